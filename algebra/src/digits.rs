@@ -12,16 +12,16 @@ use crate::Rational;
 /// Bits that a number keeps.
 const BITS: u64 = 448;
 /// Bits more for what is summed up inside a function.
-const SPARE: u64 = 64;
+const GUARD_BITS: u64 = 64;
 
 /// `mantissa * 2^exponent`, of `BITS` bits at most; zero has the exponent zero.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Digits {
+pub struct BigFloat {
     mantissa: BigInt,
     exponent: i64,
 }
 
-impl Digits {
+impl BigFloat {
     /// A relative error far above that of a chain of many operations.
     pub const ROUNDING: f64 = 1e-120;
 
@@ -40,10 +40,10 @@ impl Digits {
 
     /// Rounded to [`BITS`] bits, towards zero.
     fn new(mantissa: BigInt, exponent: i64) -> Self {
-        Self::rounded(mantissa, exponent, BITS)
+        Self::round_to_bits(mantissa, exponent, BITS)
     }
 
-    fn rounded(mantissa: BigInt, exponent: i64, bits: u64) -> Self {
+    fn round_to_bits(mantissa: BigInt, exponent: i64, bits: u64) -> Self {
         if mantissa.is_zero() {
             return Self::zero();
         }
@@ -79,7 +79,7 @@ impl Digits {
     }
 
     /// The shortest decimal number that is read as `value`: what a person wrote; `None` where that is no number.
-    pub fn as_written(value: f64) -> Option<Self> {
+    pub fn from_shortest_decimal(value: f64) -> Option<Self> {
         let text = value.is_finite().then(|| format!("{value:e}"))?;
         let (mantissa, exponent) = text.split_once('e')?;
         let n_places = mantissa
@@ -110,7 +110,7 @@ impl Digits {
 
     /// The nearest machine number, but for its last bit.
     pub fn to_f64(&self) -> f64 {
-        let short = Self::rounded(self.mantissa.clone(), self.exponent, 60);
+        let short = Self::round_to_bits(self.mantissa.clone(), self.exponent, 60);
         let mantissa = short.mantissa.to_f64().unwrap_or(0.0);
         // In two steps, so that neither power leaves the range before the product does.
         let half = short.exponent.clamp(-2200, 2200) / 2;
@@ -141,7 +141,7 @@ impl Digits {
 
     /// `self * 2^n`
     #[must_use]
-    pub fn scaled(&self, n: i64) -> Self {
+    pub fn scale_by_power_of_two(&self, n: i64) -> Self {
         let mut scaled = self.clone();
         if !scaled.is_zero() {
             scaled.exponent += n;
@@ -188,12 +188,12 @@ impl Digits {
     }
 
     /// The power of two below which its magnitude lies.
-    fn magnitude(&self) -> i64 {
+    fn binary_magnitude(&self) -> i64 {
         i64::try_from(self.mantissa.bits()).expect("some bits") + self.exponent
     }
 
     /// As an integer in units of `2^-places`.
-    fn fixed(&self, places: u64) -> BigInt {
+    fn to_fixed_point(&self, places: u64) -> BigInt {
         let shift = self.exponent + i64::try_from(places).expect("some bits");
         if shift >= 0 {
             &self.mantissa << shift.unsigned_abs()
@@ -204,20 +204,20 @@ impl Digits {
     }
 
     /// How often an argument is halved for its series, and the places that doubling costs besides.
-    fn halvings(&self) -> Option<(u64, u64)> {
+    fn argument_halvings(&self) -> Option<(u64, u64)> {
         /// Arguments beyond 2^40 have no place in a mechanism.
         const LARGEST: i64 = 40;
         const SMALL: i64 = 20;
-        let n = (self.magnitude() + SMALL).max(0);
-        let n = (self.magnitude() <= LARGEST).then(|| n.unsigned_abs())?;
-        Some((n, BITS + SPARE + 2 * n))
+        let n = (self.binary_magnitude() + SMALL).max(0);
+        let n = (self.binary_magnitude() <= LARGEST).then(|| n.unsigned_abs())?;
+        Some((n, BITS + GUARD_BITS + 2 * n))
     }
 
     /// Cosine and sine of an angle in rad; `None` of one that is beyond all measure.
     pub fn cos_sin(&self) -> Option<(Self, Self)> {
-        let (n, places) = self.halvings()?;
+        let (n, places) = self.argument_halvings()?;
         let one = BigInt::from(1) << places;
-        let x = self.scaled(-i64::try_from(n).ok()?).fixed(places);
+        let x = self.scale_by_power_of_two(-i64::try_from(n).ok()?).to_fixed_point(places);
         let square: BigInt = (&x * &x) >> places;
         // 1 - cos by its series, since doubling it loses nothing.
         let (mut term, mut versed) = (square.clone() >> 1_u32, BigInt::zero());
@@ -250,8 +250,8 @@ impl Digits {
         if self.to_f64().abs() > LARGEST {
             return None;
         }
-        let (n, places) = self.halvings()?;
-        let x = self.scaled(-i64::try_from(n).ok()?).fixed(places);
+        let (n, places) = self.argument_halvings()?;
+        let x = self.scale_by_power_of_two(-i64::try_from(n).ok()?).to_fixed_point(places);
         let mut total = BigInt::zero();
         let (mut term, mut k) = (BigInt::from(1) << places, 1_u64);
         while !term.is_zero() {
@@ -262,10 +262,10 @@ impl Digits {
             }
             k += 1;
         }
-        let mut value = Self::rounded(total, -i64::try_from(places).ok()?, places);
+        let mut value = Self::round_to_bits(total, -i64::try_from(places).ok()?, places);
         for _ in 0..n {
             let mantissa = &value.mantissa * &value.mantissa;
-            value = Self::rounded(mantissa, 2 * value.exponent, places);
+            value = Self::round_to_bits(mantissa, 2 * value.exponent, places);
         }
         Some(Self::new(value.mantissa, value.exponent))
     }
@@ -283,9 +283,9 @@ impl Digits {
 
     /// pi, by Machin's formula (1706).
     pub fn pi() -> Self {
-        static PI: OnceLock<Digits> = OnceLock::new();
+        static PI: OnceLock<BigFloat> = OnceLock::new();
         PI.get_or_init(|| {
-            let places = BITS + SPARE;
+            let places = BITS + GUARD_BITS;
             let arctangent = |inverse: u64| {
                 let mut power = (BigInt::from(1) << places) / inverse;
                 let (mut total, mut k) = (BigInt::zero(), 1_u64);
@@ -304,9 +304,9 @@ impl Digits {
     }
 }
 
-impl Add for &Digits {
-    type Output = Digits;
-    fn add(self, other: &Digits) -> Digits {
+impl Add for &BigFloat {
+    type Output = BigFloat;
+    fn add(self, other: &BigFloat) -> BigFloat {
         if self.is_zero() {
             return other.clone();
         }
@@ -319,49 +319,49 @@ impl Add for &Digits {
             (other, self)
         };
         // What lies below the last bit of the larger one is left out.
-        if high.magnitude() - low.magnitude() > i64::try_from(BITS + SPARE).expect("some bits") {
+        if high.binary_magnitude() - low.binary_magnitude() > i64::try_from(BITS + GUARD_BITS).expect("some bits") {
             return high.clone();
         }
         let shift = (high.exponent - low.exponent).unsigned_abs();
-        Digits::new((&high.mantissa << shift) + &low.mantissa, low.exponent)
+        BigFloat::new((&high.mantissa << shift) + &low.mantissa, low.exponent)
     }
 }
 
-impl Neg for &Digits {
-    type Output = Digits;
-    fn neg(self) -> Digits {
-        Digits {
+impl Neg for &BigFloat {
+    type Output = BigFloat;
+    fn neg(self) -> BigFloat {
+        BigFloat {
             mantissa: -&self.mantissa,
             exponent: self.exponent,
         }
     }
 }
 
-impl Sub for &Digits {
-    type Output = Digits;
-    fn sub(self, other: &Digits) -> Digits {
+impl Sub for &BigFloat {
+    type Output = BigFloat;
+    fn sub(self, other: &BigFloat) -> BigFloat {
         self + &-other
     }
 }
 
-impl Mul for &Digits {
-    type Output = Digits;
-    fn mul(self, other: &Digits) -> Digits {
-        Digits::new(
+impl Mul for &BigFloat {
+    type Output = BigFloat;
+    fn mul(self, other: &BigFloat) -> BigFloat {
+        BigFloat::new(
             &self.mantissa * &other.mantissa,
             self.exponent + other.exponent,
         )
     }
 }
 
-impl Div for Digits {
-    type Output = Digits;
+impl Div for BigFloat {
+    type Output = BigFloat;
     /// The divisor must not be zero.
-    fn div(self, other: Digits) -> Digits {
+    fn div(self, other: BigFloat) -> BigFloat {
         assert!(!other.is_zero(), "a divisor is not zero");
         let shift = (BITS + other.mantissa.bits() + 1).saturating_sub(self.mantissa.bits());
         let exponent = self.exponent - other.exponent - i64::try_from(shift).expect("some bits");
-        Digits::new((self.mantissa << shift) / other.mantissa, exponent)
+        BigFloat::new((self.mantissa << shift) / other.mantissa, exponent)
     }
 }
 
@@ -370,21 +370,21 @@ mod tests {
     use super::*;
 
     #[track_caller]
-    fn same(a: &Digits, b: &Digits) {
+    fn same(a: &BigFloat, b: &BigFloat) {
         let off = (a - b).abs().to_f64();
-        assert!(off <= Digits::ROUNDING * a.abs().to_f64(), "{off:.1e}");
+        assert!(off <= BigFloat::ROUNDING * a.abs().to_f64(), "{off:.1e}");
     }
 
     #[test]
     fn decimals_are_what_was_written() {
-        let tenth = Digits::as_written(0.1).unwrap();
-        same(&(&tenth * &Digits::integer(10)), &Digits::integer(1));
+        let tenth = BigFloat::from_shortest_decimal(0.1).unwrap();
+        same(&(&tenth * &BigFloat::integer(10)), &BigFloat::integer(1));
         same(
-            &Digits::as_written(-2.5e-7).unwrap(),
-            &(Digits::integer(-25) / Digits::integer(100_000_000)),
+            &BigFloat::from_shortest_decimal(-2.5e-7).unwrap(),
+            &(BigFloat::integer(-25) / BigFloat::integer(100_000_000)),
         );
         // The machine's own tenth is another number.
-        let rounded = Digits::from_f64(0.1).unwrap();
+        let rounded = BigFloat::from_f64(0.1).unwrap();
         assert!((&rounded - &tenth).abs().to_f64() > 1e-19);
         assert_eq!(rounded.to_f64().to_bits(), 0.1_f64.to_bits());
     }
@@ -392,29 +392,29 @@ mod tests {
     #[test]
     fn functions_keep_their_laws() {
         for x in [1e-9, 0.3, 1.7, -12.0, 150.0] {
-            let x = Digits::as_written(x).unwrap();
+            let x = BigFloat::from_shortest_decimal(x).unwrap();
             let (c, s) = x.cos_sin().unwrap();
-            same(&(&(&c * &c) + &(&s * &s)), &Digits::integer(1));
+            same(&(&(&c * &c) + &(&s * &s)), &BigFloat::integer(1));
             assert!((s.to_f64() - x.to_f64().sin()).abs() < 1e-14);
             assert!((c.to_f64() - x.to_f64().cos()).abs() < 1e-14);
             same(
                 &(&x.exp().unwrap() * &(-&x).exp().unwrap()),
-                &Digits::integer(1),
+                &BigFloat::integer(1),
             );
             assert!((x.tanh().unwrap().to_f64() - x.to_f64().tanh()).abs() < 1e-15);
             let root = x.abs().sqrt().unwrap();
             same(&(&root * &root), &x.abs());
         }
-        let (c, s) = Digits::pi().cos_sin().unwrap();
-        assert!(s.abs().to_f64() < Digits::ROUNDING);
-        same(&c, &Digits::integer(-1));
-        let e = Digits::integer(1).exp().unwrap();
+        let (c, s) = BigFloat::pi().cos_sin().unwrap();
+        assert!(s.abs().to_f64() < BigFloat::ROUNDING);
+        same(&c, &BigFloat::integer(-1));
+        let e = BigFloat::integer(1).exp().unwrap();
         assert!((e.to_f64() - std::f64::consts::E).abs() < 1e-15);
         same(
-            &Digits::integer(2).power(-3).unwrap(),
-            &Digits::as_written(0.125).unwrap(),
+            &BigFloat::integer(2).power(-3).unwrap(),
+            &BigFloat::from_shortest_decimal(0.125).unwrap(),
         );
-        assert!(Digits::zero().power(-1).is_none());
-        assert!(Digits::integer(-1).sqrt().is_none());
+        assert!(BigFloat::zero().power(-1).is_none());
+        assert!(BigFloat::integer(-1).sqrt().is_none());
     }
 }

@@ -1,19 +1,19 @@
 //! Gaussian elimination in the prime field, row by row.
 
-use crate::field::Element;
+use crate::field::FieldElement;
 
 /// The reduced row echelon form of the rows seen so far. It does not depend on their order.
 #[derive(Clone, Debug)]
-pub struct Echelon<const P: u64> {
+pub struct RowEchelonForm<const P: u64> {
     /// In which order columns are tried as pivots; others hold none.
     order: Vec<usize>,
     /// Columns that hold a pivot, in the order in which their rows came.
     pub pivots: Vec<usize>,
     /// One row per pivot.
-    rows: Vec<Vec<Element<P>>>,
+    rows: Vec<Vec<FieldElement<P>>>,
 }
 
-impl<const P: u64> Echelon<P> {
+impl<const P: u64> RowEchelonForm<P> {
     /// No rows yet.
     pub fn new(order: &[usize]) -> Self {
         Self {
@@ -24,7 +24,7 @@ impl<const P: u64> Echelon<P> {
     }
 
     /// Takes a row; tells whether it says anything new.
-    pub fn insert(&mut self, mut row: Vec<Element<P>>) -> bool {
+    pub fn insert(&mut self, mut row: Vec<FieldElement<P>>) -> bool {
         for (pivot, known) in self.pivots.iter().zip(&self.rows) {
             let factor = -row[*pivot];
             add_multiple(&mut row, factor, known);
@@ -33,7 +33,7 @@ impl<const P: u64> Echelon<P> {
             .order
             .iter()
             .copied()
-            .find(|c| row[*c] != Element::ZERO)
+            .find(|c| row[*c] != FieldElement::ZERO)
         else {
             return false;
         };
@@ -51,23 +51,23 @@ impl<const P: u64> Echelon<P> {
     }
 
     /// Whether a column has shown any value but zero. Rows that say nothing new cannot be the first to show one.
-    pub fn is_seen(&self, column: usize) -> bool {
-        self.rows.iter().any(|row| row[column] != Element::ZERO)
+    pub fn has_nonzero_value(&self, column: usize) -> bool {
+        self.rows.iter().any(|row| row[column] != FieldElement::ZERO)
     }
 
     /// The entry of a column in the row of a pivot; `None` if that column holds no pivot.
-    pub fn entry(&self, pivot: usize, column: usize) -> Option<Element<P>> {
+    pub fn entry(&self, pivot: usize, column: usize) -> Option<FieldElement<P>> {
         let row = self.pivots.iter().position(|p| *p == pivot)?;
         Some(self.rows[row][column])
     }
 }
 
-fn add_multiple<const P: u64>(row: &mut [Element<P>], factor: Element<P>, other: &[Element<P>]) {
-    if factor == Element::ZERO {
+fn add_multiple<const P: u64>(row: &mut [FieldElement<P>], factor: FieldElement<P>, other: &[FieldElement<P>]) {
+    if factor == FieldElement::ZERO {
         return;
     }
     for (x, y) in row.iter_mut().zip(other) {
-        if *y != Element::ZERO {
+        if *y != FieldElement::ZERO {
             *x = *x + factor * *y;
         }
     }
@@ -75,19 +75,19 @@ fn add_multiple<const P: u64>(row: &mut [Element<P>], factor: Element<P>, other:
 
 /// A basis of the solutions of `rows * x = 0`, one vector per column without pivot.
 pub fn null_space<const P: u64>(
-    rows: Vec<Vec<Element<P>>>,
+    rows: Vec<Vec<FieldElement<P>>>,
     n_columns: usize,
-) -> Vec<Vec<Element<P>>> {
+) -> Vec<Vec<FieldElement<P>>> {
     let order: Vec<usize> = (0..n_columns).collect();
-    let mut echelon = Echelon::new(&order);
+    let mut echelon = RowEchelonForm::new(&order);
     for row in rows {
         echelon.insert(row);
     }
     (0..n_columns)
         .filter(|c| !echelon.pivots.contains(c))
         .map(|free| {
-            let mut x = vec![Element::ZERO; n_columns];
-            x[free] = Element::ONE;
+            let mut x = vec![FieldElement::ZERO; n_columns];
+            x[free] = FieldElement::ONE;
             for (row, pivot) in echelon.rows.iter().zip(&echelon.pivots) {
                 x[*pivot] = -row[free];
             }

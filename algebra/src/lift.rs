@@ -11,8 +11,8 @@ const MARGIN: u64 = 30;
 
 /// The rational of smallest size with the given residues `(prime, residue)`, if it is so much smaller than the product
 /// of the primes that this cannot be chance.
-pub fn lift(residues: &[(u64, u64)]) -> Option<Rational> {
-    let (modulus, residue) = combine(residues);
+pub fn reconstruct_rational(residues: &[(u64, u64)]) -> Option<Rational> {
+    let (modulus, residue) = combine_residues(residues);
     let bits = modulus.bits();
     // Every step of Euclid's algorithm leaves a pair whose quotient has the residue; the smallest one stands out
     // (Monagan 2004).
@@ -50,7 +50,7 @@ pub fn lift(residues: &[(u64, u64)]) -> Option<Rational> {
 }
 
 /// Product of the primes, and the number below it with all the residues.
-fn combine(residues: &[(u64, u64)]) -> (BigInt, BigInt) {
+fn combine_residues(residues: &[(u64, u64)]) -> (BigInt, BigInt) {
     let (mut modulus, mut value) = (BigInt::one(), BigInt::zero());
     for &(prime, residue) in residues {
         let prime = BigInt::from(prime);
@@ -67,11 +67,11 @@ fn combine(residues: &[(u64, u64)]) -> (BigInt, BigInt) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::field::{Element, PRIMES};
+    use crate::field::{FieldElement, PRIMES};
 
     fn residues(value: &Rational, n: usize) -> Vec<(u64, u64)> {
         fn residue<const P: u64>(value: &Rational) -> (u64, u64) {
-            let element = Element::<P>::from_rational(value).unwrap();
+            let element = FieldElement::<P>::from_rational(value).unwrap();
             (P, element.representative())
         }
         [
@@ -96,7 +96,7 @@ mod tests {
         ] {
             let value = Rational::new(n, d);
             for k in 1..=3 {
-                let found = lift(&residues(&value, k));
+                let found = reconstruct_rational(&residues(&value, k));
                 assert_eq!(found, (k >= primes).then(|| value.clone()), "{n}/{d}, {k}");
             }
         }

@@ -7,18 +7,18 @@ use num_rational::BigRational;
 use num_traits::{One, Signed, Zero};
 
 /// Coefficients, the constant first, the last of them not zero; empty for zero.
-pub type Univariate = Vec<BigRational>;
+pub type UnivariatePolynomial = Vec<BigRational>;
 
 /// An interval with exact ends.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Interval {
+pub struct RationalInterval {
     /// Lower end, part of the interval.
     pub low: BigRational,
     /// Upper end, part of the interval.
     pub high: BigRational,
 }
 
-impl Interval {
+impl RationalInterval {
     /// `high - low`
     pub fn width(&self) -> BigRational {
         &self.high - &self.low
@@ -56,7 +56,7 @@ impl Interval {
 }
 
 /// The real roots of a polynomial without multiple roots, in ascending order, each in an interval of its own.
-pub fn isolate(polynomial: &[BigRational]) -> Vec<Interval> {
+pub fn isolate_roots(polynomial: &[BigRational]) -> Vec<RationalInterval> {
     let chain = sturm_chain(polynomial);
     if polynomial.len() < 2 {
         return Vec::new();
@@ -66,24 +66,24 @@ pub fn isolate(polynomial: &[BigRational]) -> Vec<Interval> {
     let largest = polynomial.iter().map(Signed::abs).max().expect("not empty");
     let bound = BigRational::one() + (largest / leading).ceil();
     let mut roots = Vec::new();
-    let whole = Interval {
+    let whole = RationalInterval {
         low: -bound.clone(),
         high: bound,
     };
     let mut open = vec![whole];
     while let Some(interval) = open.pop() {
         // Roots in (low, high].
-        let count = variations(&chain, &interval.low) - variations(&chain, &interval.high);
+        let count = sign_variations(&chain, &interval.low) - sign_variations(&chain, &interval.high);
         match count {
             0 => {}
             1 => roots.push(interval),
             _ => {
                 let middle = interval.middle();
-                open.push(Interval {
+                open.push(RationalInterval {
                     low: middle.clone(),
                     high: interval.high,
                 });
-                open.push(Interval {
+                open.push(RationalInterval {
                     low: interval.low,
                     high: middle,
                 });
@@ -94,7 +94,7 @@ pub fn isolate(polynomial: &[BigRational]) -> Vec<Interval> {
 }
 
 /// Halves an interval `(low, high]` that holds one simple root.
-pub fn halve(polynomial: &[BigRational], interval: &mut Interval) {
+pub fn halve_interval(polynomial: &[BigRational], interval: &mut RationalInterval) {
     let at_high = value(polynomial, &interval.high);
     if at_high.is_zero() {
         interval.low = interval.high.clone();
@@ -113,7 +113,7 @@ pub fn halve(polynomial: &[BigRational], interval: &mut Interval) {
 }
 
 /// The polynomial without its multiple roots.
-pub fn squarefree(polynomial: &[BigRational]) -> Univariate {
+pub fn squarefree_part(polynomial: &[BigRational]) -> UnivariatePolynomial {
     let common = gcd(polynomial.to_vec(), derivative(polynomial));
     divide(polynomial, &common).0
 }
@@ -128,7 +128,7 @@ fn value(polynomial: &[BigRational], x: &BigRational) -> BigRational {
     coefficients.fold(BigRational::zero(), |value, k| value * x + k)
 }
 
-fn derivative(polynomial: &[BigRational]) -> Univariate {
+fn derivative(polynomial: &[BigRational]) -> UnivariatePolynomial {
     let terms = polynomial.iter().enumerate().skip(1);
     terms
         .map(|(n, k)| k * BigRational::from_integer(n.into()))
@@ -136,7 +136,7 @@ fn derivative(polynomial: &[BigRational]) -> Univariate {
 }
 
 /// Divided by the size of its leading coefficient, the sign kept: remainders stay short.
-fn primitive(mut polynomial: Univariate) -> Univariate {
+fn primitive_part(mut polynomial: UnivariatePolynomial) -> UnivariatePolynomial {
     if let Some(leading) = polynomial.last().map(Signed::abs) {
         for k in &mut polynomial {
             *k /= &leading;
@@ -146,7 +146,7 @@ fn primitive(mut polynomial: Univariate) -> Univariate {
 }
 
 /// Quotient and remainder.
-fn divide(polynomial: &[BigRational], by: &[BigRational]) -> (Univariate, Univariate) {
+fn divide(polynomial: &[BigRational], by: &[BigRational]) -> (UnivariatePolynomial, UnivariatePolynomial) {
     let mut rest = polynomial.to_vec();
     let leading = by.last().expect("no division by zero");
     let steps = (rest.len() + 1).saturating_sub(by.len());
@@ -165,31 +165,31 @@ fn divide(polynomial: &[BigRational], by: &[BigRational]) -> (Univariate, Univar
     (quotient, rest)
 }
 
-fn gcd(mut a: Univariate, mut b: Univariate) -> Univariate {
+fn gcd(mut a: UnivariatePolynomial, mut b: UnivariatePolynomial) -> UnivariatePolynomial {
     while !b.is_empty() {
         let (_, rest) = divide(&a, &b);
         a = b;
-        b = primitive(rest);
+        b = primitive_part(rest);
     }
     a
 }
 
-fn sturm_chain(polynomial: &[BigRational]) -> Vec<Univariate> {
+fn sturm_chain(polynomial: &[BigRational]) -> Vec<UnivariatePolynomial> {
     let mut chain = vec![
-        primitive(polynomial.to_vec()),
-        primitive(derivative(polynomial)),
+        primitive_part(polynomial.to_vec()),
+        primitive_part(derivative(polynomial)),
     ];
     while let [.., a, b] = chain.as_slice()
         && !b.is_empty()
     {
         let (_, rest) = divide(a, b);
-        chain.push(primitive(rest.into_iter().map(|k| -k).collect()));
+        chain.push(primitive_part(rest.into_iter().map(|k| -k).collect()));
     }
     chain
 }
 
 /// Changes of sign along the chain.
-fn variations(chain: &[Univariate], x: &BigRational) -> usize {
+fn sign_variations(chain: &[UnivariatePolynomial], x: &BigRational) -> usize {
     let signs: Vec<bool> = chain
         .iter()
         .map(|p| value(p, x))
@@ -203,7 +203,7 @@ fn variations(chain: &[Univariate], x: &BigRational) -> usize {
 mod tests {
     use super::*;
 
-    fn from_roots(roots: &[(i64, i64)]) -> Univariate {
+    fn from_roots(roots: &[(i64, i64)]) -> UnivariatePolynomial {
         let mut product = vec![BigRational::one()];
         for (n, d) in roots {
             let root = BigRational::new((*n).into(), (*d).into());
@@ -227,12 +227,12 @@ mod tests {
             polynomial[k] += coefficient;
             polynomial[k + 2] += coefficient;
         }
-        let found = isolate(&polynomial);
+        let found = isolate_roots(&polynomial);
         assert_eq!(found.len(), roots.len());
         for (mut interval, (n, d)) in found.into_iter().zip(roots) {
             let root = BigRational::new(n.into(), d.into());
             for _ in 0..60 {
-                halve(&polynomial, &mut interval);
+                halve_interval(&polynomial, &mut interval);
                 assert!(interval.low <= root && root <= interval.high);
             }
             assert!(interval.width() < BigRational::new(1.into(), (1_u64 << 50).into()));
@@ -243,8 +243,8 @@ mod tests {
     fn multiple_roots_become_simple() {
         let polynomial = from_roots(&[(1, 2), (1, 2), (1, 2), (-3, 1)]);
         assert!(!is_squarefree(&polynomial));
-        let simple = squarefree(&polynomial);
+        let simple = squarefree_part(&polynomial);
         assert!(is_squarefree(&simple));
-        assert_eq!(isolate(&simple).len(), 2);
+        assert_eq!(isolate_roots(&simple).len(), 2);
     }
 }

@@ -100,12 +100,12 @@ pub fn try_generate(pattern: &str, out: &Path) -> Result<(), BuildError> {
 /// # Errors
 /// Diagnostics of all faulty model files together.
 pub fn try_generate_with(pattern: &str, options: Options, out: &Path) -> Result<(), BuildError> {
-    let files = files(pattern)?;
+    let files = matching_model_files(pattern)?;
     let mut text = String::new();
     let mut faults = String::new();
     let mut names = BTreeSet::new();
     for file in &files {
-        match module(file, options) {
+        match generate_module(file, options) {
             Ok((name, module)) if names.insert(name.clone()) => text.push_str(&module),
             Ok((name, _)) => {
                 _ = writeln!(
@@ -128,7 +128,7 @@ pub fn try_generate_with(pattern: &str, options: Options, out: &Path) -> Result<
         .map_err(|error| BuildError(format!("cannot write {error}")))
 }
 
-fn files(pattern: &str) -> Result<Vec<PathBuf>, BuildError> {
+fn matching_model_files(pattern: &str) -> Result<Vec<PathBuf>, BuildError> {
     let Some(folder) = pattern.strip_suffix("/*.toml") else {
         return Ok(vec![PathBuf::from(pattern)]);
     };
@@ -148,7 +148,7 @@ fn files(pattern: &str) -> Result<Vec<PathBuf>, BuildError> {
     Ok(files)
 }
 
-fn module(file: &Path, options: Options) -> Result<(String, String), BuildError> {
+fn generate_module(file: &Path, options: Options) -> Result<(String, String), BuildError> {
     let loaded = modelmill_spec::load_file(file);
     let sources = match &loaded {
         Ok(loaded) => &loaded.sources,

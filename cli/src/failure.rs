@@ -2,7 +2,7 @@
 
 /// Why a command ended early.
 #[derive(Debug)]
-pub(crate) enum Failure {
+pub(crate) enum CommandFailure {
     /// The library has no answer: exit status 2 where options contradict each other, else 1.
     Library(modelmill::Error),
     /// The input is at fault: exit status 1, and one message that says where, what was expected
@@ -15,9 +15,9 @@ pub(crate) enum Failure {
 }
 
 /// Result of a command.
-pub(crate) type Outcome<T = ()> = Result<T, Failure>;
+pub(crate) type CommandOutcome<T = ()> = Result<T, CommandFailure>;
 
-impl Failure {
+impl CommandFailure {
     /// The exit status.
     pub(crate) fn status(&self) -> u8 {
         match self {
@@ -28,7 +28,7 @@ impl Failure {
     }
 }
 
-impl From<modelmill::Error> for Failure {
+impl From<modelmill::Error> for CommandFailure {
     fn from(error: modelmill::Error) -> Self {
         Self::Library(error)
     }

@@ -4,47 +4,47 @@ use std::borrow::Cow;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
-use modelmill::diagnose::{Named, Separation};
+use modelmill::diagnose::{NamedEffect, SeparationProposal};
 use modelmill::edit::NewEffect;
-use modelmill::print::Spelling;
-use modelmill::recording::Reading;
+use modelmill::print::AdviceFormatter;
+use modelmill::recording::RecordingOptions;
 use modelmill::text::table::significant;
 use modelmill::{Host, Model};
-use modelmill_boundary::text::{self, Advised};
+use modelmill_boundary::text::{self, AdviceItem};
 use serde_json::Value;
 
-use crate::args::AskArgs;
+use crate::args::DiagnosisArgs;
 
 /// Significant digits of values on the command line.
 const DIGITS: usize = 5;
 
 /// The command line that asked, for texts that advise another one.
-pub(crate) struct Flags {
+pub(crate) struct CommandLineAdvice {
     /// The recordings, as the command line has them.
     recordings: String,
     /// The recordings of the fit with other names for their columns, where they need nothing else; what `excite` compares with.
     compared: String,
 }
 
-impl Flags {
+impl CommandLineAdvice {
     /// Recordings for fit and check, read as `reading` says.
-    pub(crate) fn new(fit: &[PathBuf], check: &[PathBuf], reading: &Reading) -> Self {
+    pub(crate) fn new(fit: &[PathBuf], check: &[PathBuf], reading: &RecordingOptions) -> Self {
         let named = |option: &str, paths: &[PathBuf]| -> Vec<String> {
-            let path = |p: &PathBuf| format!("{option} {}", quoted(&p.display().to_string()));
+            let path = |p: &PathBuf| format!("{option} {}", quote_word(&p.display().to_string()));
             paths.iter().map(path).collect()
         };
         let mut all = named("--data", fit);
         let mut compared = String::new();
-        let plain = Reading {
+        let plain = RecordingOptions {
             columns: reading.columns.clone(),
-            ..Reading::default()
+            ..RecordingOptions::default()
         };
         if *reading == plain {
             for data in &all {
                 let _ = write!(compared, " {data}");
             }
             for (ours, theirs) in &reading.columns {
-                let _ = write!(compared, " --map {}", quoted(&format!("{ours}={theirs}")));
+                let _ = write!(compared, " --map {}", quote_word(&format!("{ours}={theirs}")));
             }
         }
         all.extend(named("--check", check));
@@ -55,45 +55,45 @@ impl Flags {
     }
 
     /// What a command asked.
-    pub(crate) fn from_args(args: &AskArgs) -> Self {
+    pub(crate) fn from_args(args: &DiagnosisArgs) -> Self {
         Self::new(&args.data, &args.check, &args.preparation.reading())
     }
 }
 
-impl Spelling for Flags {
-    fn add(&self, model: &Model, effect: &NewEffect) -> String {
-        let mut command = command(&model.path, effect);
-        command.push_str(&with_libraries(model));
+impl AdviceFormatter for CommandLineAdvice {
+    fn add_effect(&self, model: &Model, effect: &NewEffect) -> String {
+        let mut command = add_command(&model.path, effect);
+        command.push_str(&library_flags_of_model(model));
         command
     }
 
-    fn add_from(&self, model: &Model, effect: &NewEffect, library: &str) -> String {
-        format!("{} --library {}", self.add(model, effect), quoted(library))
+    fn add_effect_from_library(&self, model: &Model, effect: &NewEffect, library: &str) -> String {
+        format!("{} --library {}", self.add_effect(model, effect), quote_word(library))
     }
 
     fn identify(&self, model: &Model) -> String {
         format!(
             "modelmill identify {} {} --out fit.json",
-            quoted(&model.path),
+            quote_word(&model.path),
             self.recordings
         )
     }
 
-    fn separate(&self, model: &Model, separation: &Separation) -> Option<String> {
+    fn separate_effects(&self, model: &Model, separation: &SeparationProposal) -> Option<String> {
         let mut command = format!(
             "modelmill excite {} --separate {}",
-            quoted(&model.path),
-            quoted(&named(&separation.effect))
+            quote_word(&model.path),
+            quote_word(&effect_argument(&separation.effect))
         );
         for rival in &separation.rivals {
-            let rival = Named {
+            let rival = NamedEffect {
                 effect: rival.clone(),
                 values: Vec::new(),
             };
-            let _ = write!(command, " --from {}", quoted(&named(&rival)));
+            let _ = write!(command, " --from {}", quote_word(&effect_argument(&rival)));
         }
-        for one in &separation.beside {
-            let _ = write!(command, " --beside {}", quoted(&named(one)));
+        for one in &separation.common_effects {
+            let _ = write!(command, " --beside {}", quote_word(&effect_argument(one)));
         }
         if let Some(noise) = separation.noise {
             let _ = write!(command, " --noise {}", significant(noise, 3));
@@ -102,17 +102,17 @@ impl Spelling for Flags {
             command,
             "{}{} --out separate.csv",
             self.compared,
-            with_libraries(model)
+            library_flags_of_model(model)
         );
         Some(command)
     }
 
-    fn held(&self) -> String {
+    fn fix_parameters(&self) -> String {
         "--held".to_owned()
     }
 
-    fn text<'a>(&self, text: &'a str) -> Cow<'a, str> {
-        spelled(text)
+    fn format_text<'a>(&self, text: &'a str) -> Cow<'a, str> {
+        format_advice(text)
     }
 }
 
@@ -126,11 +126,11 @@ const FLAGS: [(&str, &str); 5] = [
 ];
 
 /// A text of the library with its options as flags and its verbs as commands.
-pub(crate) fn spelled(text: &str) -> Cow<'_, str> {
-    let spelled = text::spelled(text, |advised| match advised {
-        Advised::Option(name, None) => format!("`{}`", flag(name)),
-        Advised::Option(name, Some(value)) => format!("`{} {}`", flag(name), in_quotes(value)),
-        Advised::Verb(name) => format!("`modelmill {name}`"),
+pub(crate) fn format_advice(text: &str) -> Cow<'_, str> {
+    let spelled = text::format_advice(text, |advised| match advised {
+        AdviceItem::Option(name, None) => format!("`{}`", flag(name)),
+        AdviceItem::Option(name, Some(value)) => format!("`{} {}`", flag(name), quote_value(value)),
+        AdviceItem::Verb(name) => format!("`modelmill {name}`"),
     });
     // Flags side by side are one piece of a command line.
     match spelled {
@@ -140,10 +140,10 @@ pub(crate) fn spelled(text: &str) -> Cow<'_, str> {
 }
 
 /// A value as a shell takes it, in the quotes that the help shows unless a shell would look into them.
-fn in_quotes(value: &str) -> Cow<'_, str> {
+fn quote_value(value: &str) -> Cow<'_, str> {
     if value.contains(['"', '$', '\\', '!', '\'']) {
-        Cow::Owned(quoted(value))
-    } else if quoted(value) != value || value.contains('/') || value.contains("=-") {
+        Cow::Owned(quote_word(value))
+    } else if quote_word(value) != value || value.contains('/') || value.contains("=-") {
         Cow::Owned(format!("\"{value}\""))
     } else {
         Cow::Borrowed(value)
@@ -159,14 +159,14 @@ fn flag(field: &str) -> String {
 }
 
 /// A JSON value with all its texts spelled as [`spelled`] does.
-pub(crate) fn spelled_in(value: &Value) -> Value {
+pub(crate) fn format_advice_in_json(value: &Value) -> Value {
     match value {
-        Value::String(text) => Value::String(spelled(text).into_owned()),
-        Value::Array(values) => values.iter().map(spelled_in).collect(),
+        Value::String(text) => Value::String(format_advice(text).into_owned()),
+        Value::Array(values) => values.iter().map(format_advice_in_json).collect(),
         Value::Object(members) => {
             let members = members.iter();
             members
-                .map(|(name, value)| (name.clone(), spelled_in(value)))
+                .map(|(name, value)| (name.clone(), format_advice_in_json(value)))
                 .collect()
         }
         Value::Null | Value::Bool(_) | Value::Number(_) => value.clone(),
@@ -174,12 +174,12 @@ pub(crate) fn spelled_in(value: &Value) -> Value {
 }
 
 /// The command that adds an effect to a model file.
-fn command(model: &str, effect: &NewEffect) -> String {
+fn add_command(model: &str, effect: &NewEffect) -> String {
     let mut command = format!(
         "modelmill add {} {} --at {}",
-        quoted(model),
+        quote_word(model),
         effect.kind,
-        quoted(&effect.at.join(","))
+        quote_word(&effect.at.join(","))
     );
     let parameters = effect.parameters.iter();
     let values = parameters.filter_map(|p| Some((p.symbol.as_str(), p.nominal?)));
@@ -192,13 +192,13 @@ fn command(model: &str, effect: &NewEffect) -> String {
 }
 
 /// How models are read, as the command line has it: libraries of kinds of one's own, and whether constants stand as numbers.
-fn with_libraries(model: &Model) -> String {
-    libraries(model.host())
+fn library_flags_of_model(model: &Model) -> String {
+    library_flags(model.host())
 }
 
 /// The same of a host.
-pub(crate) fn libraries(host: &Host) -> String {
-    let option = |path: &PathBuf| format!(" --library {}", quoted(&path.display().to_string()));
+pub(crate) fn library_flags(host: &Host) -> String {
+    let option = |path: &PathBuf| format!(" --library {}", quote_word(&path.display().to_string()));
     let mut options: String = host.libraries().iter().map(option).collect();
     if host.is_at_values() {
         options.push_str(" --at-values");
@@ -207,21 +207,21 @@ pub(crate) fn libraries(host: &Host) -> String {
 }
 
 /// `KIND@PLACE,PLACE:NAME=VALUE`.
-fn named(named: &Named) -> String {
+fn effect_argument(named: &NamedEffect) -> String {
     let mut text = format!("{}@{}", named.effect.kind, named.effect.at.join(","));
     for (symbol, value) in &named.values {
-        let _ = write!(text, ":{symbol}={}", rounded(*value));
+        let _ = write!(text, ":{symbol}={}", round_significant(*value));
     }
     text
 }
 
-fn rounded(value: f64) -> f64 {
+fn round_significant(value: f64) -> f64 {
     let text = format!("{value:.*e}", DIGITS - 1);
     text.parse().unwrap_or(value)
 }
 
 /// A word as a shell takes it.
-pub(crate) fn quoted(word: &str) -> String {
+pub(crate) fn quote_word(word: &str) -> String {
     let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./,=+:@".contains(c);
     if !word.is_empty() && word.chars().all(is_plain) {
         word.to_owned()
@@ -238,14 +238,14 @@ mod tests {
     use modelmill::edit::NewParameter;
 
     use super::*;
-    use crate::args::Cli;
+    use crate::args::CommandLine;
 
     #[test]
     fn options_of_texts_become_flags() {
         let says = "map it: option `columns` = `q=q [deg]` option `columns` = `w=w/2`, or leave option `skip_bad_samples` \
                     out; verb `identify` makes one";
         assert_eq!(
-            spelled(says),
+            format_advice(says),
             "map it: `--map \"q=q [deg]\" --map \"w=w/2\"`, or leave `--skip-bad-samples` out; `modelmill identify` makes one"
         );
     }
@@ -259,14 +259,14 @@ mod tests {
             ("q=x", "q=x"),
             ("q=-x", "\"q=-x\""),
         ] {
-            assert_eq!(in_quotes(value), expected);
+            assert_eq!(quote_value(value), expected);
         }
     }
 
     /// Every option and verb that a text of the library names is a flag or a command of the program.
     #[test]
     fn what_texts_advise_exists() {
-        let commands: Vec<clap::Command> = Cli::command().get_subcommands().cloned().collect();
+        let commands: Vec<clap::Command> = CommandLine::command().get_subcommands().cloned().collect();
         let flags: Vec<String> = commands
             .iter()
             .flat_map(clap::Command::get_arguments)
@@ -276,14 +276,14 @@ mod tests {
         let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
         for package in ["model-spec", "identify", "reduction", "modelmill"] {
             for (file, text) in sources(&root.join(package).join("src")) {
-                text::spelled(&text, |advised| {
+                text::format_advice(&text, |advised| {
                     count += 1;
                     match advised {
-                        Advised::Option(name, _) => {
+                        AdviceItem::Option(name, _) => {
                             let flag = flag(name);
                             assert!(flags.contains(&flag), "{}: {flag}", file.display());
                         }
-                        Advised::Verb(verb) => {
+                        AdviceItem::Verb(verb) => {
                             let is_verb = commands.iter().any(|c| c.get_name() == verb);
                             assert!(is_verb, "{}: {verb}", file.display());
                         }
@@ -324,14 +324,14 @@ mod tests {
             at: vec!["a".to_owned(), "b".to_owned()],
             parameters: vec![NewParameter {
                 symbol: "k".to_owned(),
-                nominal: Some(rounded(12.345_678)),
+                nominal: Some(round_significant(12.345_678)),
                 ..NewParameter::default()
             }],
             constants: vec![("q0".to_owned(), 0.5)],
             comment: None,
         };
         assert_eq!(
-            command("my arm.toml", &effect),
+            add_command("my arm.toml", &effect),
             "modelmill add 'my arm.toml' spring --at a,b --set k=12.346 --set q0=0.5 --in-place"
         );
     }

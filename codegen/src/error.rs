@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use modelmill_spec::Exact;
+use modelmill_spec::ExactExpression;
 
 /// A mechanism that the mill cannot derive, and what to do.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -105,7 +105,7 @@ pub enum DeriveError {
 }
 
 impl DeriveError {
-    pub(crate) fn unsupported(why: &'static str, expression: &Exact) -> Self {
+    pub(crate) fn unsupported(why: &'static str, expression: &ExactExpression) -> Self {
         Self::Unsupported {
             why,
             expression: format!("{expression:?}"),

@@ -15,22 +15,22 @@ mod regressor;
 pub mod review;
 mod tree;
 
-pub use derive::base::BaseParameter;
+pub use derive::base::BaseParameterEntry;
 pub use derive::{Derivation, derive_columns};
 pub use emit::{
-    Emitted, EmittedFile, Form, LANGUAGES, Language, Source, emit, emit_with_dynamics, module_name,
+    EmittedModule, EmittedFile, OutputForm, LANGUAGES, OutputLanguage, EmissionRequest, emit, emit_with_dynamics, module_name,
     vectors_c,
 };
 pub use error::DeriveError;
-pub use evaluate::{Evaluator, PoseFault, PoseReason, States};
-pub use lower::{Guard, Op, OperationCount, Program, Stage, ValueId};
+pub use evaluate::{ModelEvaluator, PoseFault, PoseReason, MotionStates};
+pub use lower::{PoseGuard, ProgramOp, OperationCount, StraightLineProgram, ProgramStage, ValueId};
 pub use modelmill_algebra::field;
-pub use on_request::dynamics::Dynamics;
+pub use on_request::dynamics::DynamicsPrograms;
 pub use on_request::passes::PassCount;
-pub use on_request::reactions::{JointReaction, LoopReaction, Reactions};
-pub use programs::{LoopPrograms, PassivePosition, Programs};
-pub use reduce::{Dependency, Method, Polynomial, Powers, RationalFunction, Reduction, Variable};
-pub use tree::expressions::Monomial;
+pub use on_request::reactions::{JointReaction, LoopReaction, ReactionPrograms};
+pub use programs::{LoopPrograms, PassivePosition, ModelPrograms};
+pub use reduce::{ColumnDependency, ReductionMethod, TrigonometricPolynomial, PowerProduct, RationalFunction, BaseReduction, FactorVariable};
+pub use tree::expressions::ParameterMonomial;
 
 use modelmill_spec::Mechanism;
 
@@ -39,6 +39,6 @@ use modelmill_spec::Mechanism;
 /// A base whose columns all but depend on each other at the file's values, so that its forces are wrong, is refused.
 pub fn derive(mechanism: &Mechanism) -> Result<Derivation, DeriveError> {
     let derivation = derive::derive(mechanism)?;
-    evaluate::lost_digits::check(&derivation)?;
+    evaluate::lost_digits::check_lost_digits(&derivation)?;
     Ok(derivation)
 }

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use modelmill_draw::{Scene, Style, svg};
+use modelmill_draw::{MechanismScene, DrawingStyle, svg};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let folder = std::env::args()
@@ -22,8 +22,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         };
         let mechanism = loaded.mechanism;
         let nominal: Vec<f64> = mechanism.coordinates.iter().map(|c| c.nominal).collect();
-        let scene = Scene::new(&mechanism, &nominal);
-        let picture = svg(&[&scene], &scene.view(), &Style::default());
+        let scene = MechanismScene::new(&mechanism, &nominal);
+        let picture = svg(&[&scene], &scene.best_view(), &DrawingStyle::default());
         println!(
             "<figure>{picture}<figcaption>{}</figcaption></figure>",
             mechanism.name

@@ -42,7 +42,7 @@ mod scene;
 mod symbols;
 mod view;
 
-pub use loads::Load;
-pub use paint::{Style, inline_svg, loaded_svg, svg};
-pub use scene::{Joint, Mark, Scene, Shape, Use};
-pub use view::View;
+pub use loads::DriveArrow;
+pub use paint::{DrawingStyle, inline_svg, loaded_svg, svg};
+pub use scene::{JointMark, SceneMark, MechanismScene, MarkShape, JointActuation};
+pub use view::ViewDirection;

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::scene::Joint;
+use crate::scene::JointMark;
 
 /// Unit vectors whose cross product is smaller are parallel.
 const PARALLEL: f64 = 1e-6;
@@ -10,13 +10,13 @@ const PARALLEL: f64 = 1e-6;
 /// The normal of the plane in which all joints move, if there is one: all axes of turning along it, all of sliding across
 /// it. Where that leaves a choice, gravity lies in the plane.
 pub(crate) fn plane_of_motion<'a>(
-    joints: impl Iterator<Item = &'a Joint>,
+    joints: impl Iterator<Item = &'a JointMark>,
     down: Option<Vector3<f64>>,
 ) -> Option<Vector3<f64>> {
-    let joints: Vec<&Joint> = joints.collect();
-    let turning = joints.iter().filter(|joint| joint.turns);
+    let joints: Vec<&JointMark> = joints.collect();
+    let turning = joints.iter().filter(|joint| joint.is_revolute);
     let sliding: Vec<Vector3<f64>> = (joints.iter())
-        .filter(|joint| joint.slides)
+        .filter(|joint| joint.is_prismatic)
         .map(|joint| joint.axis)
         .collect();
     let across = |a: &Vector3<f64>| {
@@ -34,14 +34,14 @@ pub(crate) fn plane_of_motion<'a>(
         .or_else(|| sliding.first().and_then(across))?
         .normalize();
     let is_planar = joints.iter().all(|joint| {
-        let turns = !joint.turns || joint.axis.cross(&normal).norm() < PARALLEL;
-        turns && (!joint.slides || joint.axis.dot(&normal).abs() < PARALLEL)
+        let turns = !joint.is_revolute || joint.axis.cross(&normal).norm() < PARALLEL;
+        turns && (!joint.is_prismatic || joint.axis.dot(&normal).abs() < PARALLEL)
     });
-    is_planar.then_some(towards_viewer(normal))
+    is_planar.then_some(orient_to_viewer(normal))
 }
 
 /// Of both normals of a plane the one from which the base axes look as they are used to.
-fn towards_viewer(normal: Vector3<f64>) -> Vector3<f64> {
+fn orient_to_viewer(normal: Vector3<f64>) -> Vector3<f64> {
     // z towards the viewer; else y away from them, as in a front view; else x towards them.
     let way = [normal.z, -normal.y, normal.x];
     let first = way.into_iter().find(|along| along.abs() > 0.1);
@@ -53,18 +53,18 @@ fn towards_viewer(normal: Vector3<f64>) -> Vector3<f64> {
 }
 
 /// The axes of the base frame.
-trait Axes {
+trait IdentityAxes {
     fn identity_axes() -> [Vector3<f64>; 3];
 }
 
-impl Axes for Vector3<f64> {
+impl IdentityAxes for Vector3<f64> {
     fn identity_axes() -> [Self; 3] {
         [Self::y(), Self::z(), Self::x()]
     }
 }
 
 /// Corners of the convex hull of places in one plane, in their order; `None` where these lie on a line, or in no plane.
-pub(crate) fn hull(places: &[Vector3<f64>]) -> Option<Vec<Vector3<f64>>> {
+pub(crate) fn convex_hull(places: &[Vector3<f64>]) -> Option<Vec<Vector3<f64>>> {
     const FLAT: f64 = 1e-3;
     if places.len() < 3 {
         return None;
@@ -123,14 +123,14 @@ mod tests {
             [0.5, 0.0],
         ];
         let places = square.map(|[x, y]| turn * Vector3::new(x, y, 2.0));
-        let corners = hull(&places).expect("a plane");
+        let corners = convex_hull(&places).expect("a plane");
         assert_eq!(corners.len(), 4);
         let around: f64 = (0..4)
             .map(|i| (corners[i] - corners[(i + 1) % 4]).norm())
             .sum();
         assert!((around - 4.0).abs() < 1e-9, "{around}");
         // On a line, and in no plane.
-        assert!(hull(&[Vector3::zeros(), Vector3::x(), 2.0 * Vector3::x()]).is_none());
-        assert!(hull(&[Vector3::zeros(), Vector3::x(), Vector3::y(), Vector3::z()]).is_none());
+        assert!(convex_hull(&[Vector3::zeros(), Vector3::x(), 2.0 * Vector3::x()]).is_none());
+        assert!(convex_hull(&[Vector3::zeros(), Vector3::x(), Vector3::y(), Vector3::z()]).is_none());
     }
 }

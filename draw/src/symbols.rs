@@ -2,18 +2,18 @@
 
 use std::fmt::Write as _;
 
-use crate::scene::{Joint, Use};
+use crate::scene::{JointMark, JointActuation};
 
 /// Radius of a joint's sign.
-const JOINT: f64 = 7.0;
+const JOINT_RADIUS: f64 = 7.0;
 /// Half the length of a joint's cylinder.
-const HALF: f64 = 11.0;
+const HALF_CYLINDER: f64 = 11.0;
 /// An axis whose length in the picture is below this part points at the viewer.
 const END_ON: f64 = 0.08;
 
 /// A place in the picture.
 #[derive(Clone, Copy)]
-pub(crate) struct Spot {
+pub(crate) struct SymbolPlace {
     pub(crate) at: [f64; 2],
     /// Whether the picture is one of a plane.
     pub(crate) is_flat: bool,
@@ -43,22 +43,22 @@ fn circle(class: &str, [x, y]: [f64; 2], radius: f64) -> String {
 
 /// A joint: a circle or a cylinder where it turns, a sleeve where it slides. `axis` is its direction in the picture, as
 /// long as it is seen, `towards` the part of it that points at the viewer.
-pub(crate) fn joint(joint: &Joint, spot: Spot, axis: [f64; 2], towards: f64) -> String {
-    let class = match joint.moved_by {
-        Use::Drive => "joint driven",
-        Use::Independent => "joint",
-        Use::Loops => "joint passive",
+pub(crate) fn joint(joint: &JointMark, spot: SymbolPlace, axis: [f64; 2], towards: f64) -> String {
+    let class = match joint.actuation {
+        JointActuation::Drive => "joint driven",
+        JointActuation::Independent => "joint",
+        JointActuation::Loops => "joint passive",
     };
     let length = axis[0].hypot(axis[1]);
-    if joint.slides && !joint.turns {
+    if joint.is_prismatic && !joint.is_revolute {
         return sleeve(class, spot.at, axis, length);
     }
     let mut out = if length < END_ON || spot.is_flat {
-        circle(class, spot.at, JOINT)
+        circle(class, spot.at, JOINT_RADIUS)
     } else {
         cylinder(class, spot.at, axis.map(|x| x / length), length, towards)
     };
-    if joint.slides {
+    if joint.is_prismatic {
         out.push_str(&sleeve("joint slide", spot.at, axis, length));
     }
     out
@@ -67,10 +67,10 @@ pub(crate) fn joint(joint: &Joint, spot: Spot, axis: [f64; 2], towards: f64) -> 
 /// A cylinder about `along`, a unit vector of the picture, seen so that its axis is `length` of what it is.
 fn cylinder(class: &str, at: [f64; 2], along: [f64; 2], length: f64, towards: f64) -> String {
     let across = [-along[1], along[0]];
-    let cap = JOINT * towards.abs();
+    let cap = JOINT_RADIUS * towards.abs();
     let turn = along[1].atan2(along[0]).to_degrees();
-    let end = |side: f64| [0, 1].map(|k| at[k] + side * HALF * length * along[k]);
-    let edge = |end: [f64; 2], side: f64| [0, 1].map(|k| end[k] + side * JOINT * across[k]);
+    let end = |side: f64| [0, 1].map(|k| at[k] + side * HALF_CYLINDER * length * along[k]);
+    let edge = |end: [f64; 2], side: f64| [0, 1].map(|k| end[k] + side * JOINT_RADIUS * across[k]);
     let near = if towards > 0.0 { 1.0 } else { -1.0 };
     let [far, close] = [end(-near), end(near)];
     let [a, b, c, d] = [
@@ -82,11 +82,11 @@ fn cylinder(class: &str, at: [f64; 2], along: [f64; 2], length: f64, towards: f6
     // The far cap bulges away from the near one.
     let sweep = u8::from(near < 0.0);
     let hull = format!(
-        "M{:.1} {:.1}L{:.1} {:.1}L{:.1} {:.1}L{:.1} {:.1}A{cap:.1} {JOINT:.1} {turn:.0} 0 {sweep} {:.1} {:.1}Z",
+        "M{:.1} {:.1}L{:.1} {:.1}L{:.1} {:.1}L{:.1} {:.1}A{cap:.1} {JOINT_RADIUS:.1} {turn:.0} 0 {sweep} {:.1} {:.1}Z",
         a[0], a[1], b[0], b[1], c[0], c[1], d[0], d[1], a[0], a[1]
     );
     format!(
-        "<path class=\"{class}\" d=\"{hull}\"/><ellipse class=\"{class} cap\" rx=\"{cap:.1}\" ry=\"{JOINT:.1}\" transform=\"translate({:.1} {:.1}) rotate({turn:.0})\"/>",
+        "<path class=\"{class}\" d=\"{hull}\"/><ellipse class=\"{class} cap\" rx=\"{cap:.1}\" ry=\"{JOINT_RADIUS:.1}\" transform=\"translate({:.1} {:.1}) rotate({turn:.0})\"/>",
         close[0], close[1]
     )
 }
@@ -118,8 +118,8 @@ pub(crate) fn rail(at: [f64; 2], along: [f64; 2]) -> String {
 }
 
 /// Two rings: what two points share.
-pub(crate) fn closing(spot: Spot) -> String {
-    circle("closing", spot.at, JOINT) + &circle("closing", spot.at, 3.0)
+pub(crate) fn loop_closure(spot: SymbolPlace) -> String {
+    circle("closing", spot.at, JOINT_RADIUS) + &circle("closing", spot.at, 3.0)
 }
 
 /// A cylinder with its rod.
@@ -131,7 +131,7 @@ pub(crate) fn drive([from, to]: [[f64; 2]; 2]) -> String {
 
 /// Ground with its hatching: across `up` in a plane, a disc in space. `towards` is the part of `up` that points at the
 /// viewer.
-pub(crate) fn ground(spot: Spot, up: [f64; 2], towards: f64) -> String {
+pub(crate) fn ground(spot: SymbolPlace, up: [f64; 2], towards: f64) -> String {
     let [x, y] = spot.at;
     if !spot.is_flat {
         let flat = (17.0 * towards.abs()).max(2.0);

@@ -2,20 +2,20 @@
 
 use nalgebra::Vector3;
 
-use crate::scene::Scene;
+use crate::scene::MechanismScene;
 
 /// A direction to look from.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct View {
+pub struct ViewDirection {
     /// To the right in the picture; a unit vector in the base frame.
     pub right: Vector3<f64>,
     /// Upwards in the picture.
     pub up: Vector3<f64>,
 }
 
-impl View {
+impl ViewDirection {
     /// From azimuth and elevation, rad: around the vertical from the base's x axis, and above the horizon.
-    pub fn from_angles(scene: &Scene, azimuth: f64, elevation: f64) -> Self {
+    pub fn from_angles(scene: &MechanismScene, azimuth: f64, elevation: f64) -> Self {
         let vertical = scene.down.map_or_else(Vector3::z, |down| -down);
         let level = |axis: Vector3<f64>| axis - vertical * axis.dot(&vertical);
         let ahead = [Vector3::x(), Vector3::y()].map(level);
@@ -32,7 +32,7 @@ impl View {
     }
 
     /// Towards the viewer.
-    pub fn towards(&self) -> Vector3<f64> {
+    pub fn viewer_direction(&self) -> Vector3<f64> {
         self.right.cross(&self.up)
     }
 
@@ -42,11 +42,11 @@ impl View {
     }
 }
 
-impl Scene {
+impl MechanismScene {
     /// The view that shows most: across the plane of motion where there is one, else from above and aside.
-    pub fn view(&self) -> View {
+    pub fn best_view(&self) -> ViewDirection {
         let Some(normal) = self.plane else {
-            return View::from_angles(self, -0.9, 0.42);
+            return ViewDirection::from_angles(self, -0.9, 0.42);
         };
         let within = |v: Vector3<f64>| (v - normal * v.dot(&normal)).try_normalize(0.1);
         let against = self.down.and_then(|down| within(-down));
@@ -54,7 +54,7 @@ impl Scene {
             .or_else(|| within(Vector3::y()))
             .or_else(|| within(Vector3::z()))
             .expect("no plane has both of two axes as its normal");
-        View {
+        ViewDirection {
             right: up.cross(&normal),
             up,
         }

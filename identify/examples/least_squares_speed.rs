@@ -4,7 +4,7 @@
 use std::time::Instant;
 
 use modelmill_identify::LeastSquares;
-use modelmill_identify::estimate::autocorrelated_deviations;
+use modelmill_identify::estimate::uncertainty_with_autocorrelation;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     for (parameters, channels, samples) in [(6, 2, 1_000_000), (43, 7, 100_000)] {
@@ -22,7 +22,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let solution = regression.solve()?;
         let first = start.elapsed().as_secs_f64();
         let start = Instant::now();
-        autocorrelated_deviations(&solution, channels, |visit| {
+        uncertainty_with_autocorrelation(&solution, channels, |visit| {
             (0..blocks).try_for_each(|_| visit(&w, &y))
         })?;
         let second = start.elapsed().as_secs_f64();

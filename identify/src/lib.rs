@@ -44,24 +44,24 @@ mod test_noise;
 mod words;
 
 pub use audit::{
-    ByChannel, Delay, DelayAudit, Delays, ForceAudit, PositionFault, RobustFit, Suspect, robust_fit,
+    ChannelRegressor, DelayEstimate, DelayAudit, ForceDelays, ForceAudit, PositionFault, RobustFit, WiringFault, robust_fit,
 };
 pub use estimate::{
-    Deviations, Direction, LeastSquares, LeastSquaresError, RANK_TOLERANCE, Solution, Triangle,
+    ParameterUncertainty, NullDirection, LeastSquares, LeastSquaresError, RANK_TOLERANCE, RegressionSolution, RFactor,
 };
 pub use figures::{
-    BandError, ChannelFigures, Comparison, Estimator, Figures, FiguresError, FilteredFigures,
-    FitFault, FitFile, FitFileError, FitParameter, InBand, LocateOptions, ParameterInfo, Region,
-    Status, TIME_COLUMN, TRIMMED_PART, compare, fit_parameters, in_band, locate,
+    BandError, ChannelFigures, ErrorAccumulator, EstimatorOutput, ErrorFigures, FiguresError, FilteredFigures,
+    FitFault, FitFile, FitFileError, FitParameter, FilteredChannelFigures, LocateOptions, ParameterInfo, ErrorRegion,
+    ParameterStatus, TIME_COLUMN, TRIMMED_PART, compare_forces, fit_parameters, add_filtered_forces, locate_errors,
 };
 pub use motion::{
-    DerivativeSource, Open, PASSED_BY_DECIMATION, Preparation, PreparedAs, Repeats, Run, Smoothed,
-    Smoothing, decimate, decimate_columns, decimate_table, decimate_time, differentiate,
+    DerivativeSource, PreparationChoices, DECIMATION_PASSBAND, StatePreparation, PreparationRecord, RunRepeatability, PreparedRun, SmoothedCoordinate,
+    SmoothingMethod, decimate, decimate_columns, decimate_table, decimate_time, differentiate,
     filter_and_differentiate,
 };
 pub use recording::{
-    ColumnInfo, Computed, Fault, NotFinite, Note, ReadOptions, Recording, RecordingError,
-    RecordingFile, RecordingFiles, Severity, TableInfo, has_ending_of_a_recording, name_of_bytes,
-    place_word,
+    ColumnInfo, ComputedColumn, RecordingFault, NonFinitePolicy, RecordingNote, ReadOptions, SignalRecording, RecordingError,
+    RecordingFile, RecordingFiles, NoteSeverity, TableInfo, has_recording_extension, display_name_of_bytes,
+    sample_place_word,
 };
 pub use signal::{FilterError, LowPass, MAX_FILTER_ORDER};

@@ -1,9 +1,9 @@
 //! Seeded random numbers for tests.
 
 /// `SplitMix64` with Box and Muller's transform on top.
-pub(crate) struct Noise(u64);
+pub(crate) struct TestNoise(u64);
 
-impl Noise {
+impl TestNoise {
     pub(crate) fn new(seed: u64) -> Self {
         Self(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15))
     }

@@ -29,7 +29,7 @@ pub(crate) fn with_digits(value: f64, digits: usize) -> String {
 }
 
 /// The candidate that is spelt most like `wanted`, if any comes close enough to be a likely slip.
-pub(crate) fn nearest<'a>(
+pub(crate) fn nearest_name<'a>(
     wanted: &str,
     candidates: impl IntoIterator<Item = &'a str>,
 ) -> Option<&'a str> {
@@ -73,7 +73,7 @@ fn edit_distance(a: &str, b: &str) -> usize {
 }
 
 /// Names in backquotes; a long list is cut short with its length said.
-pub(crate) fn list(names: &[String]) -> String {
+pub(crate) fn backquoted_list(names: &[String]) -> String {
     const SHOWN: usize = 40;
     let shown: Vec<String> = names
         .iter()
@@ -89,17 +89,17 @@ pub(crate) fn list(names: &[String]) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::nearest;
+    use super::nearest_name;
 
     #[test]
     fn a_slip_of_the_pen_is_found_and_a_stranger_is_not() {
         let names = ["t_s", "theta1", "theta2", "spindle_left"];
-        assert_eq!(nearest("t", names), Some("t_s"));
-        assert_eq!(nearest("spindel_left", names), Some("spindle_left"));
-        assert_eq!(nearest("Theta1", names), Some("theta1"));
-        assert_eq!(nearest("gearbox", names), None);
-        assert_eq!(nearest("q", ["t", "x"]), None);
-        assert_eq!(nearest("q", ["t", "Q"]), Some("Q"));
-        assert_eq!(nearest("q", ["t", "q1"]), Some("q1"));
+        assert_eq!(nearest_name("t", names), Some("t_s"));
+        assert_eq!(nearest_name("spindel_left", names), Some("spindle_left"));
+        assert_eq!(nearest_name("Theta1", names), Some("theta1"));
+        assert_eq!(nearest_name("gearbox", names), None);
+        assert_eq!(nearest_name("q", ["t", "x"]), None);
+        assert_eq!(nearest_name("q", ["t", "Q"]), Some("Q"));
+        assert_eq!(nearest_name("q", ["t", "q1"]), Some("q1"));
     }
 }

@@ -4,18 +4,18 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use modelmill_workbench::{Bundle, alone};
+use modelmill_workbench::{PageBundle, standalone_page};
 
 /// What the workbench is compiled to.
 pub const TARGET: &str = "wasm32-unknown-unknown";
 
 /// The workspace.
-fn root() -> PathBuf {
+fn workspace_root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
 }
 
 /// Why nothing can be compiled to WebAssembly here, with what to do; `None` where it can.
-pub fn lacks() -> Option<String> {
+pub fn missing_target() -> Option<String> {
     let asked = ["--print", "target-libdir", "--target", TARGET];
     let told = Command::new("rustc").args(asked).output().ok();
     let library = told.map(|told| String::from_utf8_lossy(&told.stdout).trim().to_owned());
@@ -27,8 +27,8 @@ pub fn lacks() -> Option<String> {
 /// Compiles the workbench in a profile of the workspace, below a folder of builds; the path of the module.
 ///
 /// Fails with a sentence when the compiler does.
-pub fn module(profile: &str, builds: &Path) -> Result<PathBuf, String> {
-    if let Some(lacks) = lacks() {
+pub fn build_module(profile: &str, builds: &Path) -> Result<PathBuf, String> {
+    if let Some(lacks) = missing_target() {
         return Err(lacks);
     }
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
@@ -42,7 +42,7 @@ pub fn module(profile: &str, builds: &Path) -> Result<PathBuf, String> {
         ])
         .args(["--target", TARGET, "--profile", profile, "--target-dir"])
         .arg(builds)
-        .current_dir(root())
+        .current_dir(workspace_root())
         .status()
         .map_err(|error| format!("cargo does not run: {error}"))?;
     if !status.success() {
@@ -56,22 +56,22 @@ pub fn module(profile: &str, builds: &Path) -> Result<PathBuf, String> {
 /// All bundled models, and the recordings of the robot with its rods, which its model does not know.
 ///
 /// Fails with a sentence when a file cannot be read.
-pub fn bundle() -> Result<Bundle, String> {
+pub fn load_bundle() -> Result<PageBundle, String> {
     let text = |path: &Path| {
         fs::read_to_string(path).map_err(|error| format!("{}: {error}", path.display()))
     };
-    let folder = root().join("model-spec/models");
+    let folder = workspace_root().join("model-spec/models");
     let entries = fs::read_dir(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
     let mut paths: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
     paths.retain(|path| path.extension().is_some_and(|e| e == "toml"));
     paths.sort();
-    let mut bundle = Bundle::default();
+    let mut bundle = PageBundle::default();
     for path in paths {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         bundle.models.push((name.into_owned(), text(&path)?));
     }
     for (name, is_check) in [("with-rods-fit.csv", false), ("with-rods-check.csv", true)] {
-        let text = text(&root().join("recordings/spidermill-mbs").join(name))?;
+        let text = text(&workspace_root().join("recordings/spidermill-mbs").join(name))?;
         let model = "spidermill.toml".to_owned();
         bundle
             .recordings
@@ -83,14 +83,14 @@ pub fn bundle() -> Result<Bundle, String> {
 /// The page around a module.
 ///
 /// Fails with a sentence when a file cannot be read.
-pub fn page(module: &Path) -> Result<String, String> {
+pub fn build_page(module: &Path) -> Result<String, String> {
     let module = fs::read(module).map_err(|error| format!("{}: {error}", module.display()))?;
-    Ok(alone(&without_names(&module), &bundle()?))
+    Ok(standalone_page(&strip_custom_sections(&module), &load_bundle()?))
 }
 
 /// A module without its custom sections, which tell debuggers of names and lines. A module is eight bytes and then sections, each
 /// with a byte for its kind (0: custom) and its length in LEB128 (WebAssembly core specification 2.0, 5.5.2).
-fn without_names(module: &[u8]) -> Vec<u8> {
+fn strip_custom_sections(module: &[u8]) -> Vec<u8> {
     let (head, mut rest) = module.split_at(8.min(module.len()));
     let mut kept = head.to_vec();
     while let [kind, after @ ..] = rest {

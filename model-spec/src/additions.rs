@@ -2,16 +2,16 @@
 //! read again.
 
 use crate::build::build;
-use crate::diagnostic::{Log, Span};
-use crate::document::Key;
-use crate::formula::{Ast, AstKind, Formula};
-use crate::load::{Failure, Loaded};
-use crate::mechanism::{Constant, Mechanism};
+use crate::diagnostic::{DiagnosticLog, SourceSpan};
+use crate::document::TomlKey;
+use crate::formula::{FormulaAst, FormulaAstKind, SourceFormula};
+use crate::load::{LoadFailure, LoadedModel};
+use crate::mechanism::{ModelConstant, Mechanism};
 use crate::parser::parse;
-use crate::record::{List, Named, OneOrMany};
+use crate::record::{EntryList, NamedEntries, OneOrMany};
 use crate::schema::{ConstantEntry, EffectEntry, EffectParameterEntry};
-use crate::unit::Unit;
-use crate::values::{Name, Number, Text};
+use crate::unit::ModelUnit;
+use crate::values::{SpannedName, SpannedNumber, SpannedText};
 
 /// An effect that shall join a model.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -36,25 +36,25 @@ pub enum ConstantValue {
 }
 
 /// Where what is in no file stands.
-const NOWHERE: Span = Span {
+const NOWHERE: SourceSpan = SourceSpan {
     file: usize::MAX,
     start: 0,
     end: 0,
 };
 
-impl Loaded {
+impl LoadedModel {
     /// The mechanism with further constants and effects, which come behind those that it has.
     ///
     /// Fails with what is wrong, as a file with these entries would: a name that is taken, an unknown kind or place, a
     /// value that is missing.
-    pub fn with(
+    pub fn with_additions(
         &self,
-        constants: &[Constant],
+        constants: &[ModelConstant],
         effects: &[AddedEffect],
-    ) -> Result<Mechanism, Failure> {
-        let mut log = Log::default();
+    ) -> Result<Mechanism, LoadFailure> {
+        let mut log = DiagnosticLog::default();
         let mut model = self.entries.model.clone();
-        let table = model.constants.get_or_insert_with(|| Named {
+        let table = model.constants.get_or_insert_with(|| NamedEntries {
             entries: Vec::new(),
             faulty: Vec::new(),
         });
@@ -62,7 +62,7 @@ impl Loaded {
             .iter()
             .map(|one| (key(&one.name), constant(one, &mut log)));
         table.entries.extend(further);
-        let list = model.effect.get_or_insert_with(|| List {
+        let list = model.effect.get_or_insert_with(|| EntryList {
             entries: Vec::new(),
             span: NOWHERE,
             faulty: false,
@@ -71,36 +71,36 @@ impl Loaded {
             list.entries.push(effect(added, &mut log));
         }
         let (mechanism, _) = build(&model, &self.entries.libraries, &mut log);
-        mechanism.ok_or_else(|| Failure {
+        mechanism.ok_or_else(|| LoadFailure {
             diagnostics: log.finish(),
             sources: self.sources.clone(),
         })
     }
 }
 
-fn key(text: &str) -> Key {
-    Key {
+fn key(text: &str) -> TomlKey {
+    TomlKey {
         name: text.to_owned(),
         span: NOWHERE,
     }
 }
 
-fn name(text: &str) -> Name {
-    Name {
+fn name(text: &str) -> SpannedName {
+    SpannedName {
         text: text.to_owned(),
         span: NOWHERE,
     }
 }
 
-fn constant(constant: &Constant, log: &mut Log) -> ConstantEntry {
+fn constant(constant: &ModelConstant, log: &mut DiagnosticLog) -> ConstantEntry {
     ConstantEntry {
         span: NOWHERE,
-        value: Some(Number {
+        value: Some(SpannedNumber {
             value: constant.value,
             span: NOWHERE,
         }),
-        unit: Unit::from_text(&constant.unit, NOWHERE, None, log),
-        note: constant.note.clone().map(|text| Text {
+        unit: ModelUnit::from_text(&constant.unit, NOWHERE, None, log),
+        note: constant.note.clone().map(|text| SpannedText {
             text,
             span: NOWHERE,
         }),
@@ -108,7 +108,7 @@ fn constant(constant: &Constant, log: &mut Log) -> ConstantEntry {
     }
 }
 
-fn effect(added: &AddedEffect, log: &mut Log) -> EffectEntry {
+fn effect(added: &AddedEffect, log: &mut DiagnosticLog) -> EffectEntry {
     let named = |name_of: &str| EffectParameterEntry {
         span: NOWHERE,
         name: Some(name(name_of)),
@@ -125,13 +125,13 @@ fn effect(added: &AddedEffect, log: &mut Log) -> EffectEntry {
             entries: added.at.iter().map(|place| name(place)).collect(),
             span: NOWHERE,
         }),
-        parameters: Some(Named {
+        parameters: Some(NamedEntries {
             entries: parameters
                 .map(|(symbol, name)| (key(symbol), named(name)))
                 .collect(),
             faulty: Vec::new(),
         }),
-        constants: (!added.constants.is_empty()).then(|| Named {
+        constants: (!added.constants.is_empty()).then(|| NamedEntries {
             entries: constants
                 .filter_map(|(symbol, value)| Some((key(symbol), formula(value, log)?)))
                 .collect(),
@@ -142,20 +142,20 @@ fn effect(added: &AddedEffect, log: &mut Log) -> EffectEntry {
     }
 }
 
-fn formula(value: &ConstantValue, log: &mut Log) -> Option<Formula> {
+fn formula(value: &ConstantValue, log: &mut DiagnosticLog) -> Option<SourceFormula> {
     Some(match value {
-        ConstantValue::Named(name) => Formula {
+        ConstantValue::Named(name) => SourceFormula {
             text: name.clone(),
-            ast: Ast {
+            ast: FormulaAst {
                 span: NOWHERE,
-                kind: AstKind::Name(name.clone()),
+                kind: FormulaAstKind::Name(name.clone()),
             },
         },
         ConstantValue::Number(value) => {
             // The decimal that a file would have, so that both mean the same rational number.
             let text = format!("{value:?}");
             let ast = parse(&text, NOWHERE, None, log)?;
-            Formula { text, ast }
+            SourceFormula { text, ast }
         }
     })
 }

@@ -8,18 +8,18 @@ use std::fmt;
 
 use num_traits::ToPrimitive;
 
-use crate::diagnostic::{Log, Span};
-use crate::exact::Function;
-use crate::formula::{Ast, AstKind};
-use crate::joint_motion::Motion;
-use crate::kinds::Carries;
+use crate::diagnostic::{DiagnosticLog, SourceSpan};
+use crate::exact::ExactFunction;
+use crate::formula::{FormulaAst, FormulaAstKind};
+use crate::joint_motion::CoordinateMotion;
+use crate::kinds::PlaceLoad;
 use crate::mechanism::Mechanism;
 use crate::parser::parse;
 use crate::suggest;
 
 /// What a column of a recording holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Quantity {
+pub enum ColumnQuantity {
     /// Time, s.
     Time,
     /// An angle or its first or second derivative, rad, rad/s, rad/s^2.
@@ -86,28 +86,28 @@ const DEGREE: f64 = std::f64::consts::PI / 180.0;
 const TURN: f64 = std::f64::consts::TAU;
 
 /// Units of columns with the factor that leads to SI, the SI unit first.
-fn units(quantity: Quantity) -> &'static [(&'static str, f64)] {
+fn units(quantity: ColumnQuantity) -> &'static [(&'static str, f64)] {
     match quantity {
-        Quantity::Time => &[("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("min", 60.0)],
-        Quantity::Number => &[("1", 1.0)],
-        Quantity::Angle(0) => &[("rad", 1.0), ("deg", DEGREE), ("mrad", 1e-3), ("rev", TURN)],
-        Quantity::Angle(1) => &[
+        ColumnQuantity::Time => &[("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("min", 60.0)],
+        ColumnQuantity::Number => &[("1", 1.0)],
+        ColumnQuantity::Angle(0) => &[("rad", 1.0), ("deg", DEGREE), ("mrad", 1e-3), ("rev", TURN)],
+        ColumnQuantity::Angle(1) => &[
             ("rad/s", 1.0),
             ("deg/s", DEGREE),
             ("rpm", TURN / 60.0),
             ("rev/s", TURN),
         ],
-        Quantity::Angle(_) => &[("rad/s^2", 1.0), ("deg/s^2", DEGREE), ("rev/s^2", TURN)],
-        Quantity::Length(0) => &[("m", 1.0), ("mm", 1e-3), ("cm", 1e-2), ("um", 1e-6)],
-        Quantity::Length(1) => &[
+        ColumnQuantity::Angle(_) => &[("rad/s^2", 1.0), ("deg/s^2", DEGREE), ("rev/s^2", TURN)],
+        ColumnQuantity::Length(0) => &[("m", 1.0), ("mm", 1e-3), ("cm", 1e-2), ("um", 1e-6)],
+        ColumnQuantity::Length(1) => &[
             ("m/s", 1.0),
             ("mm/s", 1e-3),
             ("cm/s", 1e-2),
             ("mm/min", 1e-3 / 60.0),
         ],
-        Quantity::Length(_) => &[("m/s^2", 1.0), ("mm/s^2", 1e-3), ("cm/s^2", 1e-2)],
-        Quantity::Force => &[("N", 1.0), ("kN", 1e3), ("mN", 1e-3)],
-        Quantity::Torque => &[
+        ColumnQuantity::Length(_) => &[("m/s^2", 1.0), ("mm/s^2", 1e-3), ("cm/s^2", 1e-2)],
+        ColumnQuantity::Force => &[("N", 1.0), ("kN", 1e3), ("mN", 1e-3)],
+        ColumnQuantity::Torque => &[
             ("N m", 1.0),
             ("Nm", 1.0),
             ("N mm", 1e-3),
@@ -119,33 +119,33 @@ fn units(quantity: Quantity) -> &'static [(&'static str, f64)] {
             ("kN m", 1e3),
             ("kNm", 1e3),
         ],
-        Quantity::ForceVariance => &[("N^2", 1.0), ("kN^2", 1e6), ("mN^2", 1e-6)],
-        Quantity::TorqueVariance => &[("N^2 m^2", 1.0), ("(N m)^2", 1.0), ("Nm^2", 1.0)],
+        ColumnQuantity::ForceVariance => &[("N^2", 1.0), ("kN^2", 1e6), ("mN^2", 1e-6)],
+        ColumnQuantity::TorqueVariance => &[("N^2 m^2", 1.0), ("(N m)^2", 1.0), ("Nm^2", 1.0)],
     }
 }
 
 impl Mechanism {
     /// The names that columns of recordings have in this model, with what each holds: `t`, every active coordinate
     /// with its two derivatives (`_d`, `_dd`), and every drive with the variance of its force (`_var`).
-    pub fn columns(&self) -> Vec<(String, Quantity)> {
-        let mut columns = vec![("t".to_owned(), Quantity::Time)];
+    pub fn columns(&self) -> Vec<(String, ColumnQuantity)> {
+        let mut columns = vec![("t".to_owned(), ColumnQuantity::Time)];
         for coordinate in self.coordinates.iter().filter(|c| !c.passive) {
             for (order, suffix) in (0..).zip(["", "_d", "_dd"]) {
                 let quantity = match coordinate.motion {
-                    Motion::Revolute => Quantity::Angle(order),
-                    Motion::Prismatic => Quantity::Length(order),
+                    CoordinateMotion::Revolute => ColumnQuantity::Angle(order),
+                    CoordinateMotion::Prismatic => ColumnQuantity::Length(order),
                     // Rates of the vector part are angular velocities; the scalar part has none.
-                    Motion::Quaternion if order > 0 => Quantity::Angle(order),
-                    Motion::QuaternionScalar if order > 0 => continue,
-                    Motion::Quaternion | Motion::QuaternionScalar => Quantity::Number,
+                    CoordinateMotion::Quaternion if order > 0 => ColumnQuantity::Angle(order),
+                    CoordinateMotion::QuaternionScalar if order > 0 => continue,
+                    CoordinateMotion::Quaternion | CoordinateMotion::QuaternionScalar => ColumnQuantity::Number,
                 };
                 columns.push((format!("{}{suffix}", coordinate.name), quantity));
             }
         }
         for drive in self.drives.iter().chain(&self.shared_drives) {
-            let (force, variance) = match drive.kind.carries(&self.coordinates) {
-                Carries::Torque => (Quantity::Torque, Quantity::TorqueVariance),
-                _ => (Quantity::Force, Quantity::ForceVariance),
+            let (force, variance) = match drive.kind.place_load(&self.coordinates) {
+                PlaceLoad::Torque => (ColumnQuantity::Torque, ColumnQuantity::TorqueVariance),
+                _ => (ColumnQuantity::Force, ColumnQuantity::ForceVariance),
             };
             columns.push((drive.name.clone(), force));
             columns.push((format!("{}_var", drive.name), variance));
@@ -171,7 +171,7 @@ impl Mechanism {
 /// ```
 pub fn read_column(
     text: &str,
-    quantity: Quantity,
+    quantity: ColumnQuantity,
     names: &[String],
     constants: &dyn Fn(&str) -> Option<f64>,
 ) -> Result<ColumnSum, ColumnFault> {
@@ -197,12 +197,12 @@ pub fn read_column(
         nearest: suggest::nearest(column, names.iter().map(String::as_str)).map(str::to_owned),
     };
     let (plain, stand_ins) = with_plain_names(body, names);
-    let span = Span {
+    let span = SourceSpan {
         file: 0,
         start: 0,
         end: plain.len(),
     };
-    let mut log = Log::default();
+    let mut log = DiagnosticLog::default();
     let Some(ast) = parse(&plain, span, None, &mut log) else {
         // What cannot be read as an expression is taken for a name with blanks and the like.
         if !body.contains(['+', '*', '/', '^', '(']) {
@@ -217,19 +217,19 @@ pub fn read_column(
             ),
         });
     };
-    let sum = affine(&ast, &|name| {
+    let sum = affine_value(&ast, &|name| {
         let stands_for = stand_ins.iter().find(|(stand_in, _)| stand_in == name);
         if let Some((_, column)) = stands_for {
-            Some(Value::column(column))
+            Some(AffineValue::column(column))
         } else if has(name) {
-            Some(Value::column(name))
+            Some(AffineValue::column(name))
         } else {
-            constants(name).map(Value::number)
+            constants(name).map(AffineValue::number)
         }
     })
     .map_err(|fault| match fault {
-        Unread::Name(name) => missing(&name),
-        Unread::Says(says) => ColumnFault::Malformed {
+        AffineFault::Name(name) => missing(&name),
+        AffineFault::Says(says) => ColumnFault::Malformed {
             says: format!("in `{body}` {says}"),
         },
     })?;
@@ -286,14 +286,14 @@ fn with_plain_names<'a>(text: &str, names: &'a [String]) -> (String, Vec<(String
 /// Why a text can be the description of no column of any recording; `None` if it can be.
 pub(crate) fn fault_without_recording(text: &str) -> Option<String> {
     let (body, _) = split_unit(text.trim());
-    let span = Span {
+    let span = SourceSpan {
         file: 0,
         start: 0,
         end: text.len(),
     };
-    let ast = parse(body, span, None, &mut Log::default())?;
-    match affine(&ast, &|name| Some(Value::column(name))) {
-        Err(Unread::Says(says)) => Some(says),
+    let ast = parse(body, span, None, &mut DiagnosticLog::default())?;
+    match affine_value(&ast, &|name| Some(AffineValue::column(name))) {
+        Err(AffineFault::Says(says)) => Some(says),
         _ => None,
     }
 }
@@ -309,7 +309,7 @@ fn split_unit(text: &str) -> (&str, Option<&str>) {
     }
 }
 
-fn factor_of(unit: &str, quantity: Quantity) -> Result<f64, ColumnFault> {
+fn factor_of(unit: &str, quantity: ColumnQuantity) -> Result<f64, ColumnFault> {
     let units = units(quantity);
     let found = units.iter().find(|(name, _)| *name == unit);
     found
@@ -328,18 +328,18 @@ fn factor_of(unit: &str, quantity: Quantity) -> Result<f64, ColumnFault> {
 
 /// An affine value while it is worked out.
 #[derive(Clone, Debug, Default)]
-struct Value {
+struct AffineValue {
     terms: Vec<(String, f64)>,
     offset: f64,
 }
 
 /// Why an expression has no affine value.
-enum Unread {
+enum AffineFault {
     Name(String),
     Says(String),
 }
 
-impl Value {
+impl AffineValue {
     fn number(offset: f64) -> Self {
         Self {
             terms: Vec::new(),
@@ -376,31 +376,31 @@ impl Value {
 }
 
 /// The affine value of an expression.
-fn affine(ast: &Ast, look_up: &dyn Fn(&str) -> Option<Value>) -> Result<Value, Unread> {
-    let of = |ast: &Ast| affine(ast, look_up);
-    let number = |ast: &Ast, what: &str| {
-        let value = affine(ast, look_up)?;
+fn affine_value(ast: &FormulaAst, look_up: &dyn Fn(&str) -> Option<AffineValue>) -> Result<AffineValue, AffineFault> {
+    let of = |ast: &FormulaAst| affine_value(ast, look_up);
+    let number = |ast: &FormulaAst, what: &str| {
+        let value = affine_value(ast, look_up)?;
         if value.terms.is_empty() {
             return Ok(value.offset);
         }
-        Err(Unread::Says(format!(
+        Err(AffineFault::Says(format!(
             "a column stands {what}; expected a sum of columns, each times a number, and numbers"
         )))
     };
     let value = match &ast.kind {
-        AstKind::Rational(value) => Value::number(value.to_f64().unwrap_or(f64::NAN)),
-        AstKind::Pi => Value::number(std::f64::consts::PI),
-        AstKind::Name(name) => look_up(name).ok_or_else(|| Unread::Name(name.clone()))?,
-        AstKind::Sum(terms) => {
-            let mut sum = Value::default();
+        FormulaAstKind::Rational(value) => AffineValue::number(value.to_f64().unwrap_or(f64::NAN)),
+        FormulaAstKind::Pi => AffineValue::number(std::f64::consts::PI),
+        FormulaAstKind::Name(name) => look_up(name).ok_or_else(|| AffineFault::Name(name.clone()))?,
+        FormulaAstKind::Sum(terms) => {
+            let mut sum = AffineValue::default();
             for term in terms {
                 sum = sum.add(of(term)?);
             }
             sum
         }
-        AstKind::Negative(inner) => of(inner)?.map(|value| -value),
-        AstKind::Product(factors) => {
-            let mut product = Value::number(1.0);
+        FormulaAstKind::Negative(inner) => of(inner)?.map(|value| -value),
+        FormulaAstKind::Product(factors) => {
+            let mut product = AffineValue::number(1.0);
             for factor in factors {
                 let factor = of(factor)?;
                 product = if factor.terms.is_empty() {
@@ -408,7 +408,7 @@ fn affine(ast: &Ast, look_up: &dyn Fn(&str) -> Option<Value>) -> Result<Value, U
                 } else if product.terms.is_empty() {
                     factor.map(|value| value * product.offset)
                 } else {
-                    return Err(Unread::Says(
+                    return Err(AffineFault::Says(
                         "columns are multiplied with each other; expected a sum of columns, each times a number"
                             .to_owned(),
                     ));
@@ -416,37 +416,37 @@ fn affine(ast: &Ast, look_up: &dyn Fn(&str) -> Option<Value>) -> Result<Value, U
             }
             product
         }
-        AstKind::Quotient(above, below) => {
+        FormulaAstKind::Quotient(above, below) => {
             let below = number(below, "below a fraction line")?;
             of(above)?.map(|value| value / below)
         }
-        AstKind::Power(base, 1) => of(base)?,
-        AstKind::Power(base, exponent) => {
-            Value::number(number(base, "in a power")?.powi(*exponent))
+        FormulaAstKind::Power(base, 1) => of(base)?,
+        FormulaAstKind::Power(base, exponent) => {
+            AffineValue::number(number(base, "in a power")?.powi(*exponent))
         }
-        AstKind::Apply(function, inner) => {
-            Value::number(apply(*function, number(inner, "in a function")?))
+        FormulaAstKind::Apply(function, inner) => {
+            AffineValue::number(apply_function(*function, number(inner, "in a function")?))
         }
     };
     if value.offset.is_finite() && value.terms.iter().all(|(_, factor)| factor.is_finite()) {
         Ok(value)
     } else {
-        Err(Unread::Says(
+        Err(AffineFault::Says(
             "a number is not finite; is something divided by zero?".to_owned(),
         ))
     }
 }
 
-fn apply(function: Function, x: f64) -> f64 {
+fn apply_function(function: ExactFunction, x: f64) -> f64 {
     match function {
-        Function::Sin => x.sin(),
-        Function::Cos => x.cos(),
-        Function::Sqrt => x.sqrt(),
-        Function::Abs => x.abs(),
-        Function::Sign if x == 0.0 => 0.0,
-        Function::Sign => x.signum(),
-        Function::Tanh => x.tanh(),
-        Function::Exp => x.exp(),
+        ExactFunction::Sin => x.sin(),
+        ExactFunction::Cos => x.cos(),
+        ExactFunction::Sqrt => x.sqrt(),
+        ExactFunction::Abs => x.abs(),
+        ExactFunction::Sign if x == 0.0 => 0.0,
+        ExactFunction::Sign => x.signum(),
+        ExactFunction::Tanh => x.tanh(),
+        ExactFunction::Exp => x.exp(),
     }
 }
 
@@ -458,7 +458,7 @@ mod tests {
 
     fn read(text: &str) -> Result<ColumnSum, ColumnFault> {
         let names = ["t_s", "qm5", "qm6", "pos 1 [deg]", "pos"].map(str::to_owned);
-        read_column(text, Quantity::Angle(0), &names, &|name| {
+        read_column(text, ColumnQuantity::Angle(0), &names, &|name| {
             (name == "N5").then_some(45.0)
         })
     }
@@ -518,7 +518,7 @@ mod tests {
             "lab/split.effort.arm/wrist",
         ]
         .map(str::to_owned);
-        let read = |text: &str| read_column(text, Quantity::Angle(0), &names, &|_| None).unwrap();
+        let read = |text: &str| read_column(text, ColumnQuantity::Angle(0), &names, &|_| None).unwrap();
         let sum = read("-joints.position.q/2 + 3*joints.position.q2");
         assert_eq!(
             sum.terms,
@@ -530,7 +530,7 @@ mod tests {
         let sum = read("2*lab/split.effort.arm/wrist - 1");
         assert_eq!(sum.terms, [("lab/split.effort.arm/wrist".to_owned(), 2.0)]);
         assert!((sum.offset + 1.0).abs() < 1e-15);
-        let missing = read_column("-joints.position.q3", Quantity::Angle(0), &names, &|_| None);
+        let missing = read_column("-joints.position.q3", ColumnQuantity::Angle(0), &names, &|_| None);
         assert!(missing.is_err());
     }
 }

@@ -16,7 +16,7 @@ const LONGEST_PRINTED_LINE: usize = 400;
 
 /// A stretch of bytes in one of the files read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct Span {
+pub struct SourceSpan {
     /// Index into [`Sources::files`].
     pub file: usize,
     /// First byte.
@@ -27,7 +27,7 @@ pub struct Span {
 
 /// How grave a finding is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Severity {
+pub enum DiagnosticSeverity {
     /// The file has no meaning until this is mended.
     Error,
     /// The file has a meaning, though perhaps not the one intended.
@@ -38,24 +38,24 @@ pub enum Severity {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Diagnostic {
     /// Error or warning.
-    pub severity: Severity,
+    pub severity: DiagnosticSeverity,
     /// What is wrong, in one line.
     pub message: String,
     /// Where; absent if a file could not be read at all.
-    pub span: Option<Span>,
+    pub span: Option<SourceSpan>,
     /// What was expected there; may be empty.
     pub label: String,
     /// Another place that explains the finding, such as a first definition.
-    pub related: Option<(Span, String)>,
+    pub related: Option<(SourceSpan, String)>,
     /// What to do, one sentence each.
     pub help: Vec<String>,
 }
 
 impl Diagnostic {
     /// An error at a place.
-    pub(crate) fn error(span: Span, message: impl Into<String>) -> Self {
+    pub(crate) fn error(span: SourceSpan, message: impl Into<String>) -> Self {
         Self {
-            severity: Severity::Error,
+            severity: DiagnosticSeverity::Error,
             message: message.into(),
             span: Some(span),
             label: String::new(),
@@ -65,9 +65,9 @@ impl Diagnostic {
     }
 
     /// A warning at a place.
-    pub(crate) fn warning(span: Span, message: impl Into<String>) -> Self {
+    pub(crate) fn warning(span: SourceSpan, message: impl Into<String>) -> Self {
         Self {
-            severity: Severity::Warning,
+            severity: DiagnosticSeverity::Warning,
             ..Self::error(span, message)
         }
     }
@@ -81,14 +81,14 @@ impl Diagnostic {
 
     /// Points at a second place.
     #[must_use]
-    pub(crate) fn related(mut self, span: Span, label: impl Into<String>) -> Self {
+    pub(crate) fn related(mut self, span: SourceSpan, label: impl Into<String>) -> Self {
         self.related = Some((span, label.into()));
         self
     }
 
     /// Points to where a variant removes what is missing; otherwise gives other advice.
     #[must_use]
-    pub(crate) fn removed_or(self, removal: Option<Span>, advice: impl FnOnce() -> String) -> Self {
+    pub(crate) fn with_removal_or(self, removal: Option<SourceSpan>, advice: impl FnOnce() -> String) -> Self {
         match removal {
             Some(span) => self
                 .related(span, "the variant removes it here")
@@ -123,19 +123,19 @@ pub struct SourceFile {
 
 /// The files that a model was read from, the model's own first.
 #[derive(Clone, Debug, Default)]
-pub struct Sources {
+pub struct SourceFiles {
     /// The files in the order in which they were read.
     pub files: Vec<SourceFile>,
 }
 
-impl Sources {
+impl SourceFiles {
     /// The paths of all files, for `cargo:rerun-if-changed`.
     pub fn paths(&self) -> impl Iterator<Item = &std::path::Path> {
         self.files.iter().map(|file| file.path.as_path())
     }
 
     /// Line and column of a place, both counted from one, the column in characters.
-    pub fn line_and_column(&self, span: Span) -> (usize, usize) {
+    pub fn line_and_column(&self, span: SourceSpan) -> (usize, usize) {
         let Some(file) = self.files.get(span.file) else {
             return (1, 1);
         };
@@ -148,20 +148,20 @@ impl Sources {
 
 /// Collects findings while a file is read.
 #[derive(Debug, Default)]
-pub(crate) struct Log {
+pub(crate) struct DiagnosticLog {
     diagnostics: Vec<Diagnostic>,
     n_errors: usize,
     n_left_off: usize,
     /// Set while the text itself is broken: what is missing then is no news.
     pub(crate) syntax_broken: bool,
     /// Where variants remove entries, by section and name: what still uses one is told so.
-    pub(crate) removed: BTreeMap<(String, String), Span>,
+    pub(crate) removed: BTreeMap<(String, String), SourceSpan>,
 }
 
-impl Log {
+impl DiagnosticLog {
     /// Takes a finding.
     pub(crate) fn push(&mut self, diagnostic: Diagnostic) {
-        if diagnostic.severity == Severity::Error {
+        if diagnostic.severity == DiagnosticSeverity::Error {
             self.n_errors += 1;
         }
         if self.diagnostics.contains(&diagnostic) || self.is_consequence(&diagnostic) {
@@ -187,7 +187,7 @@ impl Log {
     }
 
     /// Where a variant removes an entry from one of these sections.
-    pub(crate) fn removal(&self, sections: &[&str], name: &str) -> Option<Span> {
+    pub(crate) fn removal(&self, sections: &[&str], name: &str) -> Option<SourceSpan> {
         sections.iter().find_map(|section| {
             let key = ((*section).to_owned(), name.to_owned());
             self.removed.get(&key).copied()
@@ -206,9 +206,9 @@ impl Log {
         if self.n_left_off > 0 {
             self.diagnostics.push(Diagnostic {
                 severity: if self.n_errors > 0 {
-                    Severity::Error
+                    DiagnosticSeverity::Error
                 } else {
-                    Severity::Warning
+                    DiagnosticSeverity::Warning
                 },
                 message: format!(
                     "{} not shown; mend the first ones and look again",
@@ -228,7 +228,7 @@ impl Log {
 }
 
 /// Renders findings one below the other, with the text they mean.
-pub(crate) fn render(diagnostics: &[Diagnostic], sources: &Sources, color: bool) -> String {
+pub(crate) fn render(diagnostics: &[Diagnostic], sources: &SourceFiles, color: bool) -> String {
     let renderer = if color {
         Renderer::styled()
     } else {
@@ -246,27 +246,27 @@ pub(crate) fn render(diagnostics: &[Diagnostic], sources: &Sources, color: bool)
     modelmill_boundary::text::terminal(&text, color).into_owned()
 }
 
-fn render_one(diagnostic: &Diagnostic, sources: &Sources, renderer: &Renderer) -> String {
+fn render_one(diagnostic: &Diagnostic, sources: &SourceFiles, renderer: &Renderer) -> String {
     let level = match diagnostic.severity {
-        Severity::Error => Level::ERROR,
-        Severity::Warning => Level::WARNING,
+        DiagnosticSeverity::Error => Level::ERROR,
+        DiagnosticSeverity::Warning => Level::WARNING,
     };
     let mut group = Group::with_title(level.primary_title(diagnostic.message.as_str()));
     if let Some(span) = diagnostic.span {
         let label = Some(diagnostic.label.as_str()).filter(|label| !label.is_empty());
         match diagnostic.related.as_ref() {
             Some((other, text)) if other.file == span.file => {
-                group = place(
+                group = annotate_lines(
                     group,
                     sources,
                     &[(span, label, true), (*other, Some(text), false)],
                 );
             }
             Some((other, text)) => {
-                group = place(group, sources, &[(span, label, true)]);
-                group = place(group, sources, &[(*other, Some(text), false)]);
+                group = annotate_lines(group, sources, &[(span, label, true)]);
+                group = annotate_lines(group, sources, &[(*other, Some(text), false)]);
             }
-            None => group = place(group, sources, &[(span, label, true)]),
+            None => group = annotate_lines(group, sources, &[(span, label, true)]),
         }
     }
     if diagnostic.span.is_none() {
@@ -284,10 +284,10 @@ fn render_one(diagnostic: &Diagnostic, sources: &Sources, renderer: &Renderer) -
 }
 
 /// Adds the marked lines of one file to a group; long lines are named, not shown.
-fn place<'a>(
+fn annotate_lines<'a>(
     group: Group<'a>,
-    sources: &'a Sources,
-    marks: &[(Span, Option<&'a str>, bool)],
+    sources: &'a SourceFiles,
+    marks: &[(SourceSpan, Option<&'a str>, bool)],
 ) -> Group<'a> {
     let Some(file) = marks
         .first()

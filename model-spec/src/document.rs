@@ -2,8 +2,8 @@
 
 use toml::de::{DeTable, DeValue};
 
-use crate::diagnostic::{Diagnostic, Log, Span};
-use crate::unclosed::unclosed;
+use crate::diagnostic::{Diagnostic, DiagnosticLog, SourceSpan};
+use crate::unclosed::first_unclosed_bracket;
 
 /// Files larger than this are refused unread.
 pub const LARGEST_FILE: usize = 4 << 20;
@@ -14,14 +14,14 @@ const LONGEST_QUOTE: usize = 60;
 
 /// A value with its place.
 #[derive(Clone, Debug)]
-pub(crate) struct Node {
-    pub(crate) span: Span,
-    pub(crate) value: Value,
+pub(crate) struct TomlNode {
+    pub(crate) span: SourceSpan,
+    pub(crate) value: TomlValue,
 }
 
 /// What a place of the file holds.
 #[derive(Clone, Debug)]
-pub(crate) enum Value {
+pub(crate) enum TomlValue {
     /// A string; `inner` is the byte where its content starts, if it stands there without escapes.
     Text { text: String, inner: Option<usize> },
     /// An integer or a decimal, as written.
@@ -31,40 +31,40 @@ pub(crate) enum Value {
     /// A date or time, for which a model has no use.
     Datetime,
     /// A list.
-    Array(Vec<Node>),
+    Array(Vec<TomlNode>),
     /// Keys with values, in the order of the file.
-    Table(Table),
+    Table(TomlTable),
 }
 
 /// Keys with values, in the order of the file.
-pub(crate) type Table = Vec<(Key, Node)>;
+pub(crate) type TomlTable = Vec<(TomlKey, TomlNode)>;
 
 /// A key with its place.
 #[derive(Clone, Debug)]
-pub(crate) struct Key {
+pub(crate) struct TomlKey {
     pub(crate) name: String,
-    pub(crate) span: Span,
+    pub(crate) span: SourceSpan,
 }
 
-impl Node {
+impl TomlNode {
     /// What kind of value this is, for messages.
     pub(crate) fn kind(&self) -> &'static str {
         match &self.value {
-            Value::Text { .. } => "a string",
-            Value::Number {
+            TomlValue::Text { .. } => "a string",
+            TomlValue::Number {
                 is_integer: true, ..
             } => "an integer",
-            Value::Number { .. } => "a number",
-            Value::Boolean(_) => "a boolean",
-            Value::Datetime => "a date",
-            Value::Array(_) => "an array",
-            Value::Table(_) => "a table",
+            TomlValue::Number { .. } => "a number",
+            TomlValue::Boolean(_) => "a boolean",
+            TomlValue::Datetime => "a date",
+            TomlValue::Array(_) => "an array",
+            TomlValue::Table(_) => "a table",
         }
     }
 }
 
 /// Finds a key of a table.
-pub(crate) fn get<'a>(table: &'a Table, name: &str) -> Option<&'a (Key, Node)> {
+pub(crate) fn find_key<'a>(table: &'a TomlTable, name: &str) -> Option<&'a (TomlKey, TomlNode)> {
     table.iter().find(|(key, _)| key.name == name)
 }
 
@@ -79,9 +79,9 @@ pub(crate) fn quote(text: &str) -> String {
 }
 
 /// Parses a file; syntax errors go to the log, and what could be understood comes back.
-pub(crate) fn parse(text: &str, file: usize, log: &mut Log) -> Table {
+pub(crate) fn parse_toml(text: &str, file: usize, log: &mut DiagnosticLog) -> TomlTable {
     // The parser takes all that follows an open bracket for its inside; what stands before is read by itself.
-    let open = unclosed(text)
+    let open = first_unclosed_bracket(text)
         .filter(|_| text.len() <= LARGEST_FILE && !DeTable::parse_recoverable(text).1.is_empty());
     let Some(open) = open else {
         return parse_closed(text, file, log);
@@ -89,7 +89,7 @@ pub(crate) fn parse(text: &str, file: usize, log: &mut Log) -> Table {
     let line = text[..open.outermost].rfind('\n').map_or(0, |end| end + 1);
     let table = parse_closed(&text[..line], file, log);
     log.syntax_broken = true;
-    let span = |at: usize, length: usize| Span {
+    let span = |at: usize, length: usize| SourceSpan {
         file,
         start: at,
         end: (at + length).min(text.len()),
@@ -107,8 +107,8 @@ pub(crate) fn parse(text: &str, file: usize, log: &mut Log) -> Table {
     table
 }
 
-fn parse_closed(text: &str, file: usize, log: &mut Log) -> Table {
-    let whole = Span {
+fn parse_closed(text: &str, file: usize, log: &mut DiagnosticLog) -> TomlTable {
+    let whole = SourceSpan {
         file,
         start: 0,
         end: 0,
@@ -120,7 +120,7 @@ fn parse_closed(text: &str, file: usize, log: &mut Log) -> Table {
                 .label(format!("a model file has at most {LARGEST_FILE} bytes"))
                 .help("model files hold a mechanism; recordings belong into CSV files"),
         );
-        return Table::new();
+        return TomlTable::new();
     }
     let (root, mut errors) = DeTable::parse_recoverable(text);
     errors.sort_by_key(|error| error.span().map_or(0, |range| range.start));
@@ -137,7 +137,7 @@ fn parse_closed(text: &str, file: usize, log: &mut Log) -> Table {
         {
             continue;
         }
-        let span = error.span().map_or(whole, |range| Span {
+        let span = error.span().map_or(whole, |range| SourceSpan {
             file,
             start: range.start.min(text.len()),
             end: range.end.min(text.len()).max(range.start.min(text.len())),
@@ -150,7 +150,7 @@ fn parse_closed(text: &str, file: usize, log: &mut Log) -> Table {
                     .label("expected TOML, such as `schema = 1`")
                     .help("a recording goes where recordings are asked for (option `data`)"),
             );
-            return Table::new();
+            return TomlTable::new();
         }
         if found.len() > 200 {
             break;
@@ -162,7 +162,7 @@ fn parse_closed(text: &str, file: usize, log: &mut Log) -> Table {
     table(root.into_inner(), text, file)
 }
 
-fn syntax_error(span: Span, message: &str) -> Diagnostic {
+fn syntax_error(span: SourceSpan, message: &str) -> Diagnostic {
     if message.starts_with("string values must be quoted") {
         return Diagnostic::error(span, "this is not TOML: this value cannot be read")
             .label("expected one value, texts and expressions in quotes")
@@ -185,24 +185,24 @@ fn syntax_error(span: Span, message: &str) -> Diagnostic {
         .help(help)
 }
 
-fn table(table: DeTable<'_>, text: &str, file: usize) -> Table {
+fn table(table: DeTable<'_>, text: &str, file: usize) -> TomlTable {
     table
         .into_iter()
         .map(|(key, value)| {
-            let span = Span {
+            let span = SourceSpan {
                 file,
                 start: key.span().start,
                 end: key.span().end,
             };
             let name = key.into_inner().into_owned();
-            (Key { name, span }, node(value, text, file))
+            (TomlKey { name, span }, node(value, text, file))
         })
         .collect()
 }
 
-fn node(value: toml::Spanned<DeValue<'_>>, text: &str, file: usize) -> Node {
+fn node(value: toml::Spanned<DeValue<'_>>, text: &str, file: usize) -> TomlNode {
     let range = value.span();
-    let span = Span {
+    let span = SourceSpan {
         file,
         start: range.start,
         end: range.end,
@@ -216,7 +216,7 @@ fn node(value: toml::Spanned<DeValue<'_>>, text: &str, file: usize) -> Node {
                     text.get(at..at + string.len())
                         .is_some_and(|found| found == string)
                 });
-            Value::Text {
+            TomlValue::Text {
                 text: string.into_owned(),
                 inner,
             }
@@ -229,24 +229,24 @@ fn node(value: toml::Spanned<DeValue<'_>>, text: &str, file: usize) -> Node {
                 i128::from_str_radix(digits, integer.radix())
                     .map_or_else(|_| digits.to_owned(), |value| value.to_string())
             };
-            Value::Number {
+            TomlValue::Number {
                 text,
                 is_integer: true,
             }
         }
-        DeValue::Float(float) => Value::Number {
+        DeValue::Float(float) => TomlValue::Number {
             text: float.as_str().to_owned(),
             is_integer: false,
         },
-        DeValue::Boolean(value) => Value::Boolean(value),
-        DeValue::Datetime(_) => Value::Datetime,
-        DeValue::Array(array) => Value::Array(
+        DeValue::Boolean(value) => TomlValue::Boolean(value),
+        DeValue::Datetime(_) => TomlValue::Datetime,
+        DeValue::Array(array) => TomlValue::Array(
             array
                 .into_iter()
                 .map(|entry| node(entry, text, file))
                 .collect(),
         ),
-        DeValue::Table(inner) => Value::Table(table(inner, text, file)),
+        DeValue::Table(inner) => TomlValue::Table(table(inner, text, file)),
     };
-    Node { span, value }
+    TomlNode { span, value }
 }

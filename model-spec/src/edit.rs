@@ -7,14 +7,14 @@ use std::collections::BTreeSet;
 use std::fmt;
 use std::path::PathBuf;
 
-use modelmill_boundary::files::Files;
+use modelmill_boundary::files::FileSource;
 
-use crate::diagnostic::{Log, SourceFile, Span};
-use crate::document::{self, Node, Value, get, quote};
-use crate::exact::Exact;
+use crate::diagnostic::{DiagnosticLog, SourceFile, SourceSpan};
+use crate::document::{self, TomlNode, TomlValue, find_key, quote};
+use crate::exact::ExactExpression;
 use crate::kinds::EffectKind;
-use crate::load::{Failure, Loaded, load_with};
-use crate::mechanism::{Effect, Mechanism, Place};
+use crate::load::{LoadFailure, LoadedModel, load_with};
+use crate::mechanism::{ModelEffect, Mechanism, EffectPlace};
 use crate::suggest;
 use crate::values::is_name;
 
@@ -50,7 +50,7 @@ pub enum EditFailure {
     /// The effect is at fault: what is wrong, and what to do.
     Effect(String),
     /// The model file is faulty, or would be with the effect.
-    Model(Box<Failure>),
+    Model(Box<LoadFailure>),
 }
 
 impl fmt::Display for EditFailure {
@@ -66,11 +66,11 @@ impl std::error::Error for EditFailure {}
 
 /// A model file with an effect added.
 #[derive(Clone, Debug)]
-pub struct Edited {
+pub struct EditedModel {
     /// Its text.
     pub text: String,
     /// What it means now.
-    pub loaded: Loaded,
+    pub loaded: LoadedModel,
     /// The effect as it was added: with names for parameters whose usual names are taken.
     pub effect: NewEffect,
 }
@@ -84,8 +84,8 @@ pub fn add_to_model(
     text: &str,
     effect: &NewEffect,
     libraries: &[PathBuf],
-    files: &dyn Files,
-) -> Result<Edited, EditFailure> {
+    files: &dyn FileSource,
+) -> Result<EditedModel, EditFailure> {
     let model = |failure| EditFailure::Model(Box::new(failure));
     let before = load_with(path_name, text, libraries, files).map_err(model)?;
     let kind = kind_of(effect, &before.kinds)?;
@@ -93,8 +93,8 @@ pub fn add_to_model(
     let effect = with_free_names(effect, kind, &before.mechanism);
     let edited = add_effect(text, &effect)?;
     let loaded = load_with(path_name, &edited, libraries, files)
-        .map_err(|failure| model(apart(failure, text, &edited, &effect)))?;
-    Ok(Edited {
+        .map_err(|failure| model(relocate_failure(failure, text, &edited, &effect)))?;
+    Ok(EditedModel {
         text: edited,
         loaded,
         effect,
@@ -106,7 +106,7 @@ const NEW_EFFECT: &str = "the effect to be added";
 
 /// A failure of the edited text with its places in what the user knows: the file as it is, and the effect as a text of
 /// its own. Lines of the edited text are those of no file.
-fn apart(mut failure: Failure, old: &str, new: &str, effect: &NewEffect) -> Failure {
+fn relocate_failure(mut failure: LoadFailure, old: &str, new: &str, effect: &NewEffect) -> LoadFailure {
     let line_end = if old.contains("\r\n") { "\r\n" } else { "\n" };
     let same = old
         .bytes()
@@ -114,7 +114,7 @@ fn apart(mut failure: Failure, old: &str, new: &str, effect: &NewEffect) -> Fail
         .take_while(|(a, b)| a == b)
         .count();
     // The same text before the place of the edit is another effect's.
-    let found = [block(effect, line_end), inline(effect)]
+    let found = [effect_table(effect, line_end), inline_effect(effect)]
         .into_iter()
         .find_map(|entry| {
             let mut places = new.match_indices(&entry);
@@ -132,7 +132,7 @@ fn apart(mut failure: Failure, old: &str, new: &str, effect: &NewEffect) -> Fail
         text: entry,
     });
     let longer = new.len().saturating_sub(old.len());
-    let moved = |span: &mut Span| {
+    let moved = |span: &mut SourceSpan| {
         if span.file != 0 {
             return;
         }
@@ -154,7 +154,7 @@ fn apart(mut failure: Failure, old: &str, new: &str, effect: &NewEffect) -> Fail
 
 /// Identified values that a model file shall have.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Adopted {
+pub struct AdoptedValues {
     /// Where they come from.
     pub comment: String,
     /// Values of parameters by their names.
@@ -179,15 +179,15 @@ pub struct Adopted {
 ///                   { expression = \"m*l\", value = 2.5 },\n]\n");
 /// assert_eq!(adopt(&text, &values).unwrap(), text);
 /// ```
-pub fn adopt(text: &str, values: &Adopted) -> Result<String, String> {
-    let mut log = Log::default();
-    let table = document::parse(text, 0, &mut log);
+pub fn write_identified(text: &str, values: &AdoptedValues) -> Result<String, String> {
+    let mut log = DiagnosticLog::default();
+    let table = document::parse_toml(text, 0, &mut log);
     if log.n_errors() > 0 {
         return Err("this is not TOML; mend the file first".to_owned());
     }
     let line_end = if text.contains("\r\n") { "\r\n" } else { "\n" };
     let mut kept = text.to_owned();
-    if let Some((key, _)) = get(&table, "identified") {
+    if let Some((key, _)) = find_key(&table, "identified") {
         let start = text[..key.span.start].rfind('\n').map_or(0, |end| end + 1);
         if text[start..].lines().next().map(str::trim) != Some("[identified]") {
             return Err(
@@ -215,7 +215,7 @@ pub fn adopt(text: &str, values: &Adopted) -> Result<String, String> {
         kept = format!("{}{}", text[..start].trim_end(), line_end);
         let rest = &text[start + own_end..];
         if !rest.trim().is_empty() {
-            let block = identified(values, line_end);
+            let block = identified_table(values, line_end);
             return Ok(format!(
                 "{kept}{line_end}{block}{line_end}{}",
                 rest.trim_start_matches(['\r', '\n'])
@@ -228,11 +228,11 @@ pub fn adopt(text: &str, values: &Adopted) -> Result<String, String> {
         }
         kept.push_str(line_end);
     }
-    Ok(kept + &identified(values, line_end))
+    Ok(kept + &identified_table(values, line_end))
 }
 
 /// The table of identified values.
-fn identified(values: &Adopted, line_end: &str) -> String {
+fn identified_table(values: &AdoptedValues, line_end: &str) -> String {
     let mut lines = vec!["[identified]".to_owned()];
     let comment = values.comment.lines();
     lines.extend(comment.map(|line| format!("# {}", line.replace(char::is_control, " "))));
@@ -274,8 +274,8 @@ fn identified(values: &Adopted, line_end: &str) -> String {
 /// ```
 pub fn add_effect(text: &str, effect: &NewEffect) -> Result<String, EditFailure> {
     check_writable(effect)?;
-    let mut log = Log::default();
-    let table = document::parse(text, 0, &mut log);
+    let mut log = DiagnosticLog::default();
+    let table = document::parse_toml(text, 0, &mut log);
     if log.n_errors() > 0 {
         let says = log.finish().into_iter().next().map(|found| found.message);
         return Err(EditFailure::Effect(format!(
@@ -284,10 +284,10 @@ pub fn add_effect(text: &str, effect: &NewEffect) -> Result<String, EditFailure>
         )));
     }
     let line_end = if text.contains("\r\n") { "\r\n" } else { "\n" };
-    match get(&table, "effect") {
+    match find_key(&table, "effect") {
         None => Ok(append(text, effect, line_end)),
         Some((key, node)) => {
-            let Value::Array(entries) = &node.value else {
+            let TomlValue::Array(entries) = &node.value else {
                 return Err(EditFailure::Effect(
                     "`effect` of this file is no list of tables; write effects as `[[effect]]`"
                         .to_owned(),
@@ -305,10 +305,10 @@ pub fn add_effect(text: &str, effect: &NewEffect) -> Result<String, EditFailure>
 }
 
 /// The last byte that belongs to a value or anything in it.
-fn end_of(node: &Node) -> usize {
+fn end_of(node: &TomlNode) -> usize {
     let inner = match &node.value {
-        Value::Array(entries) => entries.iter().map(end_of).max(),
-        Value::Table(table) => table
+        TomlValue::Array(entries) => entries.iter().map(end_of).max(),
+        TomlValue::Table(table) => table
             .iter()
             .map(|(key, node)| key.span.end.max(end_of(node)))
             .max(),
@@ -318,13 +318,13 @@ fn end_of(node: &Node) -> usize {
 }
 
 /// Puts a table behind the last effect.
-fn insert_behind(text: &str, list: &Node, effect: &NewEffect, line_end: &str) -> String {
+fn insert_behind(text: &str, list: &TomlNode, effect: &NewEffect, line_end: &str) -> String {
     let end = end_of(list).min(text.len());
     let Some(rest) = text[end..].find('\n') else {
         return append(text, effect, line_end);
     };
     let at = end + rest + 1;
-    let block = block(effect, line_end);
+    let block = effect_table(effect, line_end);
     format!("{}{line_end}{block}{}", &text[..at], &text[at..])
 }
 
@@ -337,19 +337,19 @@ fn append(text: &str, effect: &NewEffect, line_end: &str) -> String {
         }
         new.push_str(line_end);
     }
-    new.push_str(&block(effect, line_end));
+    new.push_str(&effect_table(effect, line_end));
     new
 }
 
 /// Puts an entry behind the last one of an inline list.
 fn extend_inline(
     text: &str,
-    list: &Node,
-    entries: &[Node],
+    list: &TomlNode,
+    entries: &[TomlNode],
     effect: &NewEffect,
     line_end: &str,
 ) -> String {
-    let entry = inline(effect);
+    let entry = inline_effect(effect);
     let Some(last) = entries.last() else {
         let at = list.span.start + 1; // Behind the bracket.
         return format!("{}{entry}{}", &text[..at], &text[at..]);
@@ -408,7 +408,7 @@ fn comma_behind(text: &str, end: usize) -> Option<usize> {
 }
 
 /// The effect as a table with a header.
-fn block(effect: &NewEffect, line_end: &str) -> String {
+fn effect_table(effect: &NewEffect, line_end: &str) -> String {
     let mut lines: Vec<String> = remarks(effect).map(|line| format!("# {line}")).collect();
     lines.push("[[effect]]".to_owned());
     lines.extend(fields(effect));
@@ -417,7 +417,7 @@ fn block(effect: &NewEffect, line_end: &str) -> String {
 }
 
 /// The effect as an inline table.
-fn inline(effect: &NewEffect) -> String {
+fn inline_effect(effect: &NewEffect) -> String {
     let mut fields = fields(effect);
     let remark: Vec<String> = remarks(effect).collect();
     if !remark.is_empty() {
@@ -556,7 +556,7 @@ fn refuse_twin(
         if kind.places == Some(2) && !names.clone().all(|n| effect.at.iter().any(|at| at == n)) {
             continue;
         }
-        let whole = matches!(known.places[..], [Place::Base | Place::Force]);
+        let whole = matches!(known.places[..], [EffectPlace::Base | EffectPlace::Force]);
         let place = names
             .into_iter()
             .find(|name| effect.at.iter().any(|at| at == name));
@@ -606,23 +606,23 @@ fn with_free_names(effect: &NewEffect, kind: &EffectKind, mechanism: &Mechanism)
 
 impl Mechanism {
     /// The name of a place, as the model file calls it.
-    pub fn place_name(&self, place: Place) -> &str {
+    pub fn place_name(&self, place: EffectPlace) -> &str {
         match place {
-            Place::Drive(idx) => &self.drives[idx.0].name,
-            Place::Coordinate(idx) => &self.coordinates[idx.0].name,
-            Place::Point(idx) => &self.points[idx.0].name,
-            Place::Part(idx) => &self.parts[idx.0].name,
-            Place::Base => "base",
-            Place::Force => "force",
+            EffectPlace::Drive(idx) => &self.drives[idx.0].name,
+            EffectPlace::Coordinate(idx) => &self.coordinates[idx.0].name,
+            EffectPlace::Point(idx) => &self.points[idx.0].name,
+            EffectPlace::Part(idx) => &self.parts[idx.0].name,
+            EffectPlace::Base => "base",
+            EffectPlace::Force => "force",
         }
     }
 }
 
-impl Effect {
+impl ModelEffect {
     /// The value of a constant of its kind, in SI units; `None` if the kind has none of this symbol or it is left away.
     pub fn constant(&self, symbol: &str, mechanism: &Mechanism) -> Option<f64> {
         let found = self.constants.iter().find(|(name, _)| name == symbol);
-        let value = |exact: &Exact| exact.evaluate(&|symbol| mechanism.symbol_nominal(symbol));
+        let value = |exact: &ExactExpression| exact.evaluate(&|symbol| mechanism.symbol_nominal(symbol));
         found.map(|(_, exact)| value(exact))
     }
 }

@@ -17,7 +17,7 @@ pub fn json_schema() -> Value {
     let mut strict_definitions = root["$defs"].as_object().cloned().unwrap_or_default();
     let mut definitions = Map::new();
     for (name, schema) in &strict_definitions {
-        definitions.insert(format!("{name}{PARTIAL}"), partial(schema));
+        definitions.insert(format!("{name}{PARTIAL}"), optional_schema(schema));
     }
     definitions.append(&mut strict_definitions);
     let known: Vec<String> = definitions.keys().cloned().collect();
@@ -26,7 +26,7 @@ pub fn json_schema() -> Value {
         "title": "A model file of modelmill",
         "description": root["description"],
         "type": "object",
-        "properties": partial(&root["properties"]),
+        "properties": optional_schema(&root["properties"]),
         "required": root["required"],
         "additionalProperties": false,
         "if": { "not": { "required": ["extends"] } },
@@ -38,7 +38,7 @@ pub fn json_schema() -> Value {
 }
 
 /// A copy in which nothing is required, and which refers to such copies.
-fn partial(schema: &Value) -> Value {
+fn optional_schema(schema: &Value) -> Value {
     match schema {
         Value::Object(fields) => Value::Object(
             fields
@@ -49,11 +49,11 @@ fn partial(schema: &Value) -> Value {
                     Some(target) if key == "$ref" => {
                         (key.clone(), Value::String(format!("{target}{PARTIAL}")))
                     }
-                    _ => (key.clone(), partial(value)),
+                    _ => (key.clone(), optional_schema(value)),
                 })
                 .collect(),
         ),
-        Value::Array(entries) => Value::Array(entries.iter().map(partial).collect()),
+        Value::Array(entries) => Value::Array(entries.iter().map(optional_schema).collect()),
         other => other.clone(),
     }
 }

@@ -69,7 +69,7 @@ impl PlaceQuantity {
 
 /// A name of the model file, resolved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Symbol {
+pub enum ModelSymbol {
     /// Known geometry, gravity and the like.
     Constant(ConstantIdx),
     /// A dynamic parameter, which identification may find.
@@ -82,7 +82,7 @@ pub enum Symbol {
 
 /// Functions that may stand in an exact expression.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Function {
+pub enum ExactFunction {
     /// Sine of an angle.
     Sin,
     /// Cosine of an angle.
@@ -101,43 +101,43 @@ pub enum Function {
 
 /// An exact expression over the symbols of a model file.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Exact {
+pub enum ExactExpression {
     /// A rational number; decimals such as `0.316` are rationals too.
     Rational(BigRational),
     /// The ratio of a circle's circumference to its diameter.
     Pi,
     /// A named quantity.
-    Symbol(Symbol),
+    Symbol(ModelSymbol),
     /// Sum of the operands.
-    Sum(Vec<Exact>),
+    Sum(Vec<ExactExpression>),
     /// Product of the operands.
-    Product(Vec<Exact>),
+    Product(Vec<ExactExpression>),
     /// First operand over the second.
-    Quotient(Box<Exact>, Box<Exact>),
+    Quotient(Box<ExactExpression>, Box<ExactExpression>),
     /// The operand with its sign changed.
-    Negative(Box<Exact>),
+    Negative(Box<ExactExpression>),
     /// Integer power; the exponent's magnitude is at most 16.
-    Power(Box<Exact>, i32),
+    Power(Box<ExactExpression>, i32),
     /// A function of the operand.
-    Apply(Function, Box<Exact>),
+    Apply(ExactFunction, Box<ExactExpression>),
 }
 
 /// An angle whose sine and cosine are exact: `pi * turns + sum of integer multiples of symbols`, in rad.
 ///
 /// `pi` is a multiple of 1/12, so that the sine and cosine of the fixed part lie in Q(sqrt 2, sqrt 3).
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct Angle {
+pub struct ExactAngle {
     /// Coefficient of pi.
     pub pi: BigRational,
     /// Constants (unit rad) and revolute coordinates with their integer factors; sorted, without zeros.
-    pub terms: Vec<(Symbol, i32)>,
+    pub terms: Vec<(ModelSymbol, i32)>,
 }
 
 /// A length that is linear in prismatic coordinates, in m.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Length {
+pub struct ExactLength {
     /// The part that does not move; an expression over constants only.
-    pub offset: Exact,
+    pub offset: ExactExpression,
     /// Prismatic coordinates with their rational factors; sorted, without zeros.
     pub coordinates: Vec<(CoordinateIdx, BigRational)>,
 }

@@ -5,61 +5,61 @@ use std::borrow::Cow;
 
 use num_rational::BigRational;
 
-use crate::diagnostic::{Diagnostic, Log, Span};
-use crate::document::{Node, Value, quote};
-use crate::exact::Function;
+use crate::diagnostic::{Diagnostic, DiagnosticLog, SourceSpan};
+use crate::document::{TomlNode, TomlValue, quote};
+use crate::exact::ExactFunction;
 use crate::parser::parse;
-use crate::record::{Read, wrong_type};
+use crate::record::{SchemaValue, wrong_type};
 
 /// Longest text of an expression, in bytes.
 pub(crate) const LONGEST_FORMULA: usize = 4000;
 /// The functions of the language.
-pub(crate) const FUNCTIONS: [(&str, Function); 7] = [
-    ("sin", Function::Sin),
-    ("cos", Function::Cos),
-    ("sqrt", Function::Sqrt),
-    ("abs", Function::Abs),
-    ("sign", Function::Sign),
-    ("tanh", Function::Tanh),
-    ("exp", Function::Exp),
+pub(crate) const FUNCTIONS: [(&str, ExactFunction); 7] = [
+    ("sin", ExactFunction::Sin),
+    ("cos", ExactFunction::Cos),
+    ("sqrt", ExactFunction::Sqrt),
+    ("abs", ExactFunction::Abs),
+    ("sign", ExactFunction::Sign),
+    ("tanh", ExactFunction::Tanh),
+    ("exp", ExactFunction::Exp),
 ];
 
 /// A parsed expression whose names are not yet looked up.
 #[derive(Clone, Debug)]
-pub(crate) struct Ast {
-    pub(crate) span: Span,
-    pub(crate) kind: AstKind,
+pub(crate) struct FormulaAst {
+    pub(crate) span: SourceSpan,
+    pub(crate) kind: FormulaAstKind,
 }
 
 /// Shape of a node; see [`crate::Exact`].
 #[derive(Clone, Debug)]
-pub(crate) enum AstKind {
+pub(crate) enum FormulaAstKind {
     Rational(BigRational),
     Pi,
     Name(String),
-    Sum(Vec<Ast>),
-    Product(Vec<Ast>),
-    Quotient(Box<Ast>, Box<Ast>),
-    Negative(Box<Ast>),
-    Power(Box<Ast>, i32),
-    Apply(Function, Box<Ast>),
+    Sum(Vec<FormulaAst>),
+    Product(Vec<FormulaAst>),
+    Quotient(Box<FormulaAst>, Box<FormulaAst>),
+    Negative(Box<FormulaAst>),
+    Power(Box<FormulaAst>, i32),
+    Apply(ExactFunction, Box<FormulaAst>),
 }
 
 /// An expression of the file with its text.
 #[derive(Clone, Debug)]
-pub(crate) struct Formula {
+pub(crate) struct SourceFormula {
     pub(crate) text: String,
-    pub(crate) ast: Ast,
+    pub(crate) ast: FormulaAst,
 }
 
-impl Read for Formula {
+impl SchemaValue for SourceFormula {
     const EXPECTED: &'static str = "an expression in quotes, or a number";
     const EXAMPLE: &'static str = "\"2*d1\"";
 
-    fn read(node: &Node, log: &mut Log) -> Option<Self> {
+    fn read(node: &TomlNode, log: &mut DiagnosticLog) -> Option<Self> {
         let (text, inner) = match &node.value {
-            Value::Text { text, inner } => (text, *inner),
-            Value::Number { text, .. } => {
+            TomlValue::Text { text, inner } => (text, *inner),
+            TomlValue::Number { text, .. } => {
                 if text.parse::<f64>().is_ok_and(|value| !value.is_finite()) {
                     log.push(
                         Diagnostic::error(node.span, format!("`{}` is not finite", quote(text)))
@@ -82,7 +82,7 @@ impl Read for Formula {
 }
 
 #[cfg(any(test, feature = "schema"))]
-impl schemars::JsonSchema for Formula {
+impl schemars::JsonSchema for SourceFormula {
     fn schema_name() -> Cow<'static, str> {
         "Expression".into()
     }

@@ -1,12 +1,12 @@
 //! How a coordinate moves what stands behind its joint, and what follows from that: units, and what a drive carries.
 
-use crate::kinds::Carries;
-use crate::mechanism::{Coordinate, DriveKind};
-use crate::unit::Dimension;
+use crate::kinds::PlaceLoad;
+use crate::mechanism::{JointCoordinate, DriveKind};
+use crate::unit::UnitDimension;
 
 /// Kind of motion of a coordinate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Motion {
+pub enum CoordinateMotion {
     /// Angle in rad.
     Revolute,
     /// Length in m.
@@ -18,7 +18,7 @@ pub enum Motion {
     QuaternionScalar,
 }
 
-impl Motion {
+impl CoordinateMotion {
     /// Whether the coordinate is an angle in rad; else it is a length in m.
     pub fn is_angle(self) -> bool {
         match self {
@@ -62,39 +62,39 @@ impl Motion {
     }
 
     /// What acts on the coordinate.
-    pub fn carries(self) -> Carries {
+    pub fn place_load(self) -> PlaceLoad {
         if self.is_length() {
-            Carries::Force
+            PlaceLoad::Force
         } else {
-            Carries::Torque
+            PlaceLoad::Torque
         }
     }
 
     /// The dimension of the coordinate.
-    pub(crate) fn dimension(self) -> Dimension {
+    pub(crate) fn dimension(self) -> UnitDimension {
         if self.is_length() {
-            Dimension::LENGTH
+            UnitDimension::LENGTH
         } else {
-            Dimension::ONE
+            UnitDimension::ONE
         }
     }
 }
 
 impl DriveKind {
     /// What a drive of this kind carries, among the coordinates of its mechanism.
-    pub fn carries(self, coordinates: &[Coordinate]) -> Carries {
+    pub fn place_load(self, coordinates: &[JointCoordinate]) -> PlaceLoad {
         match self {
             Self::Joint(i) => coordinates
                 .get(i.0)
-                .map_or(Carries::Torque, |one| one.motion.carries()),
-            Self::Linear { .. } => Carries::Force,
+                .map_or(PlaceLoad::Torque, |one| one.motion.place_load()),
+            Self::Linear { .. } => PlaceLoad::Force,
         }
     }
 
     /// The unit of the force or torque of a drive of this kind.
-    pub fn force_unit(self, coordinates: &[Coordinate]) -> &'static str {
-        match self.carries(coordinates) {
-            Carries::Torque => "N m",
+    pub fn force_unit(self, coordinates: &[JointCoordinate]) -> &'static str {
+        match self.place_load(coordinates) {
+            PlaceLoad::Torque => "N m",
             _ => "N",
         }
     }

@@ -1,15 +1,15 @@
 //! What kinds with mechanics in place of an expression must look like: their places, symbols and dimensions.
 
-use crate::diagnostic::{Diagnostic, Log, Span};
-use crate::document::Key;
-use crate::kinds::{ActsOn, Carries, may_carry};
-use crate::mechanics::Symbols;
+use crate::diagnostic::{Diagnostic, DiagnosticLog, SourceSpan};
+use crate::document::TomlKey;
+use crate::kinds::{ActsOn, PlaceLoad, can_carry};
+use crate::mechanics::MechanicsSymbols;
 use crate::schema::EffectKindEntry;
 use crate::values::UnitByPlace;
 
 /// Checks what a kind adds: an expression at places that have one, or mechanics with their own symbols and places.
 /// False if it has mechanics or is faulty, so that there is no expression to check.
-pub(crate) fn check_way(entry: &EffectKindEntry, log: &mut Log) -> bool {
+pub(crate) fn check_expression_or_mechanics(entry: &EffectKindEntry, log: &mut DiagnosticLog) -> bool {
     let name_span = entry.name.as_ref().map_or(entry.span, |name| name.span);
     let mut places = entry.on.iter().flat_map(|on| &on.entries);
     let Some(way) = entry.mechanics else {
@@ -27,7 +27,7 @@ pub(crate) fn check_way(entry: &EffectKindEntry, log: &mut Log) -> bool {
         if let (Some(found), Some(on)) = (elsewhere, &entry.on) {
             log.push(
                 Diagnostic::error(on.span, "an expression cannot act here")
-                    .label(format!("on {} there is nothing to add to", found.words()))
+                    .label(format!("on {} there is nothing to add to", found.description()))
                     .help("expressions act on a drive, a coordinate or a point"),
             );
             return false;
@@ -48,13 +48,13 @@ pub(crate) fn check_way(entry: &EffectKindEntry, log: &mut Log) -> bool {
         );
     }
     let way = way.entry();
-    let on = way.on();
+    let on = way.acts_on();
     if let Some(found) = &entry.on
         && places.any(|place| *place != on)
     {
         log.push(
             Diagnostic::error(found.span, "these mechanics act elsewhere")
-                .label(format!("expected only {}", on.words())),
+                .label(format!("expected only {}", on.description())),
         );
     }
     check_symbols(entry, "parameters", way.parameters(), name_span, log);
@@ -66,11 +66,11 @@ pub(crate) fn check_way(entry: &EffectKindEntry, log: &mut Log) -> bool {
 fn check_symbols(
     entry: &EffectKindEntry,
     what: &str,
-    expected: Symbols,
-    name_span: Span,
-    log: &mut Log,
+    expected: MechanicsSymbols,
+    name_span: SourceSpan,
+    log: &mut DiagnosticLog,
 ) {
-    let found: Vec<(&Key, Option<&UnitByPlace>)> = if what == "parameters" {
+    let found: Vec<(&TomlKey, Option<&UnitByPlace>)> = if what == "parameters" {
         let entries = entry.parameters.iter().flat_map(|table| &table.entries);
         entries.map(|(key, one)| (key, one.unit.as_ref())).collect()
     } else {
@@ -91,9 +91,9 @@ fn check_symbols(
             continue;
         };
         let unit = units.and_then(|units| {
-            Carries::ALL
+            PlaceLoad::ALL
                 .into_iter()
-                .filter(|carries| may_carry(entry, *carries))
+                .filter(|carries| can_carry(entry, *carries))
                 .find_map(|carries| carries.unit(units))
         });
         if unit.is_none_or(|unit| unit.dimension != *dimension) {

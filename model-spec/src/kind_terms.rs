@@ -2,16 +2,16 @@
 
 use std::cell::Cell;
 
-use crate::diagnostic::{Diagnostic, Log};
-use crate::exact::{Exact, ParameterIdx, PlaceQuantity, Symbol};
-use crate::kinds::{Carries, OtherMotion};
+use crate::diagnostic::{Diagnostic, DiagnosticLog};
+use crate::exact::{ExactExpression, ParameterIdx, PlaceQuantity, ModelSymbol};
+use crate::kinds::{PlaceLoad, OtherMotion};
 use crate::schema::EffectKindEntry;
-use crate::scope::{Meaning, Scope, Sort, Wanted, meaning};
-use crate::unit::{Dimension, Unit};
+use crate::scope::{SymbolMeaning, FormulaScope, SymbolSort, FormulaRequirement, symbol_meaning};
+use crate::unit::{UnitDimension, ModelUnit};
 use crate::values::UnitByPlace;
 
 /// Symbols of a kind that have no unit where the place carries this.
-pub(crate) fn lacking_units(entry: &EffectKindEntry, carries: Carries) -> Vec<&str> {
+pub(crate) fn symbols_without_unit(entry: &EffectKindEntry, carries: PlaceLoad) -> Vec<&str> {
     let parameters = entry
         .parameters
         .iter()
@@ -33,24 +33,24 @@ pub(crate) fn lacking_units(entry: &EffectKindEntry, carries: Carries) -> Vec<&s
 }
 
 /// The unit of a kind's parameter at a place that carries this.
-pub(crate) fn unit_at(unit: Option<&UnitByPlace>, carries: Carries) -> Option<&Unit> {
+pub(crate) fn unit_at(unit: Option<&UnitByPlace>, carries: PlaceLoad) -> Option<&ModelUnit> {
     carries.unit(unit?)
 }
 
 /// What multiplies each parameter of a kind at a place, in the order of the kind's parameters.
 pub(crate) fn factors(
     entry: &EffectKindEntry,
-    carries: Carries,
-    constants: &[(String, Exact)],
-    log: &mut Log,
-) -> Option<Vec<Exact>> {
+    carries: PlaceLoad,
+    constants: &[(String, ExactExpression)],
+    log: &mut DiagnosticLog,
+) -> Option<Vec<ExactExpression>> {
     let before = log.n_errors();
     let expression = entry.expression.as_ref()?;
     let parameters = &entry.parameters.as_ref()?.entries;
     let scope = scope(entry, carries, constants, log);
     let what = format!(
         "where the place carries a {}, what this kind adds",
-        if carries == Carries::Mass {
+        if carries == PlaceLoad::Mass {
             "mass"
         } else {
             carries.name()
@@ -58,8 +58,8 @@ pub(crate) fn factors(
     );
     let exact = scope.resolve(
         expression,
-        Wanted {
-            sorts: &[Sort::Parameter, Sort::Constant, Sort::Place],
+        FormulaRequirement {
+            sorts: &[SymbolSort::Parameter, SymbolSort::Constant, SymbolSort::Place],
             dimension: carries.dimension(),
             what: &what,
         },
@@ -84,7 +84,7 @@ pub(crate) fn factors(
         return None;
     }
     let mut factors = vec![Vec::new(); parameters.len()];
-    if !split(&exact, &Exact::one(), &mut factors) {
+    if !split_into_factors(&exact, &ExactExpression::unity(), &mut factors) {
         log.push(
             Diagnostic::error(
                 expression.ast.span,
@@ -99,9 +99,9 @@ pub(crate) fn factors(
         factors
             .into_iter()
             .map(|mut terms| match terms.len() {
-                0 => Exact::zero(),
+                0 => ExactExpression::zero(),
                 1 => terms.swap_remove(0),
-                _ => Exact::Sum(terms),
+                _ => ExactExpression::Sum(terms),
             })
             .collect(),
     )
@@ -109,22 +109,22 @@ pub(crate) fn factors(
 
 fn scope(
     entry: &EffectKindEntry,
-    carries: Carries,
-    constants: &[(String, Exact)],
-    log: &mut Log,
-) -> Scope {
-    let mut scope = Scope::default();
+    carries: PlaceLoad,
+    constants: &[(String, ExactExpression)],
+    log: &mut DiagnosticLog,
+) -> FormulaScope {
+    let mut scope = FormulaScope::default();
     let parameters = entry
         .parameters
         .iter()
         .flat_map(|parameters| &parameters.entries);
     for (i, (key, parameter)) in parameters.enumerate() {
         let unit = unit_at(parameter.unit.as_ref(), carries);
-        let symbol = Symbol::Parameter(ParameterIdx(i));
+        let symbol = ModelSymbol::Parameter(ParameterIdx(i));
         let dimension = unit.map(|unit| unit.dimension);
         scope.declare(
             &key.name,
-            meaning(Sort::Parameter, symbol, dimension, "", Some(key.span)),
+            symbol_meaning(SymbolSort::Parameter, symbol, dimension, "", Some(key.span)),
             log,
         );
     }
@@ -137,11 +137,11 @@ fn scope(
         let exact = constants
             .iter()
             .find(|(name, _)| *name == key.name)
-            .map_or_else(Exact::one, |(_, exact)| exact.clone());
+            .map_or_else(ExactExpression::unity, |(_, exact)| exact.clone());
         scope.declare(
             &key.name,
-            Meaning {
-                sort: Sort::Constant,
+            SymbolMeaning {
+                sort: SymbolSort::Constant,
                 exact,
                 dimension: unit.map(|unit| unit.dimension),
                 unit: String::new(),
@@ -155,7 +155,7 @@ fn scope(
     let Some(own) = dimensions(carries) else {
         return scope;
     };
-    let other = entry.other.map_or(carries, OtherMotion::carries);
+    let other = entry.other.map_or(carries, OtherMotion::place_load);
     let other = dimensions(other).unwrap_or(own);
     for quantity in PlaceQuantity::ALL {
         let dimension = match quantity {
@@ -167,10 +167,10 @@ fn scope(
             PlaceQuantity::OtherRate => other[1],
             PlaceQuantity::OtherAcceleration => other[2],
         };
-        let symbol = Symbol::Place(quantity);
+        let symbol = ModelSymbol::Place(quantity);
         scope.declare(
             quantity.name(),
-            meaning(Sort::Place, symbol, Some(dimension), "", None),
+            symbol_meaning(SymbolSort::Place, symbol, Some(dimension), "", None),
             log,
         );
     }
@@ -178,67 +178,67 @@ fn scope(
 }
 
 /// Dimensions of position, rate, acceleration and load of a place, where it has them.
-fn dimensions(carries: Carries) -> Option<[Dimension; 4]> {
+fn dimensions(carries: PlaceLoad) -> Option<[UnitDimension; 4]> {
     match carries {
-        Carries::Mass | Carries::Elsewhere => None,
-        Carries::Force => Some([
-            Dimension::LENGTH,
-            Dimension::VELOCITY,
-            Dimension::ACCELERATION,
-            Dimension::FORCE,
+        PlaceLoad::Mass | PlaceLoad::Elsewhere => None,
+        PlaceLoad::Force => Some([
+            UnitDimension::LENGTH,
+            UnitDimension::VELOCITY,
+            UnitDimension::ACCELERATION,
+            UnitDimension::FORCE,
         ]),
-        Carries::Torque => Some([
-            Dimension::ONE,
-            Dimension::RATE,
-            Dimension::ANGULAR_ACCELERATION,
-            Dimension::TORQUE,
+        PlaceLoad::Torque => Some([
+            UnitDimension::ONE,
+            UnitDimension::RATE,
+            UnitDimension::ANGULAR_ACCELERATION,
+            UnitDimension::TORQUE,
         ]),
     }
 }
 
-fn is_parameter(symbol: Symbol) -> bool {
-    matches!(symbol, Symbol::Parameter(_))
+fn is_parameter(symbol: ModelSymbol) -> bool {
+    matches!(symbol, ModelSymbol::Parameter(_))
 }
 
 /// Splits `factor * exact` into terms per parameter; false if it is not linear and homogeneous in them.
-fn split(exact: &Exact, factor: &Exact, factors: &mut [Vec<Exact>]) -> bool {
+fn split_into_factors(exact: &ExactExpression, factor: &ExactExpression, factors: &mut [Vec<ExactExpression>]) -> bool {
     match exact {
-        Exact::Symbol(Symbol::Parameter(ParameterIdx(i))) => match factors.get_mut(*i) {
+        ExactExpression::Symbol(ModelSymbol::Parameter(ParameterIdx(i))) => match factors.get_mut(*i) {
             Some(terms) => {
                 terms.push(factor.clone());
                 true
             }
             None => false,
         },
-        Exact::Sum(terms) => terms.iter().all(|term| split(term, factor, factors)),
-        Exact::Negative(inner) => split(inner, &Exact::Negative(Box::new(factor.clone())), factors),
-        Exact::Product(members) => {
-            let (with, without): (Vec<&Exact>, Vec<&Exact>) = members
+        ExactExpression::Sum(terms) => terms.iter().all(|term| split_into_factors(term, factor, factors)),
+        ExactExpression::Negative(inner) => split_into_factors(inner, &ExactExpression::Negative(Box::new(factor.clone())), factors),
+        ExactExpression::Product(members) => {
+            let (with, without): (Vec<&ExactExpression>, Vec<&ExactExpression>) = members
                 .iter()
                 .partition(|member| member.mentions(&is_parameter));
             let [linear] = with.as_slice() else {
                 return false;
             };
-            let mut product: Vec<Exact> = without.into_iter().cloned().collect();
-            if *factor != Exact::one() {
+            let mut product: Vec<ExactExpression> = without.into_iter().cloned().collect();
+            if *factor != ExactExpression::unity() {
                 product.insert(0, factor.clone());
             }
             let product = match product.len() {
-                0 => Exact::one(),
+                0 => ExactExpression::unity(),
                 1 => product.swap_remove(0),
-                _ => Exact::Product(product),
+                _ => ExactExpression::Product(product),
             };
-            split(linear, &product, factors)
+            split_into_factors(linear, &product, factors)
         }
-        Exact::Quotient(above, below) => {
+        ExactExpression::Quotient(above, below) => {
             !below.mentions(&is_parameter)
-                && split(
+                && split_into_factors(
                     above,
-                    &Exact::Quotient(Box::new(factor.clone()), below.clone()),
+                    &ExactExpression::Quotient(Box::new(factor.clone()), below.clone()),
                     factors,
                 )
         }
-        Exact::Power(base, 1) => split(base, factor, factors),
+        ExactExpression::Power(base, 1) => split_into_factors(base, factor, factors),
         _ => false,
     }
 }

@@ -5,17 +5,17 @@
 
 use std::sync::OnceLock;
 
-use crate::diagnostic::{Diagnostic, Log};
+use crate::diagnostic::{Diagnostic, DiagnosticLog};
 use crate::document;
-use crate::exact::{ConstantIdx, Exact, PlaceQuantity, Symbol};
+use crate::exact::{ConstantIdx, ExactExpression, PlaceQuantity, ModelSymbol};
 use crate::finite;
-use crate::kind_mechanics::check_way;
-use crate::kind_terms::{factors, lacking_units};
+use crate::kind_mechanics::check_expression_or_mechanics;
+use crate::kind_terms::{factors, symbols_without_unit};
 use crate::mechanics::Mechanics;
 use crate::schema::{EffectKindEntry, LibraryEntry, ModelEntry};
-use crate::scope::Scope;
-use crate::unit::{Dimension, Unit};
-use crate::values::{self, Text, UnitByPlace};
+use crate::scope::FormulaScope;
+use crate::unit::{UnitDimension, ModelUnit};
+use crate::values::{self, SpannedText, UnitByPlace};
 use crate::words::words;
 
 /// The library of kinds as the program brings it along.
@@ -23,7 +23,7 @@ pub const LIBRARY: &str = include_str!("../library/effects.toml");
 
 /// What a place carries, which settles the units there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Carries {
+pub enum PlaceLoad {
     /// A force, on a prismatic joint or a linear drive.
     Force,
     /// A torque, on a revolute joint.
@@ -34,17 +34,17 @@ pub enum Carries {
     Elsewhere,
 }
 
-impl Carries {
+impl PlaceLoad {
     /// Whatever a place may carry.
     pub const ALL: [Self; 4] = [Self::Force, Self::Torque, Self::Mass, Self::Elsewhere];
 
     /// The dimension of what the place carries.
-    pub(crate) fn dimension(self) -> Dimension {
+    pub(crate) fn dimension(self) -> UnitDimension {
         match self {
-            Self::Force => Dimension::FORCE,
-            Self::Torque => Dimension::TORQUE,
-            Self::Mass => Dimension::MASS,
-            Self::Elsewhere => Dimension::ONE,
+            Self::Force => UnitDimension::FORCE,
+            Self::Torque => UnitDimension::TORQUE,
+            Self::Mass => UnitDimension::MASS,
+            Self::Elsewhere => UnitDimension::ONE,
         }
     }
 
@@ -59,7 +59,7 @@ impl Carries {
     }
 
     /// The unit for it among several.
-    pub(crate) fn unit(self, units: &UnitByPlace) -> Option<&Unit> {
+    pub(crate) fn unit(self, units: &UnitByPlace) -> Option<&ModelUnit> {
         match self {
             Self::Force => units.force.as_ref(),
             Self::Torque => units.torque.as_ref(),
@@ -101,7 +101,7 @@ words! {
 
 impl ActsOn {
     /// What it is, for people.
-    pub fn words(self) -> &'static str {
+    pub fn description(self) -> &'static str {
         match self {
             Self::Drive => "a drive",
             Self::Coordinate => "a coordinate",
@@ -125,15 +125,15 @@ words! {
 
 impl OtherMotion {
     /// What a place carries that moves so.
-    pub fn carries(self) -> Carries {
+    pub fn place_load(self) -> PlaceLoad {
         match self {
-            Self::Angle => Carries::Torque,
-            Self::Length => Carries::Force,
+            Self::Angle => PlaceLoad::Torque,
+            Self::Length => PlaceLoad::Force,
         }
     }
 
     /// How it moves, for people.
-    pub fn words(self) -> &'static str {
+    pub fn description(self) -> &'static str {
         match self {
             Self::Angle => "turns",
             Self::Length => "slides",
@@ -155,7 +155,7 @@ words! {
 
 /// How a constant's value is found where it is not known.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Search {
+pub enum ConstantSearch {
     /// The expression is affine in it, so that its product with the parameter is a parameter itself.
     Linear,
     /// Values from `from` to `to`, times the scale, are tried.
@@ -208,7 +208,7 @@ pub struct KindParameter {
     /// The sign that it must have.
     pub sign: Sign,
     /// Units by what the place carries; only where the kind may act.
-    pub units: Vec<(Carries, String)>,
+    pub units: Vec<(PlaceLoad, String)>,
     /// Remark; may be empty.
     pub note: String,
 }
@@ -221,9 +221,9 @@ pub struct KindConstant {
     /// Value as text where the effect gives none; `None` if the effect must give one.
     pub value: Option<String>,
     /// Units by what the place carries.
-    pub units: Vec<(Carries, String)>,
+    pub units: Vec<(PlaceLoad, String)>,
     /// How it is found where it is not known; `None` if it must be known.
-    pub search: Option<Search>,
+    pub search: Option<ConstantSearch>,
     /// Remark; may be empty.
     pub note: String,
 }
@@ -241,9 +241,9 @@ pub(crate) fn library_entries() -> &'static [EffectKindEntry] {
     static ENTRIES: OnceLock<Vec<EffectKindEntry>> = OnceLock::new();
     ENTRIES.get_or_init(|| {
         // The library is no file of the user's: its places lie outside the sources, and a test keeps it sound.
-        let mut log = Log::default();
-        let table = document::parse(LIBRARY, usize::MAX, &mut log);
-        let span = crate::Span {
+        let mut log = DiagnosticLog::default();
+        let table = document::parse_toml(LIBRARY, usize::MAX, &mut log);
+        let span = crate::SourceSpan {
             file: usize::MAX,
             start: 0,
             end: 0,
@@ -253,7 +253,7 @@ pub(crate) fn library_entries() -> &'static [EffectKindEntry] {
             .effect_kind
             .map_or_else(Vec::new, |list| list.entries);
         for entry in &entries {
-            check(entry, &mut log);
+            check_kind(entry, &mut log);
         }
         let found = log.finish();
         assert!(found.is_empty(), "the effect library is faulty: {found:?}");
@@ -262,9 +262,9 @@ pub(crate) fn library_entries() -> &'static [EffectKindEntry] {
 }
 
 /// The tables of a library that a file names.
-pub(crate) fn own_library(text: &str, file: usize, log: &mut Log) -> Vec<EffectKindEntry> {
-    let table = document::parse(text, file, log);
-    let span = crate::Span {
+pub(crate) fn own_library(text: &str, file: usize, log: &mut DiagnosticLog) -> Vec<EffectKindEntry> {
+    let table = document::parse_toml(text, file, log);
+    let span = crate::SourceSpan {
         file,
         start: 0,
         end: 0,
@@ -277,16 +277,16 @@ pub(crate) fn own_library(text: &str, file: usize, log: &mut Log) -> Vec<EffectK
 /// A kind as other crates see it.
 pub(crate) fn describe(entry: &EffectKindEntry, is_own: bool) -> EffectKind {
     let units = |units: &Option<UnitByPlace>| {
-        Carries::ALL
+        PlaceLoad::ALL
             .into_iter()
-            .filter(|carries| may_carry(entry, *carries))
+            .filter(|carries| can_carry(entry, *carries))
             .filter_map(|carries| {
                 let unit = carries.unit(units.as_ref()?)?;
                 Some((carries, unit.text.clone()))
             })
             .collect()
     };
-    let words = |text: &Option<Text>| text.as_ref().map_or_else(String::new, |t| t.text.clone());
+    let words = |text: &Option<SpannedText>| text.as_ref().map_or_else(String::new, |t| t.text.clone());
     let parameters = entry.parameters.iter().flat_map(|table| &table.entries);
     let constants = entry.constants.iter().flat_map(|table| &table.entries);
     EffectKind {
@@ -332,10 +332,10 @@ pub(crate) fn describe(entry: &EffectKindEntry, is_own: bool) -> EffectKind {
     }
 }
 
-fn search(entry: &values::Search) -> Search {
+fn search(entry: &values::SearchEntry) -> ConstantSearch {
     match entry {
-        values::Search::Linear => Search::Linear,
-        values::Search::Range(range) => Search::Range {
+        values::SearchEntry::Linear => ConstantSearch::Linear,
+        values::SearchEntry::Range(range) => ConstantSearch::Range {
             // What is missing is reported where it is read.
             from: range.from.map_or(0.0, |number| number.value),
             to: range.to.map_or(0.0, |number| number.value),
@@ -358,21 +358,21 @@ pub(crate) fn n_places(entry: &EffectKindEntry) -> Option<usize> {
     }
 }
 
-pub(crate) fn may_carry(entry: &EffectKindEntry, carries: Carries) -> bool {
+pub(crate) fn can_carry(entry: &EffectKindEntry, carries: PlaceLoad) -> bool {
     let mut places = entry.on.iter().flat_map(|on| &on.entries);
     places.any(|on| match on {
         ActsOn::Drive | ActsOn::Coordinate => {
-            matches!(carries, Carries::Force | Carries::Torque)
+            matches!(carries, PlaceLoad::Force | PlaceLoad::Torque)
         }
-        ActsOn::Point => carries == Carries::Mass,
-        ActsOn::Part | ActsOn::Base | ActsOn::Force => carries == Carries::Elsewhere,
+        ActsOn::Point => carries == PlaceLoad::Mass,
+        ActsOn::Part | ActsOn::Base | ActsOn::Force => carries == PlaceLoad::Elsewhere,
     })
 }
 
 /// Checks a kind by itself: names, units at every place where it may act, linearity in its parameters.
-pub(crate) fn check(entry: &EffectKindEntry, log: &mut Log) {
+pub(crate) fn check_kind(entry: &EffectKindEntry, log: &mut DiagnosticLog) {
     check_constant_values(entry, log);
-    if !check_way(entry, log) {
+    if !check_expression_or_mechanics(entry, log) {
         return;
     }
     if let (Some(_), Some(expression), None) = (entry.other, &entry.expression, n_places(entry)) {
@@ -386,17 +386,17 @@ pub(crate) fn check(entry: &EffectKindEntry, log: &mut Log) {
         );
     }
     let mut acts = false;
-    for carries in Carries::ALL {
-        if !may_carry(entry, carries) {
+    for carries in PlaceLoad::ALL {
+        if !can_carry(entry, carries) {
             continue;
         }
         acts = true;
-        let lacking = lacking_units(entry, carries);
+        let lacking = symbols_without_unit(entry, carries);
         // A kind for linear drives alone need not say what it would be on a joint that turns.
         if !lacking.is_empty() {
             continue;
         }
-        let placeholders: Vec<(String, Exact)> = entry
+        let placeholders: Vec<(String, ExactExpression)> = entry
             .constants
             .iter()
             .flat_map(|constants| &constants.entries)
@@ -404,7 +404,7 @@ pub(crate) fn check(entry: &EffectKindEntry, log: &mut Log) {
             .map(|(i, (key, _))| {
                 (
                     key.name.clone(),
-                    Exact::Symbol(Symbol::Constant(ConstantIdx(i))),
+                    ExactExpression::Symbol(ModelSymbol::Constant(ConstantIdx(i))),
                 )
             })
             .collect();
@@ -412,10 +412,10 @@ pub(crate) fn check(entry: &EffectKindEntry, log: &mut Log) {
             return; // One report is enough; the other places have the same fault.
         }
     }
-    let nowhere = Carries::ALL
+    let nowhere = PlaceLoad::ALL
         .into_iter()
-        .filter(|carries| may_carry(entry, *carries))
-        .all(|carries| !lacking_units(entry, carries).is_empty());
+        .filter(|carries| can_carry(entry, *carries))
+        .all(|carries| !symbols_without_unit(entry, carries).is_empty());
     if acts
         && nowhere
         && let Some((key, _)) = entry
@@ -435,7 +435,7 @@ pub(crate) fn check(entry: &EffectKindEntry, log: &mut Log) {
     }
 }
 
-fn check_constant_values(entry: &EffectKindEntry, log: &mut Log) {
+fn check_constant_values(entry: &EffectKindEntry, log: &mut DiagnosticLog) {
     for (_, constant) in entry
         .constants
         .iter()
@@ -443,7 +443,7 @@ fn check_constant_values(entry: &EffectKindEntry, log: &mut Log) {
     {
         if let Some(value) = &constant.value {
             // Values of the library may only be numbers; names mean something in a model only.
-            Scope::default().walk(&value.ast, &[], log);
+            FormulaScope::default().resolve_ast(&value.ast, &[], log);
         }
     }
 }

@@ -1,16 +1,16 @@
 //! Positions of frames and points in the base frame, in double precision, and how they move with the coordinates.
 
-use crate::exact::{CoordinateIdx, Symbol};
-use crate::mechanism::{Axis, Mechanism, PointIdx, Step};
+use crate::exact::{CoordinateIdx, ModelSymbol};
+use crate::mechanism::{FrameAxis, Mechanism, PointIdx, FrameStep};
 
 pub(crate) type Vec3 = [f64; 3];
 
 /// One motion on the way from the base to a frame.
-pub(crate) struct Moved {
+pub(crate) struct PathMotion {
     pub(crate) coordinate: CoordinateIdx,
     pub(crate) factor: f64,
     /// Whether it turns about the axis; else it slides along it.
-    pub(crate) turns: bool,
+    pub(crate) is_rotation: bool,
     pub(crate) axis: Vec3,
     pub(crate) origin: Vec3,
 }
@@ -19,12 +19,12 @@ pub(crate) struct Moved {
 pub(crate) struct FramePose {
     pub(crate) rotation: [Vec3; 3],
     pub(crate) origin: Vec3,
-    pub(crate) own: Vec<Moved>,
+    pub(crate) motions: Vec<PathMotion>,
 }
 
 /// Poses of all frames at the nominal values.
 pub(crate) fn frame_poses(mechanism: &Mechanism) -> Vec<FramePose> {
-    let value = |symbol: Symbol| mechanism.symbol_nominal(symbol);
+    let value = |symbol: ModelSymbol| mechanism.symbol_nominal(symbol);
     let mut poses: Vec<FramePose> = Vec::with_capacity(mechanism.frames.len());
     for (i, frame) in mechanism.frames.iter().enumerate() {
         let (mut rotation, mut origin) = if i == 0 {
@@ -39,14 +39,14 @@ pub(crate) fn frame_poses(mechanism: &Mechanism) -> Vec<FramePose> {
         let mut own = Vec::new();
         for step in &frame.steps {
             match step {
-                Step::Rotate(axis, angle) => {
+                FrameStep::Rotate(axis, angle) => {
                     let direction = column(&rotation, *axis);
                     for &(symbol, factor) in &angle.terms {
-                        if let Symbol::Coordinate(coordinate) = symbol {
-                            own.push(Moved {
+                        if let ModelSymbol::Coordinate(coordinate) = symbol {
+                            own.push(PathMotion {
                                 coordinate,
                                 factor: f64::from(factor),
-                                turns: true,
+                                is_rotation: true,
                                 axis: direction,
                                 origin,
                             });
@@ -54,13 +54,13 @@ pub(crate) fn frame_poses(mechanism: &Mechanism) -> Vec<FramePose> {
                     }
                     rotate(&mut rotation, *axis, angle.evaluate(&value));
                 }
-                Step::Translate(axis, length) => {
+                FrameStep::Translate(axis, length) => {
                     let direction = column(&rotation, *axis);
                     for (coordinate, factor) in &length.coordinates {
-                        own.push(Moved {
+                        own.push(PathMotion {
                             coordinate: *coordinate,
                             factor: crate::print::to_f64(factor),
-                            turns: false,
+                            is_rotation: false,
                             axis: direction,
                             origin,
                         });
@@ -71,24 +71,24 @@ pub(crate) fn frame_poses(mechanism: &Mechanism) -> Vec<FramePose> {
                     }
                 }
                 // What loops and drives reach does not move with the body as a whole, so no derivative is asked for.
-                Step::Free(body) => {
+                FrameStep::Free(body) => {
                     let of = |i: CoordinateIdx| mechanism.coordinates[i.0].nominal;
                     origin = body.position.map(of);
-                    rotation = turned_by(body.quaternion.map(of));
+                    rotation = rotation_from_quaternion(body.quaternion.map(of));
                 }
             }
         }
         poses.push(FramePose {
             rotation,
             origin,
-            own,
+            motions: own,
         });
     }
     poses
 }
 
 /// The rotation of a quaternion w, x, y, z of any length, by rows.
-pub(crate) fn turned_by([w, x, y, z]: [f64; 4]) -> [Vec3; 3] {
+pub(crate) fn rotation_from_quaternion([w, x, y, z]: [f64; 4]) -> [Vec3; 3] {
     let per = 2.0 / (w * w + x * x + y * y + z * z);
     [
         [
@@ -109,22 +109,22 @@ pub(crate) fn turned_by([w, x, y, z]: [f64; 4]) -> [Vec3; 3] {
     ]
 }
 
-fn column(rotation: &[Vec3; 3], axis: Axis) -> Vec3 {
+fn column(rotation: &[Vec3; 3], axis: FrameAxis) -> Vec3 {
     let j = match axis {
-        Axis::X => 0,
-        Axis::Y => 1,
-        Axis::Z => 2,
+        FrameAxis::X => 0,
+        FrameAxis::Y => 1,
+        FrameAxis::Z => 2,
     };
     [rotation[0][j], rotation[1][j], rotation[2][j]]
 }
 
 /// Multiplies from the right by an elementary rotation.
-fn rotate(rotation: &mut [Vec3; 3], axis: Axis, angle: f64) {
+fn rotate(rotation: &mut [Vec3; 3], axis: FrameAxis, angle: f64) {
     let (sin, cos) = angle.sin_cos();
     let (j, k) = match axis {
-        Axis::X => (1, 2),
-        Axis::Y => (2, 0),
-        Axis::Z => (0, 1),
+        FrameAxis::X => (1, 2),
+        FrameAxis::Y => (2, 0),
+        FrameAxis::Z => (0, 1),
     };
     for row in rotation {
         let (first, second) = (row[j], row[k]);
@@ -135,7 +135,7 @@ fn rotate(rotation: &mut [Vec3; 3], axis: Axis, angle: f64) {
 
 /// A point's position in the base frame.
 pub(crate) fn position(mechanism: &Mechanism, poses: &[FramePose], point: PointIdx) -> Vec3 {
-    let value = |symbol: Symbol| mechanism.symbol_nominal(symbol);
+    let value = |symbol: ModelSymbol| mechanism.symbol_nominal(symbol);
     let point = &mechanism.points[point.0];
     let pose = &poses[point.frame.0];
     let local = [0, 1, 2].map(|k| point.at[k].evaluate(&value));
@@ -154,8 +154,8 @@ pub(crate) fn jacobian(
     let mut rows = [0, 1, 2].map(|_| vec![0.0; mechanism.coordinates.len()]);
     let mut frame = mechanism.points[point.0].frame.0;
     while frame != 0 {
-        for moved in &poses[frame].own {
-            let velocity = if moved.turns {
+        for moved in &poses[frame].motions {
+            let velocity = if moved.is_rotation {
                 let arm: Vec3 = std::array::from_fn(|k| at[k] - moved.origin[k]);
                 cross(moved.axis, arm)
             } else {

@@ -3,15 +3,15 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use modelmill_boundary::files::{Disk, FileError, FileFault, Files, tidy};
+use modelmill_boundary::files::{DiskFiles, FileError, FileFault, FileSource, normalise_path};
 
 use crate::build::build;
-use crate::diagnostic::{self, Diagnostic, Log, SourceFile, Sources, Span};
-use crate::document::{self, Table, Value, get, quote};
+use crate::diagnostic::{self, Diagnostic, DiagnosticLog, SourceFile, SourceFiles, SourceSpan};
+use crate::document::{self, TomlTable, TomlValue, find_key, quote};
 use crate::kinds::{self, EffectKind};
 use crate::mechanism::Mechanism;
 use crate::merge::merge;
-use crate::reading::{read_named, read_text};
+use crate::reading::{read_referenced, read_text};
 use crate::schema::{EffectKindEntry, ModelEntry};
 
 /// Longest chain of variants.
@@ -19,29 +19,29 @@ const LONGEST_CHAIN: usize = 8;
 
 /// A model file that was read and found sound.
 #[derive(Clone, Debug)]
-pub struct Loaded {
+pub struct LoadedModel {
     /// What the file describes.
     pub mechanism: Mechanism,
     /// What may not be intended, such as names that nothing uses.
     pub warnings: Vec<Diagnostic>,
     /// The files that were read.
-    pub sources: Sources,
+    pub sources: SourceFiles,
     /// The kinds of effects that the file may use: the library's, then its own.
     pub kinds: Vec<EffectKind>,
     /// Where each product of [`Mechanism::retain`] stands.
-    pub retain: Vec<Span>,
+    pub retain: Vec<SourceSpan>,
     /// What the mechanism was built from, for effects that join it.
-    pub(crate) entries: Arc<Entries>,
+    pub(crate) entries: Arc<FileEntries>,
 }
 
 /// The tables of a model file and of its libraries.
 #[derive(Debug)]
-pub(crate) struct Entries {
+pub(crate) struct FileEntries {
     pub(crate) model: ModelEntry,
     pub(crate) libraries: Vec<EffectKindEntry>,
 }
 
-impl Loaded {
+impl LoadedModel {
     /// The warnings as text, with the places they mean; empty if there are none.
     pub fn render(&self, color: bool) -> String {
         if self.warnings.is_empty() {
@@ -53,41 +53,41 @@ impl Loaded {
 
 /// A model file that has no meaning, and why.
 #[derive(Clone, Debug)]
-pub struct Failure {
+pub struct LoadFailure {
     /// All findings, errors and warnings, in the order of the file.
     pub diagnostics: Vec<Diagnostic>,
     /// The files that were read.
-    pub sources: Sources,
+    pub sources: SourceFiles,
 }
 
-impl Failure {
+impl LoadFailure {
     /// The findings as text, with the places they mean and what to do.
     pub fn render(&self, color: bool) -> String {
         diagnostic::render(&self.diagnostics, &self.sources, color)
     }
 }
 
-impl std::fmt::Display for Failure {
+impl std::fmt::Display for LoadFailure {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(&self.render(false))
     }
 }
 
-impl std::error::Error for Failure {}
+impl std::error::Error for LoadFailure {}
 
 /// Reads a model file from disk, and those that it extends.
 ///
 /// Fails with every finding about the files, each with its place.
-pub fn load_file(path: &Path) -> Result<Loaded, Failure> {
-    load_file_with(path, &[], &Disk::default())
+pub fn load_file(path: &Path) -> Result<LoadedModel, LoadFailure> {
+    load_file_with(path, &[], &DiskFiles::default())
 }
 
 /// Reads a model file as [`load_file`] does, with further libraries of kinds of effects, and all files from `files`.
 pub fn load_file_with(
     path: &Path,
     libraries: &[PathBuf],
-    files: &dyn Files,
-) -> Result<Loaded, Failure> {
+    files: &dyn FileSource,
+) -> Result<LoadedModel, LoadFailure> {
     let advice = "give the path of a model file, such as `model-spec/models/two_link.toml`";
     let text = read_text(files, path, advice)?;
     load_with(&path.to_string_lossy(), &text, libraries, files)
@@ -116,7 +116,7 @@ pub fn load_file_with(
 /// let failure = modelmill_spec::load("p.toml", &text.replace("\"angle\" }", "\"angel\" }"), &files);
 /// assert!(failure.unwrap_err().render(false).contains("did you mean `angle`?"));
 /// ```
-pub fn load(path_name: &str, text: &str, files: &dyn Files) -> Result<Loaded, Failure> {
+pub fn load(path_name: &str, text: &str, files: &dyn FileSource) -> Result<LoadedModel, LoadFailure> {
     load_with(path_name, text, &[], files)
 }
 
@@ -126,15 +126,15 @@ pub fn load_with(
     path_name: &str,
     text: &str,
     libraries: &[PathBuf],
-    files: &dyn Files,
-) -> Result<Loaded, Failure> {
-    let mut log = Log::default();
-    let mut sources = Sources::default();
+    files: &dyn FileSource,
+) -> Result<LoadedModel, LoadFailure> {
+    let mut log = DiagnosticLog::default();
+    let mut sources = SourceFiles::default();
     let (table, named) = read_chain(path_name, text, files, &mut sources, &mut log);
     let given = libraries.iter().map(|path| (path.clone(), None));
     let libraries: Vec<_> = given.chain(named).collect();
     let libraries = read_libraries(&libraries, files, &mut sources, &mut log);
-    let whole = Span {
+    let whole = SourceSpan {
         file: 0,
         start: 0,
         end: 0,
@@ -149,12 +149,12 @@ pub fn load_with(
     let mut diagnostics = log.finish();
     let Some(mechanism) = mechanism else {
         diagnostics.sort_by_key(|found| found.severity);
-        return Err(Failure {
+        return Err(LoadFailure {
             diagnostics,
             sources,
         });
     };
-    Ok(Loaded {
+    Ok(LoadedModel {
         mechanism,
         warnings: diagnostics,
         sources,
@@ -165,23 +165,23 @@ pub fn load_with(
             .flat_map(|list| &list.entries)
             .map(|formula| formula.ast.span)
             .collect(),
-        entries: Arc::new(Entries { model, libraries }),
+        entries: Arc::new(FileEntries { model, libraries }),
     })
 }
 
 /// The kinds of effects of the program's library and of further ones.
 ///
 /// Fails with every finding about those, each with its place.
-pub fn kinds_with(libraries: &[PathBuf], files: &dyn Files) -> Result<Vec<EffectKind>, Failure> {
-    let mut log = Log::default();
-    let mut sources = Sources::default();
+pub fn kinds_with(libraries: &[PathBuf], files: &dyn FileSource) -> Result<Vec<EffectKind>, LoadFailure> {
+    let mut log = DiagnosticLog::default();
+    let mut sources = SourceFiles::default();
     let named: Vec<NamedPath> = libraries.iter().map(|path| (path.clone(), None)).collect();
     let own = read_libraries(&named, files, &mut sources, &mut log);
     for entry in &own {
-        kinds::check(entry, &mut log);
+        kinds::check_kind(entry, &mut log);
     }
     if log.n_errors() > 0 {
-        return Err(Failure {
+        return Err(LoadFailure {
             diagnostics: log.finish(),
             sources,
         });
@@ -194,23 +194,23 @@ pub fn kinds_with(libraries: &[PathBuf], files: &dyn Files) -> Result<Vec<Effect
 fn read_chain(
     path_name: &str,
     text: &str,
-    files: &dyn Files,
-    sources: &mut Sources,
-    log: &mut Log,
-) -> (Table, Vec<NamedPath>) {
+    files: &dyn FileSource,
+    sources: &mut SourceFiles,
+    log: &mut DiagnosticLog,
+) -> (TomlTable, Vec<NamedPath>) {
     let mut tables = Vec::new();
     let mut libraries = Vec::new();
     let mut path = PathBuf::from(path_name);
     let mut text = text.to_owned();
     loop {
         let file = sources.files.len();
-        let table = document::parse(&text, file, log);
+        let table = document::parse_toml(&text, file, log);
         sources.files.push(SourceFile {
             path: path.clone(),
             text,
         });
         libraries.extend(named_libraries(&table, &path));
-        let next = extended(&table, &path, sources, files, log);
+        let next = extended_file(&table, &path, sources, files, log);
         tables.push(table);
         match next {
             Some((next_path, next_text)) => {
@@ -228,44 +228,44 @@ fn read_chain(
 }
 
 /// A path, and where a file names it.
-type NamedPath = (PathBuf, Option<Span>);
+type NamedPath = (PathBuf, Option<SourceSpan>);
 
 /// The libraries that a file names, relative to itself.
-fn named_libraries(table: &Table, path: &Path) -> Vec<NamedPath> {
-    let Some((_, node)) = get(table, "library") else {
+fn named_libraries(table: &TomlTable, path: &Path) -> Vec<NamedPath> {
+    let Some((_, node)) = find_key(table, "library") else {
         return Vec::new();
     };
     let entries = match &node.value {
-        Value::Array(entries) => entries.as_slice(),
+        TomlValue::Array(entries) => entries.as_slice(),
         _ => std::slice::from_ref(node),
     };
     // What is no text is reported by the reader of the merged file.
     let texts = entries.iter().filter_map(|entry| match &entry.value {
-        Value::Text { text, .. } => Some((text, entry.span)),
+        TomlValue::Text { text, .. } => Some((text, entry.span)),
         _ => None,
     });
     let folder = path.parent().unwrap_or(Path::new(""));
     texts
-        .map(|(text, span)| (tidy(&folder.join(text)), Some(span)))
+        .map(|(text, span)| (normalise_path(&folder.join(text)), Some(span)))
         .collect()
 }
 
 /// Reads libraries of kinds of effects, each once.
 fn read_libraries(
     libraries: &[NamedPath],
-    files: &dyn Files,
-    sources: &mut Sources,
-    log: &mut Log,
+    files: &dyn FileSource,
+    sources: &mut SourceFiles,
+    log: &mut DiagnosticLog,
 ) -> Vec<EffectKindEntry> {
     let mut kinds = Vec::new();
     for (i, (path, named)) in libraries.iter().enumerate() {
-        let same = |(other, _): &NamedPath| tidy(other) == tidy(path);
+        let same = |(other, _): &NamedPath| normalise_path(other) == normalise_path(path);
         if libraries[..i].iter().any(same) {
             continue;
         }
         let file = sources.files.len();
         let path_name = quote(&path.to_string_lossy());
-        match read_named(files, path, &["effect_kind", "schema"]) {
+        match read_referenced(files, path, &["effect_kind", "schema"]) {
             Ok(text) => {
                 let entries = kinds::own_library(&text, file, log);
                 sources.files.push(SourceFile {
@@ -278,7 +278,7 @@ fn read_libraries(
                 let diagnostic = Diagnostic {
                     span: *named,
                     ..Diagnostic::error(
-                        Span {
+                        SourceSpan {
                             file: 0,
                             start: 0,
                             end: 0,
@@ -300,15 +300,15 @@ fn read_libraries(
 }
 
 /// The file that this one extends, if any.
-fn extended(
-    table: &Table,
+fn extended_file(
+    table: &TomlTable,
     path: &Path,
-    sources: &Sources,
-    files: &dyn Files,
-    log: &mut Log,
+    sources: &SourceFiles,
+    files: &dyn FileSource,
+    log: &mut DiagnosticLog,
 ) -> Option<(PathBuf, String)> {
-    let (_, node) = get(table, "extends")?;
-    let Value::Text { text: target, .. } = &node.value else {
+    let (_, node) = find_key(table, "extends")?;
+    let TomlValue::Text { text: target, .. } = &node.value else {
         // The merge drops a base's own keys, so the type must be looked at here.
         if !sources.files.is_empty() && sources.files.len() > 1 {
             log.push(
@@ -318,7 +318,7 @@ fn extended(
         }
         return None;
     };
-    let next = tidy(&path.parent().unwrap_or(Path::new("")).join(target));
+    let next = normalise_path(&path.parent().unwrap_or(Path::new("")).join(target));
     let mut refuse = |message: String, label: &str, help: &str| {
         log.push(
             Diagnostic::error(node.span, message)
@@ -328,7 +328,7 @@ fn extended(
         // What the missing file would define is not reported as unknown.
         log.syntax_broken = true;
     };
-    if sources.files.iter().any(|file| tidy(&file.path) == next) {
+    if sources.files.iter().any(|file| normalise_path(&file.path) == next) {
         refuse(
             "these files extend one another in a circle".to_owned(),
             "this file is being read already",
@@ -344,7 +344,7 @@ fn extended(
         );
         return None;
     }
-    match read_named(files, &next, &["schema"]) {
+    match read_referenced(files, &next, &["schema"]) {
         Ok(text) => Some((next, text)),
         // `.` beside a file without a folder in its path leaves no name at all.
         Err(FileError { fault, .. })

@@ -4,8 +4,8 @@
 
 use num_rational::BigRational;
 
-use crate::exact::{Angle, CoordinateIdx, Exact, Length, ParameterIdx, Symbol};
-use crate::joint_motion::Motion;
+use crate::exact::{ExactAngle, CoordinateIdx, ExactExpression, ExactLength, ParameterIdx, ModelSymbol};
+use crate::joint_motion::CoordinateMotion;
 use crate::mechanics::Mechanics;
 
 /// Index of a frame in [`Mechanism::frames`]; 0 is the base.
@@ -29,32 +29,32 @@ pub struct Mechanism {
     /// One line for people.
     pub title: Option<String>,
     /// Gravity in the base frame, m/s^2; expressions over constants. A tilt among the effects has turned it already.
-    pub gravity: [Exact; 3],
+    pub gravity: [ExactExpression; 3],
     /// Known geometry and the like.
-    pub constants: Vec<Constant>,
+    pub constants: Vec<ModelConstant>,
     /// Dynamic parameters in the order of declaration, which orders `p_g`.
-    pub parameters: Vec<Parameter>,
+    pub parameters: Vec<DynamicParameter>,
     /// Joint coordinates in the order of declaration.
-    pub coordinates: Vec<Coordinate>,
+    pub coordinates: Vec<JointCoordinate>,
     /// Frames; parents come before their children, 0 is the base.
-    pub frames: Vec<Frame>,
+    pub frames: Vec<ModelFrame>,
     /// Named points.
-    pub points: Vec<Point>,
+    pub points: Vec<FramePoint>,
     /// Rigid bodies.
-    pub parts: Vec<Part>,
+    pub parts: Vec<ModelPart>,
     /// Lumped masses.
     pub lumped_masses: Vec<LumpedMass>,
     /// Loops closed by coincident points.
-    pub loops: Vec<Loop>,
+    pub loops: Vec<KinematicLoop>,
     /// Coordinates that follow others; they are passive.
-    pub couplings: Vec<Coupling>,
+    pub couplings: Vec<CoordinateCoupling>,
     /// Drives, one per degree of freedom; what nothing drives has its row here too.
-    pub drives: Vec<Drive>,
+    pub drives: Vec<ModelDrive>,
     /// Drives of a mechanism that has more of them than degrees of freedom, such as cables; then none of [`Self::drives`] is
     /// driven, and these act on all of them by their transposed Jacobian, `J' f`.
-    pub shared_drives: Vec<Drive>,
+    pub shared_drives: Vec<ModelDrive>,
     /// Friction, drive inertia and the like.
-    pub effects: Vec<Effect>,
+    pub effects: Vec<ModelEffect>,
     /// How much later than they act the forces of recordings are read, s; zero unless an effect says otherwise.
     /// Equations and code know nothing of it: only where a model is held against a recording does it matter.
     pub force_delay: f64,
@@ -62,18 +62,18 @@ pub struct Mechanism {
     /// each is a product of powers of parameters.
     pub retain: Vec<Vec<(ParameterIdx, u32)>>,
     /// What planned motion must keep.
-    pub limits: Limits,
+    pub limits: MotionLimits,
     /// Values of base parameters by their expressions, which take the place of those of the nominal parameters.
     pub identified_base: Vec<(String, f64)>,
     /// How recordings name their columns: ours to theirs.
-    pub recording: Recording,
+    pub recording: RecordingColumns,
     /// Whether constants of the file were replaced by their values, see [`Mechanism::at_values`].
     pub is_at_values: bool,
 }
 
 /// A known quantity.
 #[derive(Clone, Debug)]
-pub struct Constant {
+pub struct ModelConstant {
     /// Identifier.
     pub name: String,
     /// Value in SI units.
@@ -88,7 +88,7 @@ pub struct Constant {
 
 /// A dynamic parameter.
 #[derive(Clone, Debug)]
-pub struct Parameter {
+pub struct DynamicParameter {
     /// Identifier.
     pub name: String,
     /// Nominal value in SI units; zero where the file gives none.
@@ -101,11 +101,11 @@ pub struct Parameter {
 
 /// A joint coordinate.
 #[derive(Clone, Debug)]
-pub struct Coordinate {
+pub struct JointCoordinate {
     /// Identifier.
     pub name: String,
     /// Angle or length.
-    pub motion: Motion,
+    pub motion: CoordinateMotion,
     /// Passive coordinates follow from the loops or by a coupling; the others are independent.
     pub passive: bool,
     /// Value at the nominal pose, which chooses the assembly mode.
@@ -116,7 +116,7 @@ pub struct Coordinate {
 /// An axis of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[allow(missing_docs)]
-pub enum Axis {
+pub enum FrameAxis {
     X,
     Y,
     Z,
@@ -124,11 +124,11 @@ pub enum Axis {
 
 /// One elementary motion from a parent frame towards its child; each acts about or along the axes reached so far.
 #[derive(Clone, Debug)]
-pub enum Step {
+pub enum FrameStep {
     /// Rotation about an axis.
-    Rotate(Axis, Angle),
+    Rotate(FrameAxis, ExactAngle),
     /// Translation along an axis.
-    Translate(Axis, Length),
+    Translate(FrameAxis, ExactLength),
     /// Any motion at all; the only step of a frame that hangs on the base.
     Free(FreeBody),
 }
@@ -161,20 +161,20 @@ pub enum TwistAxes {
 
 /// A frame in the tree.
 #[derive(Clone, Debug)]
-pub struct Frame {
+pub struct ModelFrame {
     /// Identifier; `base` for the base.
     pub name: String,
     /// Parent; the base is its own.
     pub parent: FrameIdx,
     /// Elementary motions from the parent, e.g. Rx(alpha) Tx(a) Rz(theta) Tz(d) for modified DH.
-    pub steps: Vec<Step>,
+    pub steps: Vec<FrameStep>,
     /// The convention the file used, for the frames table of a page.
-    pub convention: Convention,
+    pub convention: FrameConvention,
 }
 
 /// How a frame was written in the file.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Convention {
+pub enum FrameConvention {
     /// The base frame.
     Base,
     /// Rx(alpha) Tx(a) Rz(theta) Tz(d); the texts of a, alpha, d, theta.
@@ -187,67 +187,67 @@ pub enum Convention {
 
 /// A point fixed to a frame.
 #[derive(Clone, Debug)]
-pub struct Point {
+pub struct FramePoint {
     /// Identifier.
     pub name: String,
     /// Its frame.
     pub frame: FrameIdx,
     /// Position in that frame, m; expressions over constants.
-    pub at: [Exact; 3],
+    pub at: [ExactExpression; 3],
 }
 
 /// Inertia of a part; expressions over constants and parameters, polynomial in the parameters.
 #[derive(Clone, Debug)]
-pub enum Inertial {
+pub enum PartInertia {
     /// Mass, centre of mass in the frame, and inertia about the centre (xx, xy, xz, yy, yz, zz) along the frame's axes.
     AboutCentre {
         /// kg
-        mass: Exact,
+        mass: ExactExpression,
         /// m
-        centre: [Exact; 3],
+        centre: [ExactExpression; 3],
         /// kg m^2; the off-diagonal entries are elements of the inertia matrix (negative products).
-        inertia: [Exact; 6],
+        inertia: [ExactExpression; 6],
     },
     /// The ten linear parameters about the frame's origin.
     Linear {
         /// kg
-        mass: Exact,
+        mass: ExactExpression,
         /// Mass times centre, kg m.
-        first_moment: [Exact; 3],
+        first_moment: [ExactExpression; 3],
         /// xx, xy, xz, yy, yz, zz about the origin, kg m^2.
-        inertia: [Exact; 6],
+        inertia: [ExactExpression; 6],
     },
 }
 
 /// A rigid body on a frame.
 #[derive(Clone, Debug)]
-pub struct Part {
+pub struct ModelPart {
     /// Name for people; the frame's if the file gives none.
     pub name: String,
     /// The frame that carries it.
     pub frame: FrameIdx,
     /// Its inertia.
-    pub inertial: Inertial,
+    pub inertial: PartInertia,
 }
 
 /// A mass concentrated at a point of a frame, or at different points for the two balances of a body.
 #[derive(Clone, Debug)]
 pub struct LumpedMass {
     /// The mass; an expression over constants and parameters, kg.
-    pub mass: Exact,
+    pub mass: ExactExpression,
     /// The share of that mass which sits here.
     pub share: BigRational,
     /// The frame that carries it.
     pub frame: FrameIdx,
     /// Where the balance of forces sees it, in the frame, m; over constants and parameters.
-    pub force_at: [Exact; 3],
+    pub force_at: [ExactExpression; 3],
     /// Where the balance of moments about the frame's origin sees it, in the frame, m.
-    pub moment_at: [Exact; 3],
+    pub moment_at: [ExactExpression; 3],
 }
 
 /// A loop closed by two points that coincide.
 #[derive(Clone, Debug)]
-pub struct Loop {
+pub struct KinematicLoop {
     /// Name for people.
     pub name: String,
     /// The points.
@@ -256,27 +256,27 @@ pub struct Loop {
 
 /// A coordinate that follows others, as by gears, a belt or a screw: `coordinate = sum of factor * other + offset`.
 #[derive(Clone, Debug)]
-pub struct Coupling {
+pub struct CoordinateCoupling {
     /// What follows.
     pub coordinate: CoordinateIdx,
     /// What it follows, sorted, each with its factor: expressions over constants, in units of one over the other.
-    pub terms: Vec<(CoordinateIdx, Exact)>,
+    pub terms: Vec<(CoordinateIdx, ExactExpression)>,
     /// An expression over constants, rad or m.
-    pub offset: Exact,
+    pub offset: ExactExpression,
 }
 
-impl Coupling {
+impl CoordinateCoupling {
     /// The value of what follows, rad or m.
-    pub fn value(&self, value: &dyn Fn(Symbol) -> f64) -> f64 {
+    pub fn value(&self, value: &dyn Fn(ModelSymbol) -> f64) -> f64 {
         let terms = self.terms.iter();
-        let moved = terms.map(|(i, factor)| factor.evaluate(value) * value(Symbol::Coordinate(*i)));
+        let moved = terms.map(|(i, factor)| factor.evaluate(value) * value(ModelSymbol::Coordinate(*i)));
         self.offset.evaluate(value) + moved.sum::<f64>()
     }
 }
 
 /// A drive.
 #[derive(Clone, Debug)]
-pub struct Drive {
+pub struct ModelDrive {
     /// Identifier; the name of its force in recordings.
     pub name: String,
     /// How it acts.
@@ -302,7 +302,7 @@ pub enum DriveKind {
 
 /// Where an effect acts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Place {
+pub enum EffectPlace {
     /// On a drive: adds to its force.
     Drive(DriveIdx),
     /// On a joint coordinate, also a passive one: adds to its torque or force.
@@ -319,22 +319,22 @@ pub enum Place {
 
 /// An effect of the file, with its kind's expressions put in place.
 #[derive(Clone, Debug)]
-pub struct Effect {
+pub struct ModelEffect {
     /// Name of the kind.
     pub kind: String,
     /// Where it acts; its parameters are shared by all places.
-    pub places: Vec<Place>,
+    pub places: Vec<EffectPlace>,
     /// The place whose motion it has besides, where it acts at one place alone.
-    pub other: Option<Place>,
+    pub other: Option<EffectPlace>,
     /// Mechanics of its own. Without them the effect is `sum of parameter * expression`, the same at every place: a force
     /// or torque on drives and coordinates; at points the parameter is a mass and the expression its factor.
     pub mechanics: Option<Mechanics>,
     /// Its parameters; none where the effect only has constants.
     pub terms: Vec<EffectTerm>,
     /// The values of its kind's constants by their symbols; expressions over constants.
-    pub constants: Vec<(String, Exact)>,
+    pub constants: Vec<(String, ExactExpression)>,
     /// Bodies that join those of the mechanism; their parameters are those of the terms.
-    pub bodies: Bodies,
+    pub bodies: EffectBodies,
 }
 
 /// One parameter of an effect with what it multiplies.
@@ -345,23 +345,23 @@ pub struct EffectTerm {
     /// The parameter, listed in [`Mechanism::parameters`] after those that the file declares.
     pub parameter: ParameterIdx,
     /// Expression over constants and [`crate::PlaceQuantity`]; 1 where it has mechanics.
-    pub expression: Exact,
+    pub expression: ExactExpression,
 }
 
 /// Bodies of an effect.
 #[derive(Clone, Debug, Default)]
-pub struct Bodies {
+pub struct EffectBodies {
     /// Parts.
-    pub parts: Vec<Part>,
+    pub parts: Vec<ModelPart>,
     /// Lumped masses.
     pub lumped_masses: Vec<LumpedMass>,
 }
 
 /// What planned motion must keep; ranges are `[low, high]`, and what is not named is not limited.
 #[derive(Clone, Debug, Default)]
-pub struct Limits {
+pub struct MotionLimits {
     /// Of coordinates, each at most once.
-    pub coordinates: Vec<(CoordinateIdx, CoordinateLimits)>,
+    pub coordinates: Vec<(CoordinateIdx, CoordinateBounds)>,
     /// Forces of drives, N or N m.
     pub forces: Vec<(DriveIdx, [f64; 2])>,
     /// Boxes of points along the axes of the base frame, m.
@@ -372,7 +372,7 @@ pub struct Limits {
 
 /// Limits of a coordinate.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct CoordinateLimits {
+pub struct CoordinateBounds {
     /// rad or m
     pub position: Option<[f64; 2]>,
     /// rad/s or m/s; contains 0.
@@ -383,7 +383,7 @@ pub struct CoordinateLimits {
 
 /// How recordings name their columns.
 #[derive(Clone, Debug, Default)]
-pub struct Recording {
+pub struct RecordingColumns {
     /// Pairs of our name (`t`, a coordinate, with `_d` or `_dd`, a drive) and theirs: a column, or a sum of columns
     /// as [`crate::read_column`] reads it.
     pub columns: Vec<(String, String)>,

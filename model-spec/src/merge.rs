@@ -3,8 +3,8 @@
 //! Tables merge key by key, lists of tables by the entries' names, and inside an entry each field is replaced whole.
 //! Every value keeps its place, so that later findings point into the file at fault.
 
-use crate::diagnostic::{Diagnostic, Log};
-use crate::document::{Key, Node, Table, Value, get, quote};
+use crate::diagnostic::{Diagnostic, DiagnosticLog};
+use crate::document::{TomlKey, TomlNode, TomlTable, TomlValue, find_key, quote};
 use crate::suggest;
 
 /// Fields of which one rules the others out: a variant that sets one drops the others of the extended file.
@@ -14,7 +14,7 @@ const ALTERNATIVES: [&[&[&str]]; 3] = [
     &[&["joint"], &["linear"]],
 ];
 /// A field that an entry of a list must have: an entry of a variant without it can only mean to override another one.
-const NEEDED: [(&str, &str); 8] = [
+const REQUIRED_FIELDS: [(&str, &str); 8] = [
     ("frame", "on"),
     ("point", "on"),
     ("part", "on"),
@@ -25,13 +25,13 @@ const NEEDED: [(&str, &str); 8] = [
     ("drive", "name"),
 ];
 /// Keys that are a file's own and are not taken over.
-const OWN: [&str; 4] = ["schema", "name", "extends", "remove"];
+const OWN_KEYS: [&str; 4] = ["schema", "name", "extends", "remove"];
 
 /// Applies a variant to the file that it extends.
-pub(crate) fn merge(mut base: Table, variant: Table, log: &mut Log) -> Table {
-    base.retain(|(key, _)| !OWN.contains(&key.name.as_str()));
-    if let Some((_, list)) = get(&variant, "remove") {
-        remove(&mut base, list, log);
+pub(crate) fn merge(mut base: TomlTable, variant: TomlTable, log: &mut DiagnosticLog) -> TomlTable {
+    base.retain(|(key, _)| !OWN_KEYS.contains(&key.name.as_str()));
+    if let Some((_, list)) = find_key(&variant, "remove") {
+        remove_entries(&mut base, list, log);
     }
     for (key, node) in variant {
         match base.iter_mut().find(|(old, _)| old.name == key.name) {
@@ -42,9 +42,9 @@ pub(crate) fn merge(mut base: Table, variant: Table, log: &mut Log) -> Table {
     base
 }
 
-fn merge_section(section: &str, old: &mut Node, new: Node, log: &mut Log) {
+fn merge_section(section: &str, old: &mut TomlNode, new: TomlNode, log: &mut DiagnosticLog) {
     match (&mut old.value, new.value) {
-        (Value::Table(old), Value::Table(new)) => {
+        (TomlValue::Table(old), TomlValue::Table(new)) => {
             for (key, entry) in new {
                 match old.iter_mut().find(|(name, _)| name.name == key.name) {
                     Some((old_key, old_entry)) => {
@@ -55,11 +55,11 @@ fn merge_section(section: &str, old: &mut Node, new: Node, log: &mut Log) {
                 }
             }
         }
-        (Value::Array(old), Value::Array(new))
+        (TomlValue::Array(old), TomlValue::Array(new))
             if !new.is_empty()
                 && new
                     .iter()
-                    .all(|entry| matches!(entry.value, Value::Table(_))) =>
+                    .all(|entry| matches!(entry.value, TomlValue::Table(_))) =>
         {
             let n_old = old.len();
             for entry in new {
@@ -83,15 +83,15 @@ fn merge_section(section: &str, old: &mut Node, new: Node, log: &mut Log) {
     }
 }
 
-fn merge_entry(old: &mut Node, new: Node) {
+fn merge_entry(old: &mut TomlNode, new: TomlNode) {
     old.span = new.span;
-    let (Value::Table(old_fields), Value::Table(new_fields)) = (&mut old.value, &new.value) else {
+    let (TomlValue::Table(old_fields), TomlValue::Table(new_fields)) = (&mut old.value, &new.value) else {
         old.value = new.value;
         return;
     };
     for choice in ALTERNATIVES {
         let sets =
-            |table: &Table, option: &[&str]| option.iter().any(|key| get(table, key).is_some());
+            |table: &TomlTable, option: &[&str]| option.iter().any(|key| find_key(table, key).is_some());
         // `joint` and `linear` stand in several kinds of entries; both sides of a choice must occur to matter.
         if let Some(taken) = choice.iter().find(|option| sets(new_fields, option)) {
             old_fields.retain(|(key, _)| {
@@ -102,7 +102,7 @@ fn merge_entry(old: &mut Node, new: Node) {
             });
         }
     }
-    let Value::Table(new_fields) = new.value else {
+    let TomlValue::Table(new_fields) = new.value else {
         return;
     };
     for (key, value) in new_fields {
@@ -117,17 +117,17 @@ fn merge_entry(old: &mut Node, new: Node) {
 }
 
 /// Whether an entry lacks what a new one must have, so that it can only mean to override.
-fn is_partial(section: &str, entry: &Node) -> bool {
-    let Value::Table(table) = &entry.value else {
+fn is_partial(section: &str, entry: &TomlNode) -> bool {
+    let TomlValue::Table(table) = &entry.value else {
         return false;
     };
-    NEEDED
+    REQUIRED_FIELDS
         .iter()
-        .any(|(list, key)| *list == section && get(table, key).is_none())
+        .any(|(list, key)| *list == section && find_key(table, key).is_none())
 }
 
 /// What is wrong with an entry that means to override, but none that there is.
-fn overrides_nothing(section: &str, entry: &Node, old: &[Node]) -> Diagnostic {
+fn overrides_nothing(section: &str, entry: &TomlNode, old: &[TomlNode]) -> Diagnostic {
     let (message, advice) = match name_of(entry) {
         Some(name) => {
             let names = old.iter().filter_map(name_of);
@@ -147,7 +147,7 @@ fn overrides_nothing(section: &str, entry: &Node, old: &[Node]) -> Diagnostic {
             Some("add its `name`".to_owned()),
         ),
     };
-    let needed = NEEDED
+    let needed = REQUIRED_FIELDS
         .iter()
         .find(|(list, _)| *list == section)
         .map_or("", |(_, key)| key);
@@ -168,18 +168,18 @@ fn overrides_nothing(section: &str, entry: &Node, old: &[Node]) -> Diagnostic {
 fn with_unnamed(
     diagnostic: Diagnostic,
     section: &str,
-    entries: &[Node],
+    entries: &[TomlNode],
     wanted: Option<&str>,
 ) -> Diagnostic {
     let mut unnamed = entries.iter().filter(|entry| name_of(entry).is_none());
-    let says = |entry: &&Node| {
-        let Value::Table(table) = &entry.value else {
+    let says = |entry: &&TomlNode| {
+        let TomlValue::Table(table) = &entry.value else {
             return false;
         };
-        let texts = ["kind", "on"].map(|key| get(table, key).map(|(_, node)| &node.value));
+        let texts = ["kind", "on"].map(|key| find_key(table, key).map(|(_, node)| &node.value));
         texts
             .iter()
-            .any(|value| matches!(value, Some(Value::Text { text, .. }) if Some(text.as_str()) == wanted))
+            .any(|value| matches!(value, Some(TomlValue::Text { text, .. }) if Some(text.as_str()) == wanted))
     };
     let Some(first) = unnamed.clone().find(says).or_else(|| unnamed.next()) else {
         return diagnostic;
@@ -190,22 +190,22 @@ fn with_unnamed(
 }
 
 /// The name of an entry of a list.
-fn name_of(node: &Node) -> Option<&str> {
-    let Value::Table(table) = &node.value else {
+fn name_of(node: &TomlNode) -> Option<&str> {
+    let TomlValue::Table(table) = &node.value else {
         return None;
     };
-    match get(table, "name").map(|(_, name)| &name.value) {
-        Some(Value::Text { text, .. }) => Some(text),
+    match find_key(table, "name").map(|(_, name)| &name.value) {
+        Some(TomlValue::Text { text, .. }) => Some(text),
         _ => None,
     }
 }
 
-fn remove(base: &mut Table, list: &Node, log: &mut Log) {
-    let Value::Array(list) = &list.value else {
+fn remove_entries(base: &mut TomlTable, list: &TomlNode, log: &mut DiagnosticLog) {
+    let TomlValue::Array(list) = &list.value else {
         return; // The reader of the merged file reports the type.
     };
     for path in list {
-        let Value::Text { text, .. } = &path.value else {
+        let TomlValue::Text { text, .. } = &path.value else {
             continue;
         };
         let (section, name) = match text.split_once('.') {
@@ -232,14 +232,14 @@ fn remove(base: &mut Table, list: &Node, log: &mut Log) {
             base.remove(position);
             continue;
         };
-        let names: Vec<String> = names_in(&base[position].1);
+        let names: Vec<String> = entry_names(&base[position].1);
         let removed = match &mut base[position].1.value {
-            Value::Table(table) => {
+            TomlValue::Table(table) => {
                 let before = table.len();
                 table.retain(|(key, _)| key.name != name);
                 table.len() < before
             }
-            Value::Array(entries) => {
+            TomlValue::Array(entries) => {
                 let before = entries.len();
                 entries.retain(|entry| name_of(entry) != Some(name));
                 entries.len() < before
@@ -252,7 +252,7 @@ fn remove(base: &mut Table, list: &Node, log: &mut Log) {
         }
         if !removed && !log.is_full() {
             let entries = match &base[position].1.value {
-                Value::Array(entries) => entries.as_slice(),
+                TomlValue::Array(entries) => entries.as_slice(),
                 _ => &[],
             };
             let advice = (!names.is_empty() || entries.is_empty())
@@ -272,13 +272,13 @@ fn remove(base: &mut Table, list: &Node, log: &mut Log) {
     }
 }
 
-fn names_in(node: &Node) -> Vec<String> {
+fn entry_names(node: &TomlNode) -> Vec<String> {
     match &node.value {
-        Value::Table(table) => table
+        TomlValue::Table(table) => table
             .iter()
-            .map(|(Key { name, .. }, _)| name.clone())
+            .map(|(TomlKey { name, .. }, _)| name.clone())
             .collect(),
-        Value::Array(entries) => entries
+        TomlValue::Array(entries) => entries
             .iter()
             .filter_map(name_of)
             .map(str::to_owned)

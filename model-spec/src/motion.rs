@@ -1,23 +1,23 @@
 //! Where points are at given coordinates, and how loops move with them: a mechanism goes in once, and is asked many
 //! times, as limits of planned motion need it.
 
-use crate::exact::{CoordinateIdx, Symbol};
-use crate::kinematics::{Vec3, turned_by};
-use crate::mechanism::{Axis, DriveKind, FreeBody, Mechanism, PointIdx, Step};
+use crate::exact::{CoordinateIdx, ModelSymbol};
+use crate::kinematics::{Vec3, rotation_from_quaternion};
+use crate::mechanism::{FrameAxis, DriveKind, FreeBody, Mechanism, PointIdx, FrameStep};
 
 /// The geometry of a mechanism with the file's constants.
 #[derive(Clone, Debug)]
 pub struct Kinematics {
-    n: usize,
-    frames: Vec<(usize, Vec<Motion>)>,
+    n_coordinates: usize,
+    frames: Vec<(usize, Vec<NumericStep>)>,
     points: Vec<(usize, Vec3)>,
     loops: Vec<[usize; 2]>,
-    couplings: Vec<Follower>,
+    couplings: Vec<FollowerCoordinate>,
 }
 
 /// A coordinate that follows others: `offset + sum of factor * other`.
 #[derive(Clone, Debug)]
-struct Follower {
+struct FollowerCoordinate {
     coordinate: usize,
     terms: Vec<(usize, f64)>,
     offset: f64,
@@ -25,14 +25,14 @@ struct Follower {
 
 /// One step on the way to a frame.
 #[derive(Clone, Debug)]
-enum Motion {
-    One(Move),
+enum NumericStep {
+    One(ElementaryMotion),
     Free(FreeBody),
 }
 
 /// One elementary motion: `offset + sum of factor * coordinate` about or along an axis.
 #[derive(Clone, Debug)]
-struct Move {
+struct ElementaryMotion {
     axis: usize,
     is_rotation: bool,
     offset: f64,
@@ -41,26 +41,26 @@ struct Move {
 
 /// All frames at given coordinates.
 #[derive(Clone, Debug)]
-pub struct Poses {
-    frames: Vec<Pose>,
+pub struct MechanismPoses {
+    frames: Vec<FramePlacement>,
 }
 
 /// A frame at given coordinates, all in the axes of the base frame.
 #[derive(Clone, Debug)]
-pub struct Pose {
+pub struct FramePlacement {
     /// Row by row; its columns are the frame's axes.
     pub rotation: [[f64; 3]; 3],
     /// m
     pub origin: [f64; 3],
     /// The joints between its parent and this frame, in the order of its steps.
-    pub moved: Vec<Moved>,
+    pub joint_axes: Vec<CoordinateAxis>,
     /// Where translations led on the way from the parent's origin, m, and how many of `moved` lay behind by then.
-    pub way: Vec<([f64; 3], usize)>,
+    pub translations: Vec<([f64; 3], usize)>,
 }
 
 /// How a coordinate moves a frame against its parent.
 #[derive(Clone, Copy, Debug)]
-pub struct Moved {
+pub struct CoordinateAxis {
     /// Position of the coordinate in [`Mechanism::coordinates`].
     pub coordinate: usize,
     /// By what the coordinate is multiplied.
@@ -73,9 +73,9 @@ pub struct Moved {
     pub origin: [f64; 3],
 }
 
-impl Poses {
+impl MechanismPoses {
     /// The frames in the order of the file, the base first.
-    pub fn frames(&self) -> &[Pose] {
+    pub fn frames(&self) -> &[FramePlacement] {
         &self.frames
     }
 }
@@ -83,18 +83,18 @@ impl Poses {
 impl Kinematics {
     /// The geometry, ready to be asked.
     pub fn new(mechanism: &Mechanism) -> Self {
-        let value = |symbol: Symbol| match symbol {
-            Symbol::Coordinate(_) => 0.0,
+        let value = |symbol: ModelSymbol| match symbol {
+            ModelSymbol::Coordinate(_) => 0.0,
             other => mechanism.symbol_nominal(other),
         };
-        let axis = |axis: &Axis| match axis {
-            Axis::X => 0,
-            Axis::Y => 1,
-            Axis::Z => 2,
+        let axis = |axis: &FrameAxis| match axis {
+            FrameAxis::X => 0,
+            FrameAxis::Y => 1,
+            FrameAxis::Z => 2,
         };
-        let moves = |step: &Step| match step {
-            Step::Free(body) => Motion::Free(*body),
-            Step::Rotate(about, angle) => Motion::One(Move {
+        let moves = |step: &FrameStep| match step {
+            FrameStep::Free(body) => NumericStep::Free(*body),
+            FrameStep::Rotate(about, angle) => NumericStep::One(ElementaryMotion {
                 axis: axis(about),
                 is_rotation: true,
                 offset: angle.evaluate(&value),
@@ -102,12 +102,12 @@ impl Kinematics {
                     .terms
                     .iter()
                     .filter_map(|(symbol, n)| match symbol {
-                        Symbol::Coordinate(i) => Some((i.0, f64::from(*n))),
+                        ModelSymbol::Coordinate(i) => Some((i.0, f64::from(*n))),
                         _ => None,
                     })
                     .collect(),
             }),
-            Step::Translate(along, length) => Motion::One(Move {
+            FrameStep::Translate(along, length) => NumericStep::One(ElementaryMotion {
                 axis: axis(along),
                 is_rotation: false,
                 offset: length.evaluate(&value),
@@ -119,7 +119,7 @@ impl Kinematics {
             }),
         };
         Self {
-            n: mechanism.coordinates.len(),
+            n_coordinates: mechanism.coordinates.len(),
             frames: mechanism
                 .frames
                 .iter()
@@ -138,7 +138,7 @@ impl Kinematics {
             couplings: mechanism
                 .couplings
                 .iter()
-                .map(|coupling| Follower {
+                .map(|coupling| FollowerCoordinate {
                     coordinate: coupling.coordinate.0,
                     terms: coupling
                         .terms
@@ -152,9 +152,9 @@ impl Kinematics {
     }
 
     /// All frames at given coordinates, rad and m, in the order of the file; one for each (asserted).
-    pub fn poses(&self, coordinates: &[f64]) -> Poses {
-        assert_eq!(coordinates.len(), self.n, "one value for each coordinate");
-        let mut frames: Vec<Pose> = Vec::with_capacity(self.frames.len());
+    pub fn poses(&self, coordinates: &[f64]) -> MechanismPoses {
+        assert_eq!(coordinates.len(), self.n_coordinates, "one value for each coordinate");
+        let mut frames: Vec<FramePlacement> = Vec::with_capacity(self.frames.len());
         for (i, (parent, moves)) in self.frames.iter().enumerate() {
             let (rotation, origin) = if i == 0 {
                 let unity = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
@@ -162,19 +162,19 @@ impl Kinematics {
             } else {
                 (frames[*parent].rotation, frames[*parent].origin)
             };
-            let mut pose = Pose {
+            let mut pose = FramePlacement {
                 rotation,
                 origin,
-                moved: Vec::new(),
-                way: Vec::new(),
+                joint_axes: Vec::new(),
+                translations: Vec::new(),
             };
             for step in moves {
                 let step = match step {
-                    Motion::One(step) => step,
-                    Motion::Free(body) => {
+                    NumericStep::One(step) => step,
+                    NumericStep::Free(body) => {
                         let of = |i: CoordinateIdx| coordinates[i.0];
                         pose.origin = body.position.map(of);
-                        pose.rotation = turned_by(body.quaternion.map(of));
+                        pose.rotation = rotation_from_quaternion(body.quaternion.map(of));
                         continue;
                     }
                 };
@@ -182,7 +182,7 @@ impl Kinematics {
                 let mut amount = step.offset;
                 for (coordinate, factor) in &step.coordinates {
                     amount += factor * coordinates[*coordinate];
-                    pose.moved.push(Moved {
+                    pose.joint_axes.push(CoordinateAxis {
                         coordinate: *coordinate,
                         factor: *factor,
                         is_rotation: step.is_rotation,
@@ -191,25 +191,25 @@ impl Kinematics {
                     });
                 }
                 if step.is_rotation {
-                    turn(&mut pose.rotation, step.axis, amount);
+                    rotate_columns(&mut pose.rotation, step.axis, amount);
                 } else {
                     for k in 0..3 {
                         pose.origin[k] += amount * direction[k];
                     }
-                    pose.way.push((pose.origin, pose.moved.len()));
+                    pose.translations.push((pose.origin, pose.joint_axes.len()));
                 }
             }
             frames.push(pose);
         }
-        Poses { frames }
+        MechanismPoses { frames }
     }
 
     /// A point's position in the base frame, m.
-    pub fn point(&self, poses: &Poses, point: PointIdx) -> [f64; 3] {
+    pub fn point_position(&self, poses: &MechanismPoses, point: PointIdx) -> [f64; 3] {
         self.position(poses, point.0)
     }
 
-    fn position(&self, poses: &Poses, point: usize) -> Vec3 {
+    fn position(&self, poses: &MechanismPoses, point: usize) -> Vec3 {
         let (frame, at) = &self.points[point];
         let pose = &poses.frames[*frame];
         std::array::from_fn(|k| {
@@ -219,7 +219,7 @@ impl Kinematics {
 
     /// How far apart the two points of each loop are, m: three numbers for each loop; then by how much each coordinate that
     /// follows others is off, rad or m, at the coordinates that the poses were made of.
-    pub fn gaps(&self, poses: &Poses, coordinates: &[f64]) -> Vec<f64> {
+    pub fn gaps(&self, poses: &MechanismPoses, coordinates: &[f64]) -> Vec<f64> {
         let ends = |l: &[usize; 2]| l.map(|point| self.position(poses, point));
         let of_loops = self.loops.iter().flat_map(|l| {
             let [a, b] = ends(l);
@@ -234,11 +234,11 @@ impl Kinematics {
     }
 
     /// Derivative of [`Self::gaps`] by all coordinates, one row for each gap.
-    pub fn gap_jacobian(&self, poses: &Poses) -> Vec<Vec<f64>> {
-        let mut rows = vec![vec![0.0; self.n]; 3 * self.loops.len()];
+    pub fn gap_jacobian(&self, poses: &MechanismPoses) -> Vec<Vec<f64>> {
+        let mut rows = vec![vec![0.0; self.n_coordinates]; 3 * self.loops.len()];
         for (l, ends) in self.loops.iter().enumerate() {
             for (point, sign) in ends.iter().zip([1.0, -1.0]) {
-                self.moves(poses, *point, &mut |coordinate, velocity| {
+                self.visit_point_rates(poses, *point, &mut |coordinate, velocity| {
                     for k in 0..3 {
                         rows[3 * l + k][coordinate] += sign * velocity[k];
                     }
@@ -246,7 +246,7 @@ impl Kinematics {
             }
         }
         for follower in &self.couplings {
-            let mut row = vec![0.0; self.n];
+            let mut row = vec![0.0; self.n_coordinates];
             row[follower.coordinate] = 1.0;
             for (i, factor) in &follower.terms {
                 row[*i] -= factor;
@@ -257,11 +257,11 @@ impl Kinematics {
     }
 
     /// Shows each coordinate that moves a point, with the point's velocity for a rate of one, joint by joint.
-    fn moves(&self, poses: &Poses, point: usize, show: &mut dyn FnMut(usize, Vec3)) {
+    fn visit_point_rates(&self, poses: &MechanismPoses, point: usize, show: &mut dyn FnMut(usize, Vec3)) {
         let at = self.position(poses, point);
         let mut frame = self.points[point].0;
         while frame != 0 {
-            for moved in &poses.frames[frame].moved {
+            for moved in &poses.frames[frame].joint_axes {
                 let axis = moved.axis;
                 let velocity = if moved.is_rotation {
                     let arm: Vec3 = std::array::from_fn(|k| at[k] - moved.origin[k]);
@@ -280,8 +280,8 @@ impl Kinematics {
     }
 
     /// Derivative of a drive's angle or length by all coordinates: a row of J. No loop may tie the coordinates.
-    pub fn drive_slopes(&self, poses: &Poses, kind: DriveKind) -> Vec<f64> {
-        let mut row = vec![0.0; self.n];
+    pub fn drive_slopes(&self, poses: &MechanismPoses, kind: DriveKind) -> Vec<f64> {
+        let mut row = vec![0.0; self.n_coordinates];
         match kind {
             DriveKind::Joint(i) => row[i.0] = 1.0,
             DriveKind::Linear { from, to } => {
@@ -289,7 +289,7 @@ impl Kinematics {
                 let along: Vec3 = std::array::from_fn(|k| ends[1][k] - ends[0][k]);
                 let length = along.iter().map(|x| x * x).sum::<f64>().sqrt();
                 for (point, sign) in [(from, -1.0), (to, 1.0)] {
-                    self.moves(poses, point.0, &mut |coordinate, velocity| {
+                    self.visit_point_rates(poses, point.0, &mut |coordinate, velocity| {
                         let slope: f64 = along.iter().zip(velocity).map(|(a, v)| a * v).sum();
                         row[coordinate] += sign * slope / length;
                     });
@@ -301,7 +301,7 @@ impl Kinematics {
 }
 
 /// Multiplies from the right by an elementary rotation.
-fn turn(rotation: &mut [Vec3; 3], axis: usize, angle: f64) {
+fn rotate_columns(rotation: &mut [Vec3; 3], axis: usize, angle: f64) {
     let (sin, cos) = angle.sin_cos();
     let (j, k) = ((axis + 1) % 3, (axis + 2) % 3);
     for row in rotation {
@@ -314,7 +314,7 @@ fn turn(rotation: &mut [Vec3; 3], axis: usize, angle: f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pose::gaps;
+    use crate::pose::loop_gaps;
 
     #[test]
     fn agrees_with_the_nominal_pose_and_with_differences() {
@@ -324,7 +324,7 @@ mod tests {
             let mechanism = crate::load_file(&path).unwrap().mechanism;
             let kinematics = Kinematics::new(&mechanism);
             let mut q: Vec<f64> = mechanism.coordinates.iter().map(|c| c.nominal).collect();
-            let expected = gaps(&mechanism);
+            let expected = loop_gaps(&mechanism);
             let close = |a: &[f64], b: &[f64], by: f64| {
                 a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a - b).abs() < by)
             };

@@ -1,10 +1,10 @@
 //! The little linear algebra that checks of a pose need: rank and least squares of small dense matrices.
 
 /// A dense matrix by rows.
-pub(crate) type Rows = Vec<Vec<f64>>;
+pub(crate) type DenseRows = Vec<Vec<f64>>;
 
 /// The numeric rank: pivots above `tolerance` times the largest entry, by elimination with full pivoting.
-pub(crate) fn rank(rows: &Rows, tolerance: f64) -> usize {
+pub(crate) fn rank(rows: &DenseRows, tolerance: f64) -> usize {
     let mut rows = rows.clone();
     let n_columns = rows.first().map_or(0, Vec::len);
     let largest = rows
@@ -48,7 +48,7 @@ pub(crate) fn rank(rows: &Rows, tolerance: f64) -> usize {
 }
 
 /// Solves the normal equations `(JᵀJ + damping) x = Jᵀ r` by elimination; `None` where they are singular.
-pub(crate) fn least_squares(jacobian: &Rows, residual: &[f64], damping: f64) -> Option<Vec<f64>> {
+pub(crate) fn least_squares(jacobian: &DenseRows, residual: &[f64], damping: f64) -> Option<Vec<f64>> {
     let n = jacobian.first()?.len();
     let mut matrix = vec![vec![0.0; n + 1]; n];
     for (row, r) in jacobian.iter().zip(residual) {

@@ -7,9 +7,9 @@ use num_bigint::BigInt;
 use num_rational::BigRational;
 use num_traits::{One, Pow, Zero};
 
-use crate::diagnostic::{Diagnostic, Log, Span};
+use crate::diagnostic::{Diagnostic, DiagnosticLog, SourceSpan};
 use crate::document::quote;
-use crate::formula::{Ast, AstKind, FUNCTIONS, LONGEST_FORMULA};
+use crate::formula::{FormulaAst, FormulaAstKind, FUNCTIONS, LONGEST_FORMULA};
 use crate::suggest;
 
 /// Deepest nesting of parentheses, functions and powers.
@@ -22,7 +22,7 @@ const LARGEST_EXPONENT: i32 = 16;
 const LARGEST_DEGREE: i32 = 64;
 
 /// Parses `text`, which stands in the file at `outer`, its characters from byte `inner` on if they can be told apart.
-pub(crate) fn parse(text: &str, outer: Span, inner: Option<usize>, log: &mut Log) -> Option<Ast> {
+pub(crate) fn parse(text: &str, outer: SourceSpan, inner: Option<usize>, log: &mut DiagnosticLog) -> Option<FormulaAst> {
     if text.len() > LONGEST_FORMULA {
         log.push(
             Diagnostic::error(outer, "this expression is too long")
@@ -31,14 +31,14 @@ pub(crate) fn parse(text: &str, outer: Span, inner: Option<usize>, log: &mut Log
         );
         return None;
     }
-    let mut parser = Parser {
+    let mut parser = FormulaParser {
         text,
         at: 0,
         depth: 0,
         outer,
         inner,
     };
-    let parsed = parser.whole();
+    let parsed = parser.parse_complete();
     match parsed {
         Ok(ast) => Some(ast),
         Err(diagnostic) => {
@@ -48,18 +48,18 @@ pub(crate) fn parse(text: &str, outer: Span, inner: Option<usize>, log: &mut Log
     }
 }
 
-struct Parser<'a> {
+struct FormulaParser<'a> {
     text: &'a str,
     at: usize,
     depth: usize,
-    outer: Span,
+    outer: SourceSpan,
     inner: Option<usize>,
 }
 
-type Parsed<T> = Result<T, Box<Diagnostic>>;
+type ParseResult<T> = Result<T, Box<Diagnostic>>;
 
-impl Parser<'_> {
-    fn whole(&mut self) -> Parsed<Ast> {
+impl FormulaParser<'_> {
+    fn parse_complete(&mut self) -> ParseResult<FormulaAst> {
         self.skip_blanks();
         if self.at == self.text.len() {
             return Err(Box::new(
@@ -71,13 +71,13 @@ impl Parser<'_> {
         let (ast, _) = self.sum()?;
         self.skip_blanks();
         if let Some(found) = self.peek() {
-            return Err(self.unexpected(found));
+            return Err(self.unexpected_character(found));
         }
         Ok(ast)
     }
 
-    fn sum(&mut self) -> Parsed<(Ast, i32)> {
-        self.deeper()?;
+    fn sum(&mut self) -> ParseResult<(FormulaAst, i32)> {
+        self.enter_level()?;
         let start = self.at;
         let (first, mut degree) = self.product()?;
         let mut terms = vec![first];
@@ -98,17 +98,17 @@ impl Parser<'_> {
             });
         }
         self.depth -= 1;
-        let ast = match <[Ast; 1]>::try_from(terms) {
+        let ast = match <[FormulaAst; 1]>::try_from(terms) {
             Ok([only]) => only,
-            Err(terms) => Ast {
+            Err(terms) => FormulaAst {
                 span: self.span(start, self.at),
-                kind: AstKind::Sum(terms),
+                kind: FormulaAstKind::Sum(terms),
             },
         };
         Ok((ast, degree))
     }
 
-    fn product(&mut self) -> Parsed<(Ast, i32)> {
+    fn product(&mut self) -> ParseResult<(FormulaAst, i32)> {
         self.skip_blanks();
         let start = self.at;
         let mut minus = false;
@@ -116,7 +116,7 @@ impl Parser<'_> {
         while let Some(sign @ ('+' | '-')) = self.peek() {
             signs += 1;
             if signs > 2 {
-                return Err(self.unexpected(sign));
+                return Err(self.unexpected_character(sign));
             }
             minus ^= sign == '-';
             self.at += 1;
@@ -159,7 +159,7 @@ impl Parser<'_> {
         Ok((ast, degree))
     }
 
-    fn power(&mut self) -> Parsed<(Ast, i32)> {
+    fn power(&mut self) -> ParseResult<(FormulaAst, i32)> {
         self.skip_blanks();
         let start = self.at;
         let (base, degree) = self.atom()?;
@@ -217,7 +217,7 @@ impl Parser<'_> {
                 .label(format!("exponents multiply to at most {LARGEST_DEGREE}")),
             ));
         }
-        if exponent < 0 && matches!(&base.kind, AstKind::Rational(value) if value.is_zero()) {
+        if exponent < 0 && matches!(&base.kind, FormulaAstKind::Rational(value) if value.is_zero()) {
             return Err(Box::new(Diagnostic::error(
                 self.span(start, self.at),
                 "this divides by zero",
@@ -225,22 +225,22 @@ impl Parser<'_> {
         }
         let span = self.span(start, self.at);
         Ok((
-            Ast {
+            FormulaAst {
                 span,
-                kind: AstKind::Power(Box::new(base), exponent),
+                kind: FormulaAstKind::Power(Box::new(base), exponent),
             },
             degree,
         ))
     }
 
-    fn atom(&mut self) -> Parsed<(Ast, i32)> {
+    fn atom(&mut self) -> ParseResult<(FormulaAst, i32)> {
         self.skip_blanks();
         let start = self.at;
         match self.peek() {
             Some('(') => {
                 self.at += 1;
                 let (mut inner, degree) = self.sum()?;
-                self.close(start)?;
+                self.close_parenthesis(start)?;
                 inner.span = self.span(start, self.at);
                 Ok((inner, degree))
             }
@@ -248,15 +248,15 @@ impl Parser<'_> {
                 let value = self.number()?;
                 let span = self.span(start, self.at);
                 Ok((
-                    Ast {
+                    FormulaAst {
                         span,
-                        kind: AstKind::Rational(value),
+                        kind: FormulaAstKind::Rational(value),
                     },
                     1,
                 ))
             }
             Some(found) if found.is_ascii_alphabetic() || found == '_' => self.name_or_function(),
-            Some(found) => Err(self.unexpected(found)),
+            Some(found) => Err(self.unexpected_character(found)),
             None => {
                 let span = self.span(self.at.saturating_sub(1), self.at);
                 Err(Box::new(
@@ -267,7 +267,7 @@ impl Parser<'_> {
         }
     }
 
-    fn name_or_function(&mut self) -> Parsed<(Ast, i32)> {
+    fn name_or_function(&mut self) -> ParseResult<(FormulaAst, i32)> {
         let start = self.at;
         while self
             .peek()
@@ -286,11 +286,11 @@ impl Parser<'_> {
                 ));
             }
             let kind = if name == "pi" {
-                AstKind::Pi
+                FormulaAstKind::Pi
             } else {
-                AstKind::Name(name)
+                FormulaAstKind::Name(name)
             };
-            return Ok((Ast { span, kind }, 1));
+            return Ok((FormulaAst { span, kind }, 1));
         }
         let known = FUNCTIONS.iter().map(|(function, _)| *function);
         let Some(&(_, function)) = FUNCTIONS.iter().find(|(function, _)| *function == name) else {
@@ -306,19 +306,19 @@ impl Parser<'_> {
         let open = self.at;
         self.at += 1;
         let (inner, degree) = self.sum()?;
-        self.close(open)?;
+        self.close_parenthesis(open)?;
         let span = self.span(start, self.at);
         Ok((
-            Ast {
+            FormulaAst {
                 span,
-                kind: AstKind::Apply(function, Box::new(inner)),
+                kind: FormulaAstKind::Apply(function, Box::new(inner)),
             },
             degree,
         ))
     }
 
     /// A decimal as an exact rational, such as `0.316` or `2.5e-3`.
-    fn number(&mut self) -> Parsed<BigRational> {
+    fn number(&mut self) -> ParseResult<BigRational> {
         let start = self.at;
         let mut digits = String::new();
         let mut n_decimals = 0_i32;
@@ -382,14 +382,14 @@ impl Parser<'_> {
         })
     }
 
-    fn close(&mut self, open: usize) -> Parsed<()> {
+    fn close_parenthesis(&mut self, open: usize) -> ParseResult<()> {
         self.skip_blanks();
         if self.peek() == Some(')') {
             self.at += 1;
             return Ok(());
         }
         if let Some(found) = self.peek() {
-            return Err(self.unexpected(found));
+            return Err(self.unexpected_character(found));
         }
         Err(Box::new(
             Diagnostic::error(
@@ -400,7 +400,7 @@ impl Parser<'_> {
         ))
     }
 
-    fn deeper(&mut self) -> Parsed<()> {
+    fn enter_level(&mut self) -> ParseResult<()> {
         self.depth += 1;
         if self.depth > DEEPEST {
             return Err(Box::new(
@@ -415,7 +415,7 @@ impl Parser<'_> {
         Ok(())
     }
 
-    fn unexpected(&self, found: char) -> Box<Diagnostic> {
+    fn unexpected_character(&self, found: char) -> Box<Diagnostic> {
         let span = self.span(self.at, self.at + found.len_utf8());
         let shown = found.escape_debug();
         let diagnostic = Diagnostic::error(span, format!("unexpected `{shown}` in an expression"));
@@ -470,9 +470,9 @@ impl Parser<'_> {
         }
     }
 
-    fn span(&self, start: usize, end: usize) -> Span {
+    fn span(&self, start: usize, end: usize) -> SourceSpan {
         match self.inner {
-            Some(inner) => Span {
+            Some(inner) => SourceSpan {
                 file: self.outer.file,
                 start: (inner + start).min(self.outer.end),
                 end: (inner + end).min(self.outer.end),
@@ -482,46 +482,46 @@ impl Parser<'_> {
     }
 }
 
-fn negative(ast: Ast, span: Span) -> Ast {
+fn negative(ast: FormulaAst, span: SourceSpan) -> FormulaAst {
     let kind = match ast.kind {
-        AstKind::Rational(value) => AstKind::Rational(-value),
-        kind => AstKind::Negative(Box::new(Ast {
+        FormulaAstKind::Rational(value) => FormulaAstKind::Rational(-value),
+        kind => FormulaAstKind::Negative(Box::new(FormulaAst {
             span: ast.span,
             kind,
         })),
     };
-    Ast { span, kind }
+    FormulaAst { span, kind }
 }
 
 /// Makes `a*c/(b*d)` of the chain `a/b*c/d`, its numbers collected into one, so that no chain is deep.
-fn fraction(above: Vec<Ast>, below: Vec<Ast>, span: Span) -> Parsed<Ast> {
+fn fraction(above: Vec<FormulaAst>, below: Vec<FormulaAst>, span: SourceSpan) -> ParseResult<FormulaAst> {
     let mut number = BigRational::one();
     let mut numerator = Vec::new();
     let mut denominator = Vec::new();
     for factor in above {
         match factor.kind {
-            AstKind::Rational(value) => number *= value,
+            FormulaAstKind::Rational(value) => number *= value,
             _ => numerator.push(factor),
         }
     }
     for factor in below {
         match factor.kind {
-            AstKind::Rational(value) if value.is_zero() => {
+            FormulaAstKind::Rational(value) if value.is_zero() => {
                 return Err(Box::new(
                     Diagnostic::error(factor.span, "this divides by zero")
                         .label("must not be zero"),
                 ));
             }
-            AstKind::Rational(value) => number /= value,
+            FormulaAstKind::Rational(value) => number /= value,
             _ => denominator.push(factor),
         }
     }
     if !number.is_one() || numerator.is_empty() {
         numerator.insert(
             0,
-            Ast {
+            FormulaAst {
                 span,
-                kind: AstKind::Rational(number),
+                kind: FormulaAstKind::Rational(number),
             },
         );
     }
@@ -530,18 +530,18 @@ fn fraction(above: Vec<Ast>, below: Vec<Ast>, span: Span) -> Parsed<Ast> {
         return Ok(numerator);
     }
     let denominator = product(denominator, span);
-    Ok(Ast {
+    Ok(FormulaAst {
         span,
-        kind: AstKind::Quotient(Box::new(numerator), Box::new(denominator)),
+        kind: FormulaAstKind::Quotient(Box::new(numerator), Box::new(denominator)),
     })
 }
 
-fn product(mut factors: Vec<Ast>, span: Span) -> Ast {
+fn product(mut factors: Vec<FormulaAst>, span: SourceSpan) -> FormulaAst {
     if factors.len() == 1 {
         return factors.swap_remove(0);
     }
-    Ast {
+    FormulaAst {
         span,
-        kind: AstKind::Product(factors),
+        kind: FormulaAstKind::Product(factors),
     }
 }

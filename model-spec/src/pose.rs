@@ -4,12 +4,12 @@
 //! A mechanism goes in, its passive coordinates come out refined until the loops close, by Gauss-Newton steps
 //! damped after Levenberg and Marquardt.
 
-use crate::build::Places;
-use crate::diagnostic::{Diagnostic, Log, Span};
-use crate::exact::Symbol;
+use crate::build::MechanismSpans;
+use crate::diagnostic::{Diagnostic, DiagnosticLog, SourceSpan};
+use crate::exact::ModelSymbol;
 use crate::kinematics::{Vec3, frame_poses, jacobian, position};
-use crate::mechanism::{Coupling, DriveKind, Mechanism, Step};
-use crate::numeric::{Rows, least_squares, rank};
+use crate::mechanism::{CoordinateCoupling, DriveKind, Mechanism, FrameStep};
+use crate::numeric::{DenseRows, least_squares, rank};
 
 /// Passive angles may move this far, in rad, before it counts as another assembly.
 const FARTHEST_TURN: f64 = 0.5;
@@ -19,14 +19,14 @@ const CLOSED: f64 = 1e-9;
 const SINGULAR: f64 = 1e-8;
 /// What is left of an equation beside others, relative to the largest, where it says nothing of its own: the digits of a file
 /// may leave that much of one which follows from them.
-const FOLLOWS: f64 = 1e-5;
+const DEPENDENCE_TOLERANCE: f64 = 1e-5;
 
 /// Checks the nominal pose and refines the passive coordinates there.
-pub(crate) fn check(mechanism: &mut Mechanism, places: &Places, log: &mut Log) {
+pub(crate) fn check_pose(mechanism: &mut Mechanism, places: &MechanismSpans, log: &mut DiagnosticLog) {
     if !check_finite(mechanism, places, log) {
         return;
     }
-    if check_tied(mechanism, places, log)
+    if check_constraint_count(mechanism, places, log)
         && close_loops(mechanism, places, log)
         && check_passive(mechanism, places, log)
     {
@@ -35,15 +35,15 @@ pub(crate) fn check(mechanism: &mut Mechanism, places: &Places, log: &mut Log) {
 }
 
 /// Gaps of all loops, three for each, then of the couplings, the derivative of the gaps, and the size of the mechanism.
-pub(crate) struct Gaps {
+pub(crate) struct LoopGaps {
     pub(crate) values: Vec<f64>,
-    pub(crate) rows: Rows,
+    pub(crate) rows: DenseRows,
     pub(crate) size: f64,
 }
 
-pub(crate) fn gaps(mechanism: &Mechanism) -> Gaps {
+pub(crate) fn loop_gaps(mechanism: &Mechanism) -> LoopGaps {
     let poses = frame_poses(mechanism);
-    let mut found = Gaps {
+    let mut found = LoopGaps {
         values: Vec::new(),
         rows: Vec::new(),
         size: 0.0,
@@ -66,7 +66,7 @@ pub(crate) fn gaps(mechanism: &Mechanism) -> Gaps {
             .iter()
             .fold(found.size, |size, x| size.max(x.abs()));
     }
-    let value = |symbol: Symbol| mechanism.symbol_nominal(symbol);
+    let value = |symbol: ModelSymbol| mechanism.symbol_nominal(symbol);
     for (coupling, row) in mechanism.couplings.iter().zip(coupling_rows(mechanism)) {
         let own = mechanism.coordinates[coupling.coordinate.0].nominal;
         found.values.push(own - coupling.value(&value));
@@ -76,9 +76,9 @@ pub(crate) fn gaps(mechanism: &Mechanism) -> Gaps {
 }
 
 /// The derivative of what follows, less what it follows, by all coordinates: one row for each coupling.
-fn coupling_rows(mechanism: &Mechanism) -> Rows {
-    let value = |symbol: Symbol| mechanism.symbol_nominal(symbol);
-    let row = |coupling: &Coupling| {
+fn coupling_rows(mechanism: &Mechanism) -> DenseRows {
+    let value = |symbol: ModelSymbol| mechanism.symbol_nominal(symbol);
+    let row = |coupling: &CoordinateCoupling| {
         let mut row = vec![0.0; mechanism.coordinates.len()];
         row[coupling.coordinate.0] = 1.0;
         for (i, factor) in &coupling.terms {
@@ -94,7 +94,7 @@ fn norm(values: &[f64]) -> f64 {
 }
 
 /// Columns of the passive coordinates, or of the others.
-fn columns(mechanism: &Mechanism, rows: &Rows, passive: bool) -> Rows {
+fn columns(mechanism: &Mechanism, rows: &DenseRows, passive: bool) -> DenseRows {
     rows.iter()
         .map(|row| {
             row.iter()
@@ -107,10 +107,10 @@ fn columns(mechanism: &Mechanism, rows: &Rows, passive: bool) -> Rows {
 }
 
 /// Reports lengths and positions that have no finite value, such as the root of a negative number.
-fn check_finite(mechanism: &Mechanism, places: &Places, log: &mut Log) -> bool {
+fn check_finite(mechanism: &Mechanism, places: &MechanismSpans, log: &mut DiagnosticLog) -> bool {
     let before = log.n_errors();
-    let value = |symbol: Symbol| mechanism.symbol_nominal(symbol);
-    let mut report = |span: Option<Span>, what: &str| {
+    let value = |symbol: ModelSymbol| mechanism.symbol_nominal(symbol);
+    let mut report = |span: Option<SourceSpan>, what: &str| {
         if let Some(span) = span {
             log.push(
                 Diagnostic::error(span, format!("{what} has no finite value"))
@@ -121,10 +121,10 @@ fn check_finite(mechanism: &Mechanism, places: &Places, log: &mut Log) -> bool {
     };
     for (i, frame) in mechanism.frames.iter().enumerate() {
         let finite = frame.steps.iter().all(|step| match step {
-            Step::Rotate(_, angle) => angle.evaluate(&value).is_finite(),
-            Step::Translate(_, length) => length.evaluate(&value).abs() < 1e100,
+            FrameStep::Rotate(_, angle) => angle.evaluate(&value).is_finite(),
+            FrameStep::Translate(_, length) => length.evaluate(&value).abs() < 1e100,
             // Checked where its coordinates are read.
-            Step::Free(_) => true,
+            FrameStep::Free(_) => true,
         });
         if !finite {
             report(
@@ -153,7 +153,7 @@ fn check_finite(mechanism: &Mechanism, places: &Places, log: &mut Log) -> bool {
 }
 
 /// Moves the passive coordinates until the loops close; false if they do not, or only far away.
-fn close_loops(mechanism: &mut Mechanism, places: &Places, log: &mut Log) -> bool {
+fn close_loops(mechanism: &mut Mechanism, places: &MechanismSpans, log: &mut DiagnosticLog) -> bool {
     if mechanism.loops.is_empty() {
         return true;
     }
@@ -164,7 +164,7 @@ fn close_loops(mechanism: &mut Mechanism, places: &Places, log: &mut Log) -> boo
         .iter()
         .map(|&i| mechanism.coordinates[i].nominal)
         .collect();
-    let Closing { gaps: now, size } = move_passive(mechanism, &passive);
+    let ClosureResidual { gaps: now, size } = move_passive(mechanism, &passive);
     let mut closes = true;
     for (i, closed) in mechanism.loops.iter().enumerate() {
         let gap = norm(&now.values[3 * i..3 * i + 3]);
@@ -212,13 +212,13 @@ fn close_loops(mechanism: &mut Mechanism, places: &Places, log: &mut Log) -> boo
 }
 
 /// What is left of the gaps when they are as small as the passive coordinates can make them.
-struct Closing {
-    gaps: Gaps,
+struct ClosureResidual {
+    gaps: LoopGaps,
     /// The size of the mechanism where it started.
     size: f64,
 }
 
-impl Closing {
+impl ClosureResidual {
     /// Whether all loops close.
     fn is_closed(&self) -> bool {
         let mut loops = self.gaps.values.chunks(3);
@@ -227,8 +227,8 @@ impl Closing {
 }
 
 /// Moves the passive coordinates until the loops close as well as they can.
-fn move_passive(mechanism: &mut Mechanism, passive: &[usize]) -> Closing {
-    let at_start = gaps(mechanism);
+fn move_passive(mechanism: &mut Mechanism, passive: &[usize]) -> ClosureResidual {
+    let at_start = loop_gaps(mechanism);
     let size = at_start.size.max(1e-6);
     let mut now = at_start;
     let mut damping = 1e-9;
@@ -248,7 +248,7 @@ fn move_passive(mechanism: &mut Mechanism, passive: &[usize]) -> Closing {
         for (&i, change) in passive.iter().zip(&step) {
             mechanism.coordinates[i].nominal -= change;
         }
-        let next = gaps(mechanism);
+        let next = loop_gaps(mechanism);
         if norm(&next.values) < norm(&now.values) {
             now = next;
             damping *= 0.1;
@@ -262,7 +262,7 @@ fn move_passive(mechanism: &mut Mechanism, passive: &[usize]) -> Closing {
             }
         }
     }
-    Closing { gaps: now, size }
+    ClosureResidual { gaps: now, size }
 }
 
 fn check_same_assembly(
@@ -270,8 +270,8 @@ fn check_same_assembly(
     passive: &[usize],
     given: &[f64],
     size: f64,
-    places: &Places,
-    log: &mut Log,
+    places: &MechanismSpans,
+    log: &mut DiagnosticLog,
 ) -> bool {
     let mut fine = true;
     for (&i, given) in passive.iter().zip(given) {
@@ -312,9 +312,9 @@ fn check_same_assembly(
 
 /// The derivative of the gaps as if both points of each loop stood in one place, so that loops which are still a little
 /// open do not seem to depend on coordinates that move them as a whole.
-fn tied_rows(mechanism: &Mechanism) -> Rows {
+fn constraint_rows(mechanism: &Mechanism) -> DenseRows {
     let poses = frame_poses(mechanism);
-    let mut rows = Rows::new();
+    let mut rows = DenseRows::new();
     for closed in &mechanism.loops {
         let at = position(mechanism, &poses, closed.joins[0]);
         let [left, right] = closed
@@ -329,18 +329,18 @@ fn tied_rows(mechanism: &Mechanism) -> Rows {
 }
 
 /// The loops must not tie more coordinates than are passive.
-fn check_tied(mechanism: &Mechanism, places: &Places, log: &mut Log) -> bool {
+fn check_constraint_count(mechanism: &Mechanism, places: &MechanismSpans, log: &mut DiagnosticLog) -> bool {
     let passive: Vec<usize> = (0..mechanism.coordinates.len())
         .filter(|&i| mechanism.coordinates[i].passive)
         .collect();
     let n_passive = passive.len();
-    let mut n_equations = rank(&tied_rows(mechanism), FOLLOWS);
+    let mut n_equations = rank(&constraint_rows(mechanism), DEPENDENCE_TOLERANCE);
     if n_equations > n_passive {
         // Equations that follow from others, as in linkages that move against the count of their freedoms, do so only
         // where the loops close, and not where nominal values are rounded.
         let mut closed = mechanism.clone();
         if move_passive(&mut closed, &passive).is_closed() {
-            n_equations = rank(&tied_rows(&closed), FOLLOWS);
+            n_equations = rank(&constraint_rows(&closed), DEPENDENCE_TOLERANCE);
         }
     }
     let n_coordinates = mechanism.coordinates.len();
@@ -416,11 +416,11 @@ fn plural(n: usize, one: &str) -> String {
 }
 
 /// The loops must settle the passive coordinates.
-fn check_passive(mechanism: &Mechanism, places: &Places, log: &mut Log) -> bool {
+fn check_passive(mechanism: &Mechanism, places: &MechanismSpans, log: &mut DiagnosticLog) -> bool {
     let passive: Vec<usize> = (0..mechanism.coordinates.len())
         .filter(|&i| mechanism.coordinates[i].passive)
         .collect();
-    let rows = gaps(mechanism).rows;
+    let rows = loop_gaps(mechanism).rows;
     let settled = rank(&columns(mechanism, &rows, true), SINGULAR);
     let equations = rank(&rows, SINGULAR);
     if settled == passive.len() {
@@ -460,10 +460,10 @@ fn check_passive(mechanism: &Mechanism, places: &Places, log: &mut Log) -> bool 
 }
 
 /// The drives must move with the degrees of freedom, one to one, at the nominal pose.
-fn check_drives(mechanism: &Mechanism, places: &Places, log: &mut Log) {
-    let found = gaps(mechanism);
+fn check_drives(mechanism: &Mechanism, places: &MechanismSpans, log: &mut DiagnosticLog) {
+    let found = loop_gaps(mechanism);
     let poses = frame_poses(mechanism);
-    let mut rates: Rows = Vec::new();
+    let mut rates: DenseRows = Vec::new();
     for (i, drive) in mechanism.drives.iter().enumerate() {
         let mut row = vec![0.0; mechanism.coordinates.len()];
         match drive.kind {

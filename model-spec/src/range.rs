@@ -6,27 +6,27 @@ use std::borrow::Cow;
 #[cfg(any(test, feature = "schema"))]
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 
-use crate::diagnostic::{Diagnostic, Log, Span};
-use crate::document::{Node, Value};
-use crate::record::{Read, wrong_type};
-use crate::values::Number;
+use crate::diagnostic::{Diagnostic, DiagnosticLog, SourceSpan};
+use crate::document::{TomlNode, TomlValue};
+use crate::record::{SchemaValue, wrong_type};
+use crate::values::SpannedNumber;
 
 /// A range with its place.
 #[derive(Clone, Debug)]
-pub(crate) struct Range {
+pub(crate) struct ValueRange {
     pub(crate) ends: [f64; 2],
-    pub(crate) span: Span,
+    pub(crate) span: SourceSpan,
 }
 
-impl Read for Range {
+impl SchemaValue for ValueRange {
     const EXPECTED: &'static str = "two numbers, the lower one first, or one for both directions";
     const EXAMPLE: &'static str = "[-1.5, 2]";
 
-    fn read(node: &Node, log: &mut Log) -> Option<Self> {
+    fn read(node: &TomlNode, log: &mut DiagnosticLog) -> Option<Self> {
         let span = node.span;
         let ends = match &node.value {
-            Value::Number { .. } => {
-                let size = Number::read(node, log)?.value;
+            TomlValue::Number { .. } => {
+                let size = SpannedNumber::read(node, log)?.value;
                 if size <= 0.0 {
                     log.push(
                         Diagnostic::error(span, "this range is empty")
@@ -37,9 +37,9 @@ impl Read for Range {
                 }
                 [-size, size]
             }
-            Value::Array(entries) if entries.len() == 2 => {
-                let low = Number::read(&entries[0], log);
-                let high = Number::read(&entries[1], log);
+            TomlValue::Array(entries) if entries.len() == 2 => {
+                let low = SpannedNumber::read(&entries[0], log);
+                let high = SpannedNumber::read(&entries[1], log);
                 [low?.value, high?.value]
             }
             _ => return wrong_type::<Self>(node, log),
@@ -57,7 +57,7 @@ impl Read for Range {
 }
 
 #[cfg(any(test, feature = "schema"))]
-impl JsonSchema for Range {
+impl JsonSchema for ValueRange {
     fn schema_name() -> Cow<'static, str> {
         "Range".into()
     }

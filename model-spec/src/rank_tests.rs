@@ -6,11 +6,11 @@
 
 use std::path::Path;
 
-use crate::exact::{Exact, ParameterIdx, PlaceQuantity, Symbol};
+use crate::exact::{ExactExpression, ParameterIdx, PlaceQuantity, ModelSymbol};
 use crate::kinematics::{FramePose, Vec3, frame_poses, position};
-use crate::mechanism::{Inertial, Mechanism, Place};
-use crate::numeric::{Rows, least_squares, rank};
-use crate::pose::gaps;
+use crate::mechanism::{PartInertia, Mechanism, EffectPlace};
+use crate::numeric::{DenseRows, least_squares, rank};
+use crate::pose::loop_gaps;
 
 /// Numbers between -1 and 1 that are the same everywhere (Marsaglia 2003).
 struct Random(u64);
@@ -56,10 +56,10 @@ fn velocity(
     let (mut angular, mut linear) = ([0.0; 3], [0.0; 3]);
     let mut up = frame;
     while up != 0 {
-        for moved in &poses[up].own {
+        for moved in &poses[up].motions {
             let rate = moved.factor * rates[moved.coordinate.0];
             let axis = moved.axis.map(|x| x * rate);
-            if moved.turns {
+            if moved.is_rotation {
                 angular = add(angular, axis);
                 let arm = std::array::from_fn(|k| at[k] - moved.origin[k]);
                 linear = add(linear, cross(axis, arm));
@@ -104,7 +104,7 @@ fn try_draw(mechanism: &mut Mechanism, nominal: &[f64], random: &mut Random) -> 
             mechanism.coordinates[i].nominal = nominal[i] + way * (targets[i] - nominal[i]);
         }
         for _ in 0..6 {
-            let found = gaps(mechanism);
+            let found = loop_gaps(mechanism);
             let rows = of_passive(&found.rows, &passive);
             if let Some(change) = least_squares(&rows, &found.values, 0.0) {
                 for (&i, change) in passive.iter().zip(change) {
@@ -112,11 +112,11 @@ fn try_draw(mechanism: &mut Mechanism, nominal: &[f64], random: &mut Random) -> 
                 }
             }
         }
-        if gaps(mechanism).values.iter().any(|gap| gap.abs() > 1e-12) {
+        if loop_gaps(mechanism).values.iter().any(|gap| gap.abs() > 1e-12) {
             return None;
         }
     }
-    let found = gaps(mechanism);
+    let found = loop_gaps(mechanism);
     let driven: Vec<f64> = found
         .rows
         .iter()
@@ -133,7 +133,7 @@ fn try_draw(mechanism: &mut Mechanism, nominal: &[f64], random: &mut Random) -> 
     Some(rates)
 }
 
-fn of_passive(rows: &Rows, passive: &[usize]) -> Rows {
+fn of_passive(rows: &DenseRows, passive: &[usize]) -> DenseRows {
     rows.iter()
         .map(|row| passive.iter().map(|&j| row[j]).collect())
         .collect()
@@ -147,11 +147,11 @@ fn energies(mechanism: &Mechanism, rates: &[f64]) -> Vec<f64> {
     });
     let mut row = vec![0.0; mechanism.parameters.len()];
     for (i, energy) in row.iter_mut().enumerate() {
-        let unit = |symbol: Symbol| match symbol {
-            Symbol::Parameter(idx) => f64::from(u8::from(idx == ParameterIdx(i))),
+        let unit = |symbol: ModelSymbol| match symbol {
+            ModelSymbol::Parameter(idx) => f64::from(u8::from(idx == ParameterIdx(i))),
             other => mechanism.symbol_nominal(other),
         };
-        let value = |exact: &Exact| exact.evaluate(&unit);
+        let value = |exact: &ExactExpression| exact.evaluate(&unit);
         let mut body = |frame: usize, mass: f64, first: Vec3, inertia: [f64; 6]| {
             let (angular, linear) = velocity(mechanism, &poses, frame, rates);
             let (w, v) = (
@@ -169,7 +169,7 @@ fn energies(mechanism: &Mechanism, rates: &[f64]) -> Vec<f64> {
                 - dot(into_frame(&poses[frame], gravity), first);
         };
         for part in &mechanism.parts {
-            let Inertial::Linear {
+            let PartInertia::Linear {
                 mass,
                 first_moment,
                 inertia,
@@ -206,15 +206,15 @@ fn energies(mechanism: &Mechanism, rates: &[f64]) -> Vec<f64> {
         }
     }
     for effect in &mechanism.effects {
-        let acceleration = Exact::Symbol(Symbol::Place(PlaceQuantity::Acceleration));
+        let acceleration = ExactExpression::Symbol(ModelSymbol::Place(PlaceQuantity::Acceleration));
         for (term, place) in effect.terms.iter().zip(&effect.places) {
             assert_eq!(term.expression, acceleration);
             let coordinate = match *place {
-                Place::Drive(idx) => match mechanism.drives[idx.0].kind {
+                EffectPlace::Drive(idx) => match mechanism.drives[idx.0].kind {
                     crate::DriveKind::Joint(coordinate) => coordinate,
                     crate::DriveKind::Linear { .. } => panic!("these models drive joints"),
                 },
-                Place::Coordinate(coordinate) => coordinate,
+                EffectPlace::Coordinate(coordinate) => coordinate,
                 _ => panic!("only drives and coordinates have an inertia here"),
             };
             row[term.parameter.0] += 0.5 * rates[coordinate.0].powi(2);
@@ -234,7 +234,7 @@ fn n_base_parameters(path: &str) -> usize {
         .collect();
     let mut random = Random(0x0123_4567_89ab_cdef);
     let n_samples = 2 * mechanism.parameters.len() + 10;
-    let mut rows: Rows = Vec::new();
+    let mut rows: DenseRows = Vec::new();
     for _ in 0..n_samples {
         let rates = draw(&mut mechanism, &nominal, &mut random);
         let mut row = energies(&mechanism, &rates);

@@ -2,31 +2,31 @@
 
 use std::path::Path;
 
-use modelmill_boundary::files::{FileError, FileFault, Files};
+use modelmill_boundary::files::{FileError, FileFault, FileSource};
 use toml::de::DeTable;
 
-use crate::diagnostic::{Diagnostic, Severity, SourceFile, Sources, Span};
+use crate::diagnostic::{Diagnostic, DiagnosticSeverity, SourceFile, SourceFiles, SourceSpan};
 use crate::document::LARGEST_FILE;
-use crate::load::Failure;
+use crate::load::LoadFailure;
 
 /// Reads the text of a file that a user names; `advice` is what to do when there is none.
 ///
 /// Fails when it cannot be read, is too large to be meant, or is no text.
-pub fn read_text(files: &dyn Files, path: &Path, advice: &str) -> Result<String, Failure> {
+pub fn read_text(files: &dyn FileSource, path: &Path, advice: &str) -> Result<String, LoadFailure> {
     let bytes = files
         .read(path, LARGEST_FILE as u64)
-        .map_err(|error| Failure {
-            diagnostics: vec![unreadable(&error, advice)],
-            sources: Sources::default(),
+        .map_err(|error| LoadFailure {
+            diagnostics: vec![unreadable_file(&error, advice)],
+            sources: SourceFiles::default(),
         })?;
-    String::from_utf8(bytes).map_err(|error| no_text(path, error.as_bytes()))
+    String::from_utf8(bytes).map_err(|error| invalid_utf8(path, error.as_bytes()))
 }
 
 /// Reads the text of a file that another one names, which must hold one of these keys outside of all tables.
 ///
 /// Fails with what the file is not, in one line and without a word of its text: nobody who hands on a model file shall
 /// learn in this way what else is on the reader's disk.
-pub fn read_named(files: &dyn Files, path: &Path, keys: &[&str]) -> Result<String, FileError> {
+pub fn read_referenced(files: &dyn FileSource, path: &Path, keys: &[&str]) -> Result<String, FileError> {
     let text = files.read_text(path, LARGEST_FILE as u64)?;
     let (table, _) = DeTable::parse_recoverable(&text);
     if keys.iter().any(|key| table.get_ref().contains_key(*key)) {
@@ -38,13 +38,13 @@ pub fn read_named(files: &dyn Files, path: &Path, keys: &[&str]) -> Result<Strin
     Err(FileError::new(path, fault))
 }
 
-fn unreadable(error: &FileError, advice: &str) -> Diagnostic {
+fn unreadable_file(error: &FileError, advice: &str) -> Diagnostic {
     let help = match &error.fault {
         FileFault::Missing | FileFault::Folder => advice,
         other => other.remedy(),
     };
     Diagnostic {
-        severity: Severity::Error,
+        severity: DiagnosticSeverity::Error,
         message: format!("cannot read `{}`: {}", error.path.display(), error.fault),
         span: None,
         label: String::new(),
@@ -54,25 +54,25 @@ fn unreadable(error: &FileError, advice: &str) -> Diagnostic {
 }
 
 /// What is wrong with a file whose bytes are no text, with the place of the first of them.
-fn no_text(path: &Path, bytes: &[u8]) -> Failure {
+fn invalid_utf8(path: &Path, bytes: &[u8]) -> LoadFailure {
     let start = match std::str::from_utf8(bytes) {
         Ok(text) => text.len(),
         Err(error) => error.valid_up_to(),
     };
     let text = String::from_utf8_lossy(bytes).into_owned();
     let end = (start + char::REPLACEMENT_CHARACTER.len_utf8()).min(text.len());
-    let span = Span {
+    let span = SourceSpan {
         file: 0,
         start,
         end,
     };
-    Failure {
+    LoadFailure {
         diagnostics: vec![
             Diagnostic::error(span, "this file is no text in UTF-8")
                 .label("the first byte that is not")
                 .help("save it as UTF-8; `modelmill` reads model files as text (TOML)"),
         ],
-        sources: Sources {
+        sources: SourceFiles {
             files: vec![SourceFile {
                 path: path.to_owned(),
                 text,

@@ -9,26 +9,26 @@ use std::borrow::Cow;
 #[cfg(any(test, feature = "schema"))]
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 
-use crate::diagnostic::{Diagnostic, Log, Span};
-use crate::document::{Key, Node, Table, Value, get, quote};
+use crate::diagnostic::{Diagnostic, DiagnosticLog, SourceSpan};
+use crate::document::{TomlKey, TomlNode, TomlTable, TomlValue, find_key, quote};
 use crate::suggest;
 use crate::values::check_name;
 
 /// Most entries of one list or table.
 const MOST_ENTRIES: usize = 1000;
 /// A type of the schema.
-pub(crate) trait Read: Sized {
+pub(crate) trait SchemaValue: Sized {
     /// What a place of this type holds, for messages: `a string`.
     const EXPECTED: &'static str;
     /// An example of it as TOML.
     const EXAMPLE: &'static str;
 
     /// Reads a value; a fault goes to the log and gives `None`.
-    fn read(node: &Node, log: &mut Log) -> Option<Self>;
+    fn read(node: &TomlNode, log: &mut DiagnosticLog) -> Option<Self>;
 }
 
 /// Reports a value of the wrong type.
-pub(crate) fn wrong_type<T: Read>(node: &Node, log: &mut Log) -> Option<T> {
+pub(crate) fn wrong_type<T: SchemaValue>(node: &TomlNode, log: &mut DiagnosticLog) -> Option<T> {
     log.push(
         Diagnostic::error(
             node.span,
@@ -143,15 +143,15 @@ macro_rules! first {
 pub(crate) use {first, need, record};
 
 /// Reads one field of a table; `required_of` lists all keys of the table if the field must be there.
-pub(crate) fn field<T: Read>(
-    table: &Table,
+pub(crate) fn read_field<T: SchemaValue>(
+    table: &TomlTable,
     key: &str,
     required_of: Option<&[&str]>,
     title: &str,
-    span: Span,
-    log: &mut Log,
+    span: SourceSpan,
+    log: &mut DiagnosticLog,
 ) -> Option<T> {
-    if let Some((_, node)) = get(table, key) {
+    if let Some((_, node)) = find_key(table, key) {
         return T::read(node, log);
     }
     let misspelt = |keys: &[&str]| {
@@ -174,7 +174,7 @@ pub(crate) fn field<T: Read>(
 }
 
 /// Reports keys that a table does not have.
-pub(crate) fn check_keys(table: &Table, known: &[&str], title: &str, log: &mut Log) {
+pub(crate) fn check_keys(table: &TomlTable, known: &[&str], title: &str, log: &mut DiagnosticLog) {
     for (key, _) in table {
         // Broken text leaves scraps that look like keys.
         if known.contains(&key.name.as_str()) || log.is_full() || log.syntax_broken {
@@ -190,7 +190,7 @@ pub(crate) fn check_keys(table: &Table, known: &[&str], title: &str, log: &mut L
 
 /// Adds a description to a schema, also to a reference.
 #[cfg(any(test, feature = "schema"))]
-pub(crate) fn described(mut schema: Schema, text: &str) -> serde_json::Value {
+pub(crate) fn with_description(mut schema: Schema, text: &str) -> serde_json::Value {
     if !text.trim().is_empty() {
         schema.insert("description".to_owned(), tidy(text).into());
     }
@@ -205,19 +205,19 @@ pub(crate) fn tidy(text: &str) -> String {
 
 /// A list; faulty entries are left out once they are reported.
 #[derive(Clone, Debug)]
-pub(crate) struct List<T> {
+pub(crate) struct EntryList<T> {
     pub(crate) entries: Vec<T>,
-    pub(crate) span: Span,
+    pub(crate) span: SourceSpan,
     /// True if any entry was faulty.
     pub(crate) faulty: bool,
 }
 
-impl<T: Read> Read for List<T> {
+impl<T: SchemaValue> SchemaValue for EntryList<T> {
     const EXPECTED: &'static str = "a list";
     const EXAMPLE: &'static str = "[ ... ]";
 
-    fn read(node: &Node, log: &mut Log) -> Option<Self> {
-        let Value::Array(array) = &node.value else {
+    fn read(node: &TomlNode, log: &mut DiagnosticLog) -> Option<Self> {
+        let TomlValue::Array(array) = &node.value else {
             log.push(
                 Diagnostic::error(
                     node.span,
@@ -243,7 +243,7 @@ impl<T: Read> Read for List<T> {
     }
 }
 
-fn too_many(n: usize, span: Span, log: &mut Log) -> bool {
+fn too_many(n: usize, span: SourceSpan, log: &mut DiagnosticLog) -> bool {
     if n > MOST_ENTRIES {
         log.push(
             Diagnostic::error(span, format!("there are {n} entries here"))
@@ -254,7 +254,7 @@ fn too_many(n: usize, span: Span, log: &mut Log) -> bool {
 }
 
 #[cfg(any(test, feature = "schema"))]
-impl<T: JsonSchema> JsonSchema for List<T> {
+impl<T: JsonSchema> JsonSchema for EntryList<T> {
     fn inline_schema() -> bool {
         true
     }
@@ -272,16 +272,16 @@ impl<T: JsonSchema> JsonSchema for List<T> {
 #[derive(Clone, Debug)]
 pub(crate) struct OneOrMany<T> {
     pub(crate) entries: Vec<T>,
-    pub(crate) span: Span,
+    pub(crate) span: SourceSpan,
 }
 
-impl<T: Read> Read for OneOrMany<T> {
+impl<T: SchemaValue> SchemaValue for OneOrMany<T> {
     const EXPECTED: &'static str = T::EXPECTED;
     const EXAMPLE: &'static str = T::EXAMPLE;
 
-    fn read(node: &Node, log: &mut Log) -> Option<Self> {
-        if let Value::Array(_) = node.value {
-            let list = List::<T>::read(node, log)?;
+    fn read(node: &TomlNode, log: &mut DiagnosticLog) -> Option<Self> {
+        if let TomlValue::Array(_) = node.value {
+            let list = EntryList::<T>::read(node, log)?;
             return Some(Self {
                 entries: list.entries,
                 span: list.span,
@@ -312,18 +312,18 @@ impl<T: JsonSchema> JsonSchema for OneOrMany<T> {
 
 /// Entries under names of the author's choice, in the order of the file.
 #[derive(Clone, Debug)]
-pub(crate) struct Named<T> {
-    pub(crate) entries: Vec<(Key, T)>,
+pub(crate) struct NamedEntries<T> {
+    pub(crate) entries: Vec<(TomlKey, T)>,
     /// Names whose entries could not be read; they count as known.
-    pub(crate) faulty: Vec<Key>,
+    pub(crate) faulty: Vec<TomlKey>,
 }
 
-impl<T: Read> Read for Named<T> {
+impl<T: SchemaValue> SchemaValue for NamedEntries<T> {
     const EXPECTED: &'static str = "a table of names";
     const EXAMPLE: &'static str = "{ name = ... }";
 
-    fn read(node: &Node, log: &mut Log) -> Option<Self> {
-        let Value::Table(table) = &node.value else {
+    fn read(node: &TomlNode, log: &mut DiagnosticLog) -> Option<Self> {
+        let TomlValue::Table(table) = &node.value else {
             return wrong_type::<Self>(node, log);
         };
         if too_many(table.len(), node.span, log) {
@@ -345,7 +345,7 @@ impl<T: Read> Read for Named<T> {
 }
 
 #[cfg(any(test, feature = "schema"))]
-impl<T: JsonSchema> JsonSchema for Named<T> {
+impl<T: JsonSchema> JsonSchema for NamedEntries<T> {
     fn inline_schema() -> bool {
         true
     }

@@ -6,25 +6,25 @@
 use std::cell::Cell;
 use std::collections::BTreeMap;
 
-use crate::diagnostic::{Diagnostic, Log, Span};
+use crate::diagnostic::{Diagnostic, DiagnosticLog, SourceSpan};
 use crate::document::quote;
-use crate::exact::{Exact, Function, Symbol};
+use crate::exact::{ExactExpression, ExactFunction, ModelSymbol};
 use crate::finite;
-use crate::formula::{Ast, AstKind, Formula};
+use crate::formula::{FormulaAst, FormulaAstKind, SourceFormula};
 use crate::suggest;
-use crate::unit::Dimension;
+use crate::unit::UnitDimension;
 use crate::values::check_not_reserved;
 
 /// What sort of thing a name stands for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Sort {
+pub(crate) enum SymbolSort {
     Constant,
     Parameter,
     Coordinate,
     Place,
 }
 
-impl Sort {
+impl SymbolSort {
     fn name(self) -> &'static str {
         match self {
             Self::Constant => "a constant",
@@ -37,39 +37,39 @@ impl Sort {
 
 /// The meaning of a name.
 #[derive(Clone, Debug)]
-pub(crate) struct Meaning {
-    pub(crate) sort: Sort,
-    pub(crate) exact: Exact,
+pub(crate) struct SymbolMeaning {
+    pub(crate) sort: SymbolSort,
+    pub(crate) exact: ExactExpression,
     /// Unknown where the unit was faulty; then it fits anything.
-    pub(crate) dimension: Option<Dimension>,
+    pub(crate) dimension: Option<UnitDimension>,
     /// The unit as printed.
     pub(crate) unit: String,
     /// The number that the file gives it; only constants have one.
     pub(crate) value: Option<f64>,
-    pub(crate) declared: Option<Span>,
+    pub(crate) declared: Option<SourceSpan>,
     pub(crate) used: Cell<bool>,
 }
 
 /// Names and their meanings.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Scope {
-    names: BTreeMap<String, Meaning>,
+pub(crate) struct FormulaScope {
+    names: BTreeMap<String, SymbolMeaning>,
 }
 
 /// What an expression must be.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Wanted<'a> {
+pub(crate) struct FormulaRequirement<'a> {
     /// Its sorts of names.
-    pub(crate) sorts: &'a [Sort],
+    pub(crate) sorts: &'a [SymbolSort],
     /// Its dimension.
-    pub(crate) dimension: Dimension,
+    pub(crate) dimension: UnitDimension,
     /// What it is, for messages: `the mass of a part`.
     pub(crate) what: &'a str,
 }
 
-impl Scope {
+impl FormulaScope {
     /// Adds a name; a second definition is reported and gives false.
-    pub(crate) fn declare(&mut self, name: &str, meaning: Meaning, log: &mut Log) -> bool {
+    pub(crate) fn declare(&mut self, name: &str, meaning: SymbolMeaning, log: &mut DiagnosticLog) -> bool {
         if let (Some(span), Some(first)) = (meaning.declared, self.names.get(name)) {
             let mut diagnostic =
                 Diagnostic::error(span, format!("`{}` is defined twice", quote(name)))
@@ -96,12 +96,12 @@ impl Scope {
     }
 
     /// Looks a name up.
-    pub(crate) fn get(&self, name: &str) -> Option<&Meaning> {
+    pub(crate) fn get(&self, name: &str) -> Option<&SymbolMeaning> {
         self.names.get(name)
     }
 
     /// All names with their meanings.
-    pub(crate) fn iter(&self) -> impl Iterator<Item = (&str, &Meaning)> {
+    pub(crate) fn iter(&self) -> impl Iterator<Item = (&str, &SymbolMeaning)> {
         self.names
             .iter()
             .map(|(name, meaning)| (name.as_str(), meaning))
@@ -111,10 +111,10 @@ impl Scope {
     pub(crate) fn look_up(
         &self,
         name: &str,
-        span: Span,
-        sorts: &[Sort],
-        log: &mut Log,
-    ) -> Option<&Meaning> {
+        span: SourceSpan,
+        sorts: &[SymbolSort],
+        log: &mut DiagnosticLog,
+    ) -> Option<&SymbolMeaning> {
         let allowed = || {
             self.names
                 .iter()
@@ -133,7 +133,7 @@ impl Scope {
                 log.push(
                     Diagnostic::error(span, format!("unknown name `{}`", quote(name)))
                         .label(format!("expected {list}"))
-                        .removed_or(removal, || {
+                        .with_removal_or(removal, || {
                             suggest::advice(name, "names", candidates.iter().copied())
                         }),
                 );
@@ -162,12 +162,12 @@ impl Scope {
     /// Gives an expression its meaning; faults are reported.
     pub(crate) fn resolve(
         &self,
-        formula: &Formula,
-        wanted: Wanted<'_>,
-        log: &mut Log,
-    ) -> Option<Exact> {
+        formula: &SourceFormula,
+        wanted: FormulaRequirement<'_>,
+        log: &mut DiagnosticLog,
+    ) -> Option<ExactExpression> {
         let before = log.n_errors();
-        let (exact, dimension) = self.walk(&formula.ast, wanted.sorts, log)?;
+        let (exact, dimension) = self.resolve_ast(&formula.ast, wanted.sorts, log)?;
         self.check_value(&formula.ast, log);
         if let Some(found) = dimension
             && found != wanted.dimension
@@ -194,10 +194,10 @@ impl Scope {
     }
 
     /// Reports an expression without a finite value at the constants of the file.
-    fn check_value(&self, ast: &Ast, log: &mut Log) {
+    fn check_value(&self, ast: &FormulaAst, log: &mut DiagnosticLog) {
         if let Err(fault) = finite::value(ast, &|name| self.value(name)) {
             let declared = match &fault.piece.kind {
-                AstKind::Name(name) => self.get(name).and_then(|meaning| meaning.declared),
+                FormulaAstKind::Name(name) => self.get(name).and_then(|meaning| meaning.declared),
                 _ => None,
             };
             log.push(fault.report(declared));
@@ -205,25 +205,25 @@ impl Scope {
     }
 
     /// The meaning and dimension of a subexpression; `None` as a dimension fits any, as bare numbers do.
-    pub(crate) fn walk(
+    pub(crate) fn resolve_ast(
         &self,
-        ast: &Ast,
-        sorts: &[Sort],
-        log: &mut Log,
-    ) -> Option<(Exact, Option<Dimension>)> {
+        ast: &FormulaAst,
+        sorts: &[SymbolSort],
+        log: &mut DiagnosticLog,
+    ) -> Option<(ExactExpression, Option<UnitDimension>)> {
         match &ast.kind {
-            AstKind::Rational(value) => Some((Exact::Rational(value.clone()), None)),
-            AstKind::Pi => Some((Exact::Pi, None)),
-            AstKind::Name(name) => {
+            FormulaAstKind::Rational(value) => Some((ExactExpression::Rational(value.clone()), None)),
+            FormulaAstKind::Pi => Some((ExactExpression::Pi, None)),
+            FormulaAstKind::Name(name) => {
                 let meaning = self.look_up(name, ast.span, sorts, log)?;
                 Some((meaning.exact.clone(), meaning.dimension))
             }
-            AstKind::Sum(terms) => {
+            FormulaAstKind::Sum(terms) => {
                 let mut sum = Vec::new();
-                let mut dimension: Option<(Dimension, Span)> = None;
+                let mut dimension: Option<(UnitDimension, SourceSpan)> = None;
                 let mut faulty = false;
                 for term in terms {
-                    let Some((exact, found)) = self.walk(term, sorts, log) else {
+                    let Some((exact, found)) = self.resolve_ast(term, sorts, log) else {
                         faulty = true;
                         continue;
                     };
@@ -248,53 +248,53 @@ impl Scope {
                         _ => {}
                     }
                 }
-                (!faulty).then(|| (Exact::Sum(sum), dimension.map(|(found, _)| found)))
+                (!faulty).then(|| (ExactExpression::Sum(sum), dimension.map(|(found, _)| found)))
             }
-            AstKind::Product(factors) => {
+            FormulaAstKind::Product(factors) => {
                 let mut product = Vec::new();
-                let mut dimension: Option<Dimension> = None;
+                let mut dimension: Option<UnitDimension> = None;
                 let mut faulty = false;
                 for factor in factors {
-                    let Some((exact, found)) = self.walk(factor, sorts, log) else {
+                    let Some((exact, found)) = self.resolve_ast(factor, sorts, log) else {
                         faulty = true;
                         continue;
                     };
                     product.push(exact);
                     if let Some(found) = found {
-                        dimension = Some(dimension.map_or(found, |before| before.times(found)));
+                        dimension = Some(dimension.map_or(found, |before| before.multiplied_by(found)));
                     }
                 }
-                (!faulty).then_some((Exact::Product(product), dimension))
+                (!faulty).then_some((ExactExpression::Product(product), dimension))
             }
-            AstKind::Quotient(above, below) => {
-                let above = self.walk(above, sorts, log);
-                let below = self.walk(below, sorts, log);
+            FormulaAstKind::Quotient(above, below) => {
+                let above = self.resolve_ast(above, sorts, log);
+                let below = self.resolve_ast(below, sorts, log);
                 let ((above, upper), (below, lower)) = (above?, below?);
                 let dimension = match (upper, lower) {
                     (None, None) => None,
                     (upper, lower) => Some(
                         upper
-                            .unwrap_or(Dimension::ONE)
-                            .over(lower.unwrap_or(Dimension::ONE)),
+                            .unwrap_or(UnitDimension::ONE)
+                            .divided_by(lower.unwrap_or(UnitDimension::ONE)),
                     ),
                 };
-                Some((Exact::Quotient(Box::new(above), Box::new(below)), dimension))
+                Some((ExactExpression::Quotient(Box::new(above), Box::new(below)), dimension))
             }
-            AstKind::Negative(inner) => {
-                let (exact, dimension) = self.walk(inner, sorts, log)?;
-                Some((Exact::Negative(Box::new(exact)), dimension))
+            FormulaAstKind::Negative(inner) => {
+                let (exact, dimension) = self.resolve_ast(inner, sorts, log)?;
+                Some((ExactExpression::Negative(Box::new(exact)), dimension))
             }
-            AstKind::Power(base, exponent) => {
-                let (exact, dimension) = self.walk(base, sorts, log)?;
+            FormulaAstKind::Power(base, exponent) => {
+                let (exact, dimension) = self.resolve_ast(base, sorts, log)?;
                 Some((
-                    Exact::Power(Box::new(exact), *exponent),
+                    ExactExpression::Power(Box::new(exact), *exponent),
                     dimension.map(|found| found.power(*exponent)),
                 ))
             }
-            AstKind::Apply(function, inner) => {
-                let (exact, dimension) = self.walk(inner, sorts, log)?;
-                let dimension = apply(*function, dimension, inner.span, log)?;
-                Some((Exact::Apply(*function, Box::new(exact)), dimension))
+            FormulaAstKind::Apply(function, inner) => {
+                let (exact, dimension) = self.resolve_ast(inner, sorts, log)?;
+                let dimension = function_dimension(*function, dimension, inner.span, log)?;
+                Some((ExactExpression::Apply(*function, Box::new(exact)), dimension))
             }
         }
     }
@@ -302,17 +302,17 @@ impl Scope {
 
 /// The dimension of a function's value; a wrong operand is reported.
 #[allow(clippy::option_option)] // Outer: faulty or not; inner: fits any dimension.
-fn apply(
-    function: Function,
-    operand: Option<Dimension>,
-    span: Span,
-    log: &mut Log,
-) -> Option<Option<Dimension>> {
+fn function_dimension(
+    function: ExactFunction,
+    operand: Option<UnitDimension>,
+    span: SourceSpan,
+    log: &mut DiagnosticLog,
+) -> Option<Option<UnitDimension>> {
     match (function, operand) {
-        (Function::Abs, operand) => Some(operand),
-        (Function::Sign, _) => Some(Some(Dimension::ONE)),
-        (Function::Sqrt, None) => Some(None),
-        (Function::Sqrt, Some(found)) => {
+        (ExactFunction::Abs, operand) => Some(operand),
+        (ExactFunction::Sign, _) => Some(Some(UnitDimension::ONE)),
+        (ExactFunction::Sqrt, None) => Some(None),
+        (ExactFunction::Sqrt, Some(found)) => {
             let root = found.square_root();
             if root.is_none() {
                 log.push(
@@ -322,9 +322,9 @@ fn apply(
             }
             root.map(Some)
         }
-        (Function::Sin | Function::Cos | Function::Tanh | Function::Exp, operand) => {
+        (ExactFunction::Sin | ExactFunction::Cos | ExactFunction::Tanh | ExactFunction::Exp, operand) => {
             if let Some(found) = operand
-                && found != Dimension::ONE
+                && found != UnitDimension::ONE
             {
                 log.push(
                     Diagnostic::error(
@@ -339,22 +339,22 @@ fn apply(
                 );
                 return None;
             }
-            Some(Some(Dimension::ONE))
+            Some(Some(UnitDimension::ONE))
         }
     }
 }
 
 /// A symbol's meaning.
-pub(crate) fn meaning(
-    sort: Sort,
-    symbol: Symbol,
-    dimension: Option<Dimension>,
+pub(crate) fn symbol_meaning(
+    sort: SymbolSort,
+    symbol: ModelSymbol,
+    dimension: Option<UnitDimension>,
     unit: &str,
-    declared: Option<Span>,
-) -> Meaning {
-    Meaning {
+    declared: Option<SourceSpan>,
+) -> SymbolMeaning {
+    SymbolMeaning {
         sort,
-        exact: Exact::Symbol(symbol),
+        exact: ExactExpression::Symbol(symbol),
         dimension,
         unit: unit.to_owned(),
         value: None,

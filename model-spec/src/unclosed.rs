@@ -6,7 +6,7 @@
 
 /// A bracket without its partner.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Unclosed {
+pub(crate) struct UnclosedBracket {
     /// `{` or `[`.
     pub(crate) bracket: char,
     /// Its byte.
@@ -19,7 +19,7 @@ pub(crate) struct Unclosed {
 }
 
 /// The first bracket that is open where the next table, or the end of the file, comes.
-pub(crate) fn unclosed(text: &str) -> Option<Unclosed> {
+pub(crate) fn first_unclosed_bracket(text: &str) -> Option<UnclosedBracket> {
     let mut open: Vec<(char, usize)> = Vec::new();
     let mut at = 0;
     let mut starts_line = true;
@@ -27,7 +27,7 @@ pub(crate) fn unclosed(text: &str) -> Option<Unclosed> {
         let rest = &text[at..];
         if starts_line && let Some(length) = head_of_table(rest) {
             if let Some((bracket, place)) = open.last() {
-                return Some(Unclosed {
+                return Some(UnclosedBracket {
                     bracket: *bracket,
                     at: *place,
                     outermost: open[0].1,
@@ -41,7 +41,7 @@ pub(crate) fn unclosed(text: &str) -> Option<Unclosed> {
         starts_line = first == '\n' || (starts_line && first.is_whitespace());
         at += match first {
             '#' => rest.find('\n').unwrap_or(rest.len()),
-            '"' | '\'' => string(rest, first)?,
+            '"' | '\'' => string_length(rest, first)?,
             '{' | '[' => {
                 open.push((first, at));
                 1
@@ -57,7 +57,7 @@ pub(crate) fn unclosed(text: &str) -> Option<Unclosed> {
             other => other.len_utf8(),
         };
     }
-    open.last().map(|(bracket, at)| Unclosed {
+    open.last().map(|(bracket, at)| UnclosedBracket {
         bracket: *bracket,
         at: *at,
         outermost: open[0].1,
@@ -86,7 +86,7 @@ fn head_of_table(rest: &str) -> Option<usize> {
 }
 
 /// The length of a string with its quotes; `None` where it is not closed, which is an error of its own.
-fn string(rest: &str, quote: char) -> Option<usize> {
+fn string_length(rest: &str, quote: char) -> Option<usize> {
     let long: String = std::iter::repeat_n(quote, 3).collect();
     let (fence, several_lines) = if rest.starts_with(&long) {
         (long.as_str(), true)
@@ -119,7 +119,7 @@ mod tests {
 
     #[track_caller]
     fn check(text: &str, expected: Option<&str>) {
-        let found = unclosed(text);
+        let found = first_unclosed_bracket(text);
         assert_eq!(found.map(|open| &text[open.at..]), expected, "{text}");
     }
 

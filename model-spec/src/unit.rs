@@ -5,14 +5,14 @@
 #[cfg(any(test, feature = "schema"))]
 use std::borrow::Cow;
 
-use crate::diagnostic::{Diagnostic, Log, Span};
-use crate::document::{Node, Value, quote};
-use crate::record::Read;
+use crate::diagnostic::{Diagnostic, DiagnosticLog, SourceSpan};
+use crate::document::{TomlNode, TomlValue, quote};
+use crate::record::SchemaValue;
 use crate::suggest;
 
 /// Twice the exponents of kg, m, s, A; twice, so that square roots stay whole.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub(crate) struct Dimension([i32; 4]);
+pub(crate) struct UnitDimension([i32; 4]);
 
 /// The base of the algebra and the units derived from it, as single exponents of kg, m, s, A.
 const UNITS: [(&str, [i32; 4]); 17] = [
@@ -75,7 +75,7 @@ const PRINTED: [(&str, [i32; 4], &str); 18] = [
     ("A", [0, 0, 0, 1], "a current"),
 ];
 
-impl Dimension {
+impl UnitDimension {
     pub(crate) const ONE: Self = Self::new([0, 0, 0, 0]);
     pub(crate) const TIME: Self = Self::new([0, 0, 1, 0]);
     pub(crate) const LENGTH: Self = Self::new([0, 1, 0, 0]);
@@ -95,13 +95,13 @@ impl Dimension {
         Self([2 * single[0], 2 * single[1], 2 * single[2], 2 * single[3]])
     }
 
-    pub(crate) fn times(self, other: Self) -> Self {
+    pub(crate) fn multiplied_by(self, other: Self) -> Self {
         Self(std::array::from_fn(|i| {
             self.0[i].saturating_add(other.0[i])
         }))
     }
 
-    pub(crate) fn over(self, other: Self) -> Self {
+    pub(crate) fn divided_by(self, other: Self) -> Self {
         Self(std::array::from_fn(|i| {
             self.0[i].saturating_sub(other.0[i])
         }))
@@ -137,7 +137,7 @@ impl Dimension {
     }
 }
 
-impl std::fmt::Display for Dimension {
+impl std::fmt::Display for UnitDimension {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         if let Some((unit, _, _)) = PRINTED
             .iter()
@@ -164,21 +164,21 @@ impl std::fmt::Display for Dimension {
 
 /// A unit of the file.
 #[derive(Clone, Debug)]
-pub(crate) struct Unit {
+pub(crate) struct ModelUnit {
     /// As the author wrote it, blanks tidied.
     pub(crate) text: String,
-    pub(crate) dimension: Dimension,
+    pub(crate) dimension: UnitDimension,
 }
 
-impl Unit {
+impl ModelUnit {
     /// A unit by its text, such as `N s/m`, which stands at `span` and, as far as it is known, begins at `inner` there.
     pub(crate) fn from_text(
         text: &str,
-        span: Span,
+        span: SourceSpan,
         inner: Option<usize>,
-        log: &mut Log,
+        log: &mut DiagnosticLog,
     ) -> Option<Self> {
-        let fault = match parse(text) {
+        let fault = match parse_unit(text) {
             Ok(dimension) => {
                 return Some(Self {
                     text: text.split_whitespace().collect::<Vec<_>>().join(" "),
@@ -187,7 +187,7 @@ impl Unit {
             }
             Err(fault) => fault,
         };
-        let place = inner.map_or(span, |inner| Span {
+        let place = inner.map_or(span, |inner| SourceSpan {
             file: span.file,
             start: inner + fault.start,
             end: inner + fault.end,
@@ -213,12 +213,12 @@ impl Unit {
     }
 }
 
-impl Read for Unit {
+impl SchemaValue for ModelUnit {
     const EXPECTED: &'static str = "a unit in quotes";
     const EXAMPLE: &'static str = "\"kg m^2\"";
 
-    fn read(node: &Node, log: &mut Log) -> Option<Self> {
-        let Value::Text { text, inner } = &node.value else {
+    fn read(node: &TomlNode, log: &mut DiagnosticLog) -> Option<Self> {
+        let TomlValue::Text { text, inner } = &node.value else {
             return crate::record::wrong_type::<Self>(node, log);
         };
         Self::from_text(text, node.span, *inner, log)
@@ -226,7 +226,7 @@ impl Read for Unit {
 }
 
 #[cfg(any(test, feature = "schema"))]
-impl schemars::JsonSchema for Unit {
+impl schemars::JsonSchema for ModelUnit {
     fn schema_name() -> Cow<'static, str> {
         "Unit".into()
     }
@@ -249,21 +249,21 @@ pub fn unit_product(factors: &[(&str, i32)]) -> String {
     }
     let product = factors
         .iter()
-        .filter_map(|(unit, n)| parse(unit).ok().map(|dimension| dimension.power(*n)))
-        .fold(Dimension::ONE, Dimension::times);
+        .filter_map(|(unit, n)| parse_unit(unit).ok().map(|dimension| dimension.power(*n)))
+        .fold(UnitDimension::ONE, UnitDimension::multiplied_by);
     product.to_string()
 }
 
 /// A stretch of the unit's text that has no meaning.
-struct Fault {
+struct UnitFault {
     start: usize,
     end: usize,
     message: String,
 }
 
 /// Products by blanks or `*`; after one `/` comes a single unit or a bracket.
-fn parse(text: &str) -> Result<Dimension, Fault> {
-    let whole = |message: &str| Fault {
+fn parse_unit(text: &str) -> Result<UnitDimension, UnitFault> {
+    let whole = |message: &str| UnitFault {
         start: 0,
         end: text.len(),
         message: message.to_owned(),
@@ -292,19 +292,19 @@ fn parse(text: &str) -> Result<Dimension, Fault> {
             factors(below, offset)?
         };
         if n_factors != 1 {
-            return Err(Fault {
+            return Err(UnitFault {
                 start: offset,
                 end: text.len(),
                 message: "it is not clear what this unit divides by".to_owned(),
             });
         }
-        dimension = dimension.over(divisor);
+        dimension = dimension.divided_by(divisor);
     }
     Ok(dimension)
 }
 
-fn factors(text: &str, offset: usize) -> Result<(Dimension, usize), Fault> {
-    let mut dimension = Dimension::ONE;
+fn factors(text: &str, offset: usize) -> Result<(UnitDimension, usize), UnitFault> {
+    let mut dimension = UnitDimension::ONE;
     let mut n_factors = 0;
     let mut at = 0;
     while at < text.len() {
@@ -325,7 +325,7 @@ fn factors(text: &str, offset: usize) -> Result<(Dimension, usize), Fault> {
             Some((name, exponent)) => (name, exponent.parse::<i32>().ok()),
             None => (word, Some(1)),
         };
-        let fault = |message: String, length: usize| Fault {
+        let fault = |message: String, length: usize| UnitFault {
             start: offset + at,
             end: offset + at + length,
             message,
@@ -339,12 +339,12 @@ fn factors(text: &str, offset: usize) -> Result<(Dimension, usize), Fault> {
                 word.len(),
             ));
         };
-        dimension = dimension.times(Dimension::new(*single).power(exponent));
+        dimension = dimension.multiplied_by(UnitDimension::new(*single).power(exponent));
         n_factors += 1;
         at += end;
     }
     if n_factors == 0 {
-        return Err(Fault {
+        return Err(UnitFault {
             start: offset,
             end: offset + text.len(),
             message: "a unit is missing here".to_owned(),
@@ -355,7 +355,7 @@ fn factors(text: &str, offset: usize) -> Result<(Dimension, usize), Fault> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Dimension, UNITS, parse};
+    use super::{UnitDimension, UNITS, parse_unit};
 
     #[test]
     fn units_multiply_and_divide() {
@@ -370,23 +370,23 @@ mod tests {
             ("V s/(rad A)", "kg m^2 s^-2 A^-2"),
             ("rad", "1"),
         ] {
-            let dimension = parse(text).map_err(|fault| fault.message).unwrap();
+            let dimension = parse_unit(text).map_err(|fault| fault.message).unwrap();
             assert_eq!(dimension.to_string(), printed, "{text}");
         }
         for text in [
             "", "kg m s/", "m/s/s", "N/m s", "Nm", "mm", "m^x", "m^99", "()", "m/(", "\u{e9}",
         ] {
-            assert!(parse(text).is_err(), "{text}");
+            assert!(parse_unit(text).is_err(), "{text}");
         }
     }
 
     #[test]
     fn printed_dimensions_read_as_the_same() {
         for (name, _) in UNITS {
-            let dimension = parse(name).map_err(|fault| fault.message).unwrap();
-            let square = dimension.times(dimension);
-            for found in [dimension, square, Dimension::ONE.over(dimension)] {
-                assert_eq!(parse(&found.to_string()).ok(), Some(found), "{name}");
+            let dimension = parse_unit(name).map_err(|fault| fault.message).unwrap();
+            let square = dimension.multiplied_by(dimension);
+            for found in [dimension, square, UnitDimension::ONE.divided_by(dimension)] {
+                assert_eq!(parse_unit(&found.to_string()).ok(), Some(found), "{name}");
             }
         }
     }

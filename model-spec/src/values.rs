@@ -6,12 +6,12 @@ use std::borrow::Cow;
 #[cfg(any(test, feature = "schema"))]
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 
-use crate::diagnostic::{Diagnostic, Log, Span};
-use crate::document::{Node, Value, quote};
-use crate::formula::Formula;
-use crate::record::{Read, wrong_type};
+use crate::diagnostic::{Diagnostic, DiagnosticLog, SourceSpan};
+use crate::document::{TomlNode, TomlValue, quote};
+use crate::formula::SourceFormula;
+use crate::record::{SchemaValue, wrong_type};
 use crate::schema::{SearchRangeEntry, UnitTable};
-use crate::unit::Unit;
+use crate::unit::ModelUnit;
 use crate::words::words;
 
 /// Words that mean something in expressions and so name nothing else.
@@ -37,17 +37,17 @@ const RESERVED: [&str; 17] = [
 
 /// A name, where it is defined or where it is used.
 #[derive(Clone, Debug)]
-pub(crate) struct Name {
+pub(crate) struct SpannedName {
     pub(crate) text: String,
-    pub(crate) span: Span,
+    pub(crate) span: SourceSpan,
 }
 
-impl Read for Name {
+impl SchemaValue for SpannedName {
     const EXPECTED: &'static str = "a name in quotes";
     const EXAMPLE: &'static str = "\"S1\"";
 
-    fn read(node: &Node, log: &mut Log) -> Option<Self> {
-        let Value::Text { text, .. } = &node.value else {
+    fn read(node: &TomlNode, log: &mut DiagnosticLog) -> Option<Self> {
+        let TomlValue::Text { text, .. } = &node.value else {
             return wrong_type::<Self>(node, log);
         };
         check_name(text, node.span, log).then(|| Self {
@@ -67,7 +67,7 @@ pub(crate) fn is_name(text: &str) -> bool {
 }
 
 /// Reports a name that is no identifier.
-pub(crate) fn check_name(text: &str, span: Span, log: &mut Log) -> bool {
+pub(crate) fn check_name(text: &str, span: SourceSpan, log: &mut DiagnosticLog) -> bool {
     let fine = is_name(text);
     if !fine {
         log.push(
@@ -79,7 +79,7 @@ pub(crate) fn check_name(text: &str, span: Span, log: &mut Log) -> bool {
 }
 
 /// Reports a name that is taken by the language of expressions.
-pub(crate) fn check_not_reserved(text: &str, span: Span, log: &mut Log) -> bool {
+pub(crate) fn check_not_reserved(text: &str, span: SourceSpan, log: &mut DiagnosticLog) -> bool {
     let reserved = RESERVED.contains(&text);
     if reserved {
         log.push(
@@ -92,7 +92,7 @@ pub(crate) fn check_not_reserved(text: &str, span: Span, log: &mut Log) -> bool 
 }
 
 #[cfg(any(test, feature = "schema"))]
-impl JsonSchema for Name {
+impl JsonSchema for SpannedName {
     fn schema_name() -> Cow<'static, str> {
         "Name".into()
     }
@@ -109,17 +109,17 @@ impl JsonSchema for Name {
 
 /// Free text.
 #[derive(Clone, Debug)]
-pub(crate) struct Text {
+pub(crate) struct SpannedText {
     pub(crate) text: String,
-    pub(crate) span: Span,
+    pub(crate) span: SourceSpan,
 }
 
-impl Read for Text {
+impl SchemaValue for SpannedText {
     const EXPECTED: &'static str = "a text in quotes";
     const EXAMPLE: &'static str = "\"...\"";
 
-    fn read(node: &Node, log: &mut Log) -> Option<Self> {
-        let Value::Text { text, .. } = &node.value else {
+    fn read(node: &TomlNode, log: &mut DiagnosticLog) -> Option<Self> {
+        let TomlValue::Text { text, .. } = &node.value else {
             return wrong_type::<Self>(node, log);
         };
         if text.len() > 4000 {
@@ -137,7 +137,7 @@ impl Read for Text {
 }
 
 #[cfg(any(test, feature = "schema"))]
-impl JsonSchema for Text {
+impl JsonSchema for SpannedText {
     fn inline_schema() -> bool {
         true
     }
@@ -153,17 +153,17 @@ impl JsonSchema for Text {
 
 /// A finite number.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Number {
+pub(crate) struct SpannedNumber {
     pub(crate) value: f64,
-    pub(crate) span: Span,
+    pub(crate) span: SourceSpan,
 }
 
-impl Read for Number {
+impl SchemaValue for SpannedNumber {
     const EXPECTED: &'static str = "a number";
     const EXAMPLE: &'static str = "0.25";
 
-    fn read(node: &Node, log: &mut Log) -> Option<Self> {
-        let Value::Number { text, .. } = &node.value else {
+    fn read(node: &TomlNode, log: &mut DiagnosticLog) -> Option<Self> {
+        let TomlValue::Number { text, .. } = &node.value else {
             return wrong_type::<Self>(node, log);
         };
         match text.parse::<f64>() {
@@ -184,7 +184,7 @@ impl Read for Number {
 }
 
 #[cfg(any(test, feature = "schema"))]
-impl JsonSchema for Number {
+impl JsonSchema for SpannedNumber {
     fn inline_schema() -> bool {
         true
     }
@@ -200,14 +200,14 @@ impl JsonSchema for Number {
 
 /// Yes or no.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Flag(pub(crate) bool);
+pub(crate) struct BooleanFlag(pub(crate) bool);
 
-impl Read for Flag {
+impl SchemaValue for BooleanFlag {
     const EXPECTED: &'static str = "`true` or `false`";
     const EXAMPLE: &'static str = "true";
 
-    fn read(node: &Node, log: &mut Log) -> Option<Self> {
-        let Value::Boolean(value) = node.value else {
+    fn read(node: &TomlNode, log: &mut DiagnosticLog) -> Option<Self> {
+        let TomlValue::Boolean(value) = node.value else {
             return wrong_type::<Self>(node, log);
         };
         Some(Self(value))
@@ -215,7 +215,7 @@ impl Read for Flag {
 }
 
 #[cfg(any(test, feature = "schema"))]
-impl JsonSchema for Flag {
+impl JsonSchema for BooleanFlag {
     fn inline_schema() -> bool {
         true
     }
@@ -232,21 +232,21 @@ impl JsonSchema for Flag {
 /// A unit that may depend on what the place carries.
 #[derive(Clone, Debug)]
 pub(crate) struct UnitByPlace {
-    pub(crate) force: Option<Unit>,
-    pub(crate) torque: Option<Unit>,
-    pub(crate) point: Option<Unit>,
+    pub(crate) force: Option<ModelUnit>,
+    pub(crate) torque: Option<ModelUnit>,
+    pub(crate) point: Option<ModelUnit>,
     /// Elsewhere: one unit for all places serves there.
-    pub(crate) elsewhere: Option<Unit>,
+    pub(crate) elsewhere: Option<ModelUnit>,
 }
 
-impl Read for UnitByPlace {
+impl SchemaValue for UnitByPlace {
     const EXPECTED: &'static str = "a unit in quotes, or units by place";
     const EXAMPLE: &'static str = "{ force = \"N\", torque = \"N m\" }";
 
-    fn read(node: &Node, log: &mut Log) -> Option<Self> {
+    fn read(node: &TomlNode, log: &mut DiagnosticLog) -> Option<Self> {
         match &node.value {
-            Value::Text { .. } => {
-                let unit = Unit::read(node, log)?;
+            TomlValue::Text { .. } => {
+                let unit = ModelUnit::read(node, log)?;
                 Some(Self {
                     force: Some(unit.clone()),
                     torque: Some(unit.clone()),
@@ -254,7 +254,7 @@ impl Read for UnitByPlace {
                     elsewhere: Some(unit),
                 })
             }
-            Value::Table(table) => {
+            TomlValue::Table(table) => {
                 let table = UnitTable::from_table(table, node.span, log);
                 Some(Self {
                     force: table.force,
@@ -279,7 +279,7 @@ impl JsonSchema for UnitByPlace {
     }
 
     fn json_schema(generator: &mut SchemaGenerator) -> Schema {
-        let unit = generator.subschema_for::<Unit>();
+        let unit = generator.subschema_for::<ModelUnit>();
         let table = generator.subschema_for::<UnitTable>();
         json_schema!({ "anyOf": [unit, table] })
     }
@@ -287,14 +287,14 @@ impl JsonSchema for UnitByPlace {
 
 /// The version of the file format.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Version;
+pub(crate) struct SchemaVersion;
 
-impl Read for Version {
+impl SchemaValue for SchemaVersion {
     const EXPECTED: &'static str = "the version of the file format";
     const EXAMPLE: &'static str = "1";
 
-    fn read(node: &Node, log: &mut Log) -> Option<Self> {
-        let Value::Number { text, .. } = &node.value else {
+    fn read(node: &TomlNode, log: &mut DiagnosticLog) -> Option<Self> {
+        let TomlValue::Number { text, .. } = &node.value else {
             return wrong_type::<Self>(node, log);
         };
         if text != "1" {
@@ -312,7 +312,7 @@ impl Read for Version {
 }
 
 #[cfg(any(test, feature = "schema"))]
-impl JsonSchema for Version {
+impl JsonSchema for SchemaVersion {
     fn inline_schema() -> bool {
         true
     }
@@ -328,18 +328,18 @@ impl JsonSchema for Version {
 
 /// Three expressions, or two in the x-y plane.
 #[derive(Clone, Debug)]
-pub(crate) struct Vector {
+pub(crate) struct FormulaVector {
     /// The entries; absent where one was faulty.
-    pub(crate) entries: Vec<Option<Formula>>,
-    pub(crate) span: Span,
+    pub(crate) entries: Vec<Option<SourceFormula>>,
+    pub(crate) span: SourceSpan,
 }
 
-impl Read for Vector {
+impl SchemaValue for FormulaVector {
     const EXPECTED: &'static str = "a vector of three expressions, or of two in the x-y plane";
     const EXAMPLE: &'static str = "[\"d1\", 0, 0]";
 
-    fn read(node: &Node, log: &mut Log) -> Option<Self> {
-        let Value::Array(array) = &node.value else {
+    fn read(node: &TomlNode, log: &mut DiagnosticLog) -> Option<Self> {
+        let TomlValue::Array(array) = &node.value else {
             return wrong_type::<Self>(node, log);
         };
         if !(2..=3).contains(&array.len()) {
@@ -359,7 +359,7 @@ impl Read for Vector {
         Some(Self {
             entries: array
                 .iter()
-                .map(|entry| Formula::read(entry, log))
+                .map(|entry| SourceFormula::read(entry, log))
                 .collect(),
             span: node.span,
         })
@@ -367,7 +367,7 @@ impl Read for Vector {
 }
 
 #[cfg(any(test, feature = "schema"))]
-impl JsonSchema for Vector {
+impl JsonSchema for FormulaVector {
     fn schema_name() -> Cow<'static, str> {
         "Vector".into()
     }
@@ -376,7 +376,7 @@ impl JsonSchema for Vector {
         json_schema!({
             "description": "x, y and z; z may be left away.",
             "type": "array",
-            "items": generator.subschema_for::<Formula>(),
+            "items": generator.subschema_for::<SourceFormula>(),
             "minItems": 2,
             "maxItems": 3,
         })
@@ -385,15 +385,15 @@ impl JsonSchema for Vector {
 
 /// A place of a lumped mass.
 #[derive(Clone, Debug)]
-pub(crate) enum Spot {
+pub(crate) enum LumpedMassPlace {
     /// A named point.
-    Point(Name),
+    Point(SpannedName),
     /// A position in the frame.
-    Vector(Vector),
+    Vector(FormulaVector),
 }
 
-impl Spot {
-    pub(crate) fn span(&self) -> Span {
+impl LumpedMassPlace {
+    pub(crate) fn span(&self) -> SourceSpan {
         match self {
             Self::Point(name) => name.span,
             Self::Vector(vector) => vector.span,
@@ -401,21 +401,21 @@ impl Spot {
     }
 }
 
-impl Read for Spot {
+impl SchemaValue for LumpedMassPlace {
     const EXPECTED: &'static str = "the name of a point, or a vector";
     const EXAMPLE: &'static str = "\"R3m\"";
 
-    fn read(node: &Node, log: &mut Log) -> Option<Self> {
+    fn read(node: &TomlNode, log: &mut DiagnosticLog) -> Option<Self> {
         match &node.value {
-            Value::Text { .. } => Name::read(node, log).map(Self::Point),
-            Value::Array(_) => Vector::read(node, log).map(Self::Vector),
+            TomlValue::Text { .. } => SpannedName::read(node, log).map(Self::Point),
+            TomlValue::Array(_) => FormulaVector::read(node, log).map(Self::Vector),
             _ => wrong_type::<Self>(node, log),
         }
     }
 }
 
 #[cfg(any(test, feature = "schema"))]
-impl JsonSchema for Spot {
+impl JsonSchema for LumpedMassPlace {
     fn inline_schema() -> bool {
         true
     }
@@ -425,26 +425,26 @@ impl JsonSchema for Spot {
     }
 
     fn json_schema(generator: &mut SchemaGenerator) -> Schema {
-        let name = generator.subschema_for::<Name>();
-        let vector = generator.subschema_for::<Vector>();
+        let name = generator.subschema_for::<SpannedName>();
+        let vector = generator.subschema_for::<FormulaVector>();
         json_schema!({ "anyOf": [name, vector] })
     }
 }
 
 /// The end of a parameter's name, such as `1` in `M1`.
 #[derive(Clone, Debug)]
-pub(crate) struct Suffix {
+pub(crate) struct NameSuffix {
     pub(crate) text: String,
-    pub(crate) span: Span,
+    pub(crate) span: SourceSpan,
 }
 
-impl Read for Suffix {
+impl SchemaValue for NameSuffix {
     const EXPECTED: &'static str = "the end of a name in quotes";
     const EXAMPLE: &'static str = "\"1\"";
 
-    fn read(node: &Node, log: &mut Log) -> Option<Self> {
-        let (Value::Text { text, .. }
-        | Value::Number {
+    fn read(node: &TomlNode, log: &mut DiagnosticLog) -> Option<Self> {
+        let (TomlValue::Text { text, .. }
+        | TomlValue::Number {
             text,
             is_integer: true,
         }) = &node.value
@@ -470,7 +470,7 @@ impl Read for Suffix {
 }
 
 #[cfg(any(test, feature = "schema"))]
-impl JsonSchema for Suffix {
+impl JsonSchema for NameSuffix {
     fn schema_name() -> Cow<'static, str> {
         "Suffix".into()
     }
@@ -503,21 +503,21 @@ words! {
 
 /// How a constant's value is found where it is not known.
 #[derive(Clone, Debug)]
-pub(crate) enum Search {
+pub(crate) enum SearchEntry {
     /// The expression is affine in it.
     Linear,
     /// Values of a range are tried.
     Range(SearchRangeEntry),
 }
 
-impl Read for Search {
+impl SchemaValue for SearchEntry {
     const EXPECTED: &'static str = "a range to search, or `linear`";
     const EXAMPLE: &'static str = "{ from = 0.01, to = 1, of = \"rate\" }";
 
-    fn read(node: &Node, log: &mut Log) -> Option<Self> {
+    fn read(node: &TomlNode, log: &mut DiagnosticLog) -> Option<Self> {
         match &node.value {
-            Value::Text { text, .. } if text == "linear" => Some(Self::Linear),
-            Value::Table(table) => {
+            TomlValue::Text { text, .. } if text == "linear" => Some(Self::Linear),
+            TomlValue::Table(table) => {
                 let range = SearchRangeEntry::from_table(table, node.span, log);
                 if let (Some(from), Some(to)) = (range.from, range.to)
                     && from.value >= to.value
@@ -535,7 +535,7 @@ impl Read for Search {
 }
 
 #[cfg(any(test, feature = "schema"))]
-impl JsonSchema for Search {
+impl JsonSchema for SearchEntry {
     fn inline_schema() -> bool {
         true
     }

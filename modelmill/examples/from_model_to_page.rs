@@ -3,10 +3,10 @@
 
 use std::path::Path;
 
-use modelmill::diagnose::Question;
-use modelmill::identify::Estimation;
-use modelmill::print::Words;
-use modelmill::recording::Reading;
+use modelmill::diagnose::DiagnosisOptions;
+use modelmill::identify::EstimatorOptions;
+use modelmill::print::PlainAdvice;
+use modelmill::recording::RecordingOptions;
 use modelmill::{Model, Outcome, report};
 
 fn main() -> Outcome {
@@ -18,12 +18,12 @@ fn main() -> Outcome {
     }
 
     let recordings = root.join("recordings/spidermill-mbs");
-    let fit = model.recording(recordings.join("with-rods-fit.csv"), &Reading::default())?;
-    let check = model.recording(recordings.join("with-rods-check.csv"), &Reading::default())?;
-    let before = model.identify(&[&fit], &[&check], &Estimation::default())?;
+    let fit = model.recording(recordings.join("with-rods-fit.csv"), &RecordingOptions::default())?;
+    let check = model.recording(recordings.join("with-rods-check.csv"), &RecordingOptions::default())?;
+    let before = model.identify(&[&fit], &[&check], &EstimatorOptions::default())?;
     println!("identified: {:.2} % off on the check run", percent(&before));
 
-    let findings = model.diagnose(&[&fit], &[&check], &Question::default())?;
+    let findings = model.diagnose(&[&fit], &[&check], &DiagnosisOptions::default())?;
     for missing in &findings.missing {
         println!(
             "missing: {} at {}",
@@ -32,8 +32,8 @@ fn main() -> Outcome {
         );
     }
 
-    let better = model.with(&findings.entries)?;
-    let after = better.identify(&[&fit], &[&check], &Estimation::default())?;
+    let better = model.with_added_effects(&findings.entries)?;
+    let after = better.identify(&[&fit], &[&check], &EstimatorOptions::default())?;
     println!("with it: {:.2e} % off on the check run", percent(&after));
 
     let folder = std::env::temp_dir();
@@ -46,7 +46,7 @@ fn main() -> Outcome {
     write("spidermill-completed.toml", better.text())?;
     write(
         "what-the-model-lacks.html",
-        &report::page(&findings, &Words)?,
+        &report::page(&findings, &PlainAdvice)?,
     )
 }
 

@@ -9,16 +9,16 @@ use crate::model::Model;
 
 /// What is set of an effect.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Setting {
+pub struct EffectSetting {
     /// Symbol of a parameter or a constant of the kind.
     pub symbol: String,
     /// What is said of it.
-    pub said: Said,
+    pub value: SettingValue,
 }
 
 /// What is said of a symbol.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Said {
+pub enum SettingValue {
     /// Its value, or the nominal value of a parameter.
     Value(f64),
     /// The name of the parameter in the model file.
@@ -30,8 +30,8 @@ impl Model {
     /// byte for byte. Nothing is written.
     ///
     /// Fails when the file with the effects has no meaning: an unknown kind or place, a value that is missing, an effect twice.
-    pub fn with(&self, effects: &[NewEffect]) -> Outcome<Model> {
-        let added = added::add(self, effects)?;
+    pub fn with_added_effects(&self, effects: &[NewEffect]) -> Outcome<Model> {
+        let added = added::add_entries(self, effects)?;
         Ok(self
             .host()
             .derive(&self.path, added.loaded)?
@@ -47,7 +47,7 @@ pub fn new_effect(
     kinds: &[EffectKind],
     kind: &str,
     at: &[String],
-    settings: &[Setting],
+    settings: &[EffectSetting],
 ) -> Outcome<NewEffect> {
     let mut effect = NewEffect {
         kind: kind.to_owned(),
@@ -71,18 +71,18 @@ pub fn new_effect(
                 effect.parameters.len() - 1
             });
             let parameter = &mut effect.parameters[at];
-            match &setting.said {
-                Said::Value(value) => parameter.nominal = Some(*value),
-                Said::Name(name) => parameter.name = Some(name.clone()),
+            match &setting.value {
+                SettingValue::Value(value) => parameter.nominal = Some(*value),
+                SettingValue::Name(name) => parameter.name = Some(name.clone()),
             }
             continue;
         }
-        match (&setting.said, constants.contains(&symbol)) {
-            (Said::Value(value), true) => {
+        match (&setting.value, constants.contains(&symbol)) {
+            (SettingValue::Value(value), true) => {
                 effect.constants.retain(|(known, _)| known != symbol);
                 effect.constants.push((symbol.to_owned(), *value));
             }
-            (Said::Name(_), true) => {
+            (SettingValue::Name(_), true) => {
                 return Err(Error::input(format!(
                     "{symbol}.name: `{symbol}` is a constant of `{}`, which has a value and no name",
                     kind.name

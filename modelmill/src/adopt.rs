@@ -3,24 +3,24 @@
 //! A fit of physical parameters (`identify --physical`) becomes values of parameters, which bodies can have; any other one
 //! becomes values of base parameters, which say nothing of single bodies.
 
-use modelmill_identify::{FitFile, Note, Status};
-use modelmill_spec::Loaded;
-use modelmill_spec::edit::{Adopted, adopt};
+use modelmill_identify::{FitFile, RecordingNote, ParameterStatus};
+use modelmill_spec::LoadedModel;
+use modelmill_spec::edit::{AdoptedValues, write_identified};
 
 use crate::error::{Error, Outcome};
 use crate::model::Model;
 use crate::text::table::count;
 
 /// A model file with the values of a fit.
-pub struct Adoption {
+pub struct FitAdoption {
     /// Its text.
     pub text: String,
     /// What it means now.
-    pub loaded: Loaded,
+    pub loaded: LoadedModel,
     /// What was written.
-    pub adopted: Adopted,
+    pub adopted: AdoptedValues,
     /// What there is to know about the values.
-    pub notes: Vec<Note>,
+    pub notes: Vec<RecordingNote>,
 }
 
 impl Model {
@@ -28,26 +28,26 @@ impl Model {
     /// else stays as it is, byte for byte. `file` is what messages call the fit.
     ///
     /// Fails when the fit is one of another model.
-    pub fn adopt(&self, fit: &FitFile, file: &str) -> Outcome<Adoption> {
+    pub fn adopt(&self, fit: &FitFile, file: &str) -> Outcome<FitAdoption> {
         let values = self.values_of(fit, file)?;
         let mut notes = values.notes;
         let by_expression = self.derivation.base_parameters();
-        let mut adopted = Adopted {
+        let mut adopted = AdoptedValues {
             comment: format!(
                 "From {file}: {} from {}.",
                 count(fit.parameters.len(), "base parameter", "base parameters"),
                 count(fit.samples, "sample", "samples")
             ),
-            ..Adopted::default()
+            ..AdoptedValues::default()
         };
-        if fit.physical().is_empty() {
+        if fit.physical_parameters().is_empty() {
             let undetermined = fit.parameters.iter();
             let undetermined: Vec<&str> = undetermined
-                .filter(|p| p.status == Status::Undetermined)
+                .filter(|p| p.status == ParameterStatus::Undetermined)
                 .map(|p| p.name.as_str())
                 .collect();
             if !undetermined.is_empty() {
-                notes.push(Note::warning(format!(
+                notes.push(RecordingNote::warning(format!(
                     "{file} does not determine {}: the values that it took for them are written with the others.",
                     undetermined.join(", ")
                 )));
@@ -61,7 +61,7 @@ impl Model {
             }
         } else {
             let known = &self.derivation.mechanism.parameters;
-            for (name, value) in fit.physical() {
+            for (name, value) in fit.physical_parameters() {
                 if !known.iter().any(|parameter| parameter.name == name) {
                     return Err(Error::input(format!(
                         "{file}: the model has no parameter `{name}`; identify this model again"
@@ -70,10 +70,10 @@ impl Model {
                 adopted.parameters.push((name, value));
             }
         }
-        let text = adopt(self.text(), &adopted)
+        let text = write_identified(self.text(), &adopted)
             .map_err(|says| Error::input(format!("{}: {says}", self.path)))?;
         let loaded = self.host().load_text(self.path.as_ref(), &text)?;
-        Ok(Adoption {
+        Ok(FitAdoption {
             text,
             loaded,
             adopted,

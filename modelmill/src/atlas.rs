@@ -5,8 +5,8 @@
 
 use std::fmt::Write as _;
 
-use modelmill_codegen::{Method, OperationCount, Stage};
-use modelmill_spec::{Exact, Loaded, Mechanism, Motion};
+use modelmill_codegen::{ReductionMethod, OperationCount, ProgramStage};
+use modelmill_spec::{ExactExpression, LoadedModel, Mechanism, CoordinateMotion};
 
 use crate::error::Outcome;
 use crate::model::Model;
@@ -14,7 +14,7 @@ use crate::text::table::{count, significant};
 
 /// What the atlas says of a mechanism.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Entry {
+pub struct AtlasEntry {
     /// The model's name; files of the atlas are called so.
     pub name: String,
     /// Its title.
@@ -49,32 +49,32 @@ impl Model {
     /// What the atlas says of this model; `seconds` is how long it took to derive, if that was measured.
     ///
     /// Fails where a variant of it (without gravity, without effects) cannot be derived.
-    pub fn atlas(&self, seconds: Option<f64>) -> Outcome<Entry> {
+    pub fn atlas(&self, seconds: Option<f64>) -> Outcome<AtlasEntry> {
         let derivation = &self.derivation;
         let mechanism = &derivation.mechanism;
         let mut bodies = mechanism.clone();
         bodies.effects.clear();
         bodies.retain.clear();
         let mut weightless = bodies.clone();
-        weightless.gravity = std::array::from_fn(|_| Exact::Sum(Vec::new()));
+        weightless.gravity = std::array::from_fn(|_| ExactExpression::Sum(Vec::new()));
         let general = if mechanism.effects.is_empty() {
             self.clone()
         } else {
-            self.variant(bodies)?
+            self.derive_variant(bodies)?
         };
-        let base = [&general, &self.variant(weightless)?].map(|m| m.base.len());
-        let at_values = general.check()?.rank.map_or(0, |rank| rank.shown.rank);
-        let of = |motion: Motion| {
+        let base = [&general, &self.derive_variant(weightless)?].map(|m| m.base.len());
+        let at_values = general.check()?.rank.map_or(0, |rank| rank.numeric_rank.rank);
+        let of = |motion: CoordinateMotion| {
             let coordinates = mechanism.coordinates.iter();
             coordinates.filter(|c| c.motion == motion).count()
         };
-        let free = of(Motion::QuaternionScalar);
+        let free = of(CoordinateMotion::QuaternionScalar);
         let programs = &derivation.programs;
-        Ok(Entry {
+        Ok(AtlasEntry {
             name: self.name.clone(),
             title: mechanism.title.clone().unwrap_or_default(),
             // The position of a free body is no joint.
-            joints: [of(Motion::Revolute), of(Motion::Prismatic) - 3 * free],
+            joints: [of(CoordinateMotion::Revolute), of(CoordinateMotion::Prismatic) - 3 * free],
             free,
             passive: mechanism.coordinates.iter().filter(|c| c.passive).count(),
             loops: mechanism.loops.len(),
@@ -82,11 +82,11 @@ impl Model {
                 + mechanism.shared_drives.len(),
             base,
             at_values,
-            is_exact: matches!(derivation.reduction.method, Method::Exact { .. }),
+            is_exact: matches!(derivation.reduction.method, ReductionMethod::Exact { .. }),
             effects: [mechanism.effects.len(), derivation.reduction.retained.len()],
             operations: [
-                programs.regressor.count(Stage::State),
-                programs.inverse_dynamics.count(Stage::State),
+                programs.regressor.count_operations(ProgramStage::State),
+                programs.inverse_dynamics.count_operations(ProgramStage::State),
             ],
             seconds,
             is_imported: false,
@@ -94,14 +94,14 @@ impl Model {
     }
 
     /// The base parameters as a page of the atlas: expressions, with the values of the file, beside the picture.
-    pub fn atlas_page(&self, entry: &Entry) -> String {
+    pub fn atlas_page(&self, entry: &AtlasEntry) -> String {
         let mut text = format!(
             "# {}\n\n{}.\n\n![{}]({}.svg)\n\n{}.\n\n## Base parameters, eq. (16)\n\n| | expression | value | unit |\n|---|---|---:|---|\n",
             entry.name,
             entry.title,
             entry.name,
             entry.name,
-            entry.in_words(),
+            entry.summary_text(),
         );
         for (base, value) in self.base.iter().zip(&self.nominal) {
             let _ = writeln!(
@@ -118,15 +118,15 @@ impl Model {
     }
 
     /// The same model of another mechanism.
-    fn variant(&self, mechanism: Mechanism) -> Outcome<Self> {
-        let mut loaded = Loaded::clone(&self.loaded);
+    fn derive_variant(&self, mechanism: Mechanism) -> Outcome<Self> {
+        let mut loaded = LoadedModel::clone(&self.loaded);
         loaded.mechanism = mechanism;
         self.host().derive(&self.path, loaded)
     }
 }
 
-impl Entry {
-    pub(crate) fn in_words(&self) -> String {
+impl AtlasEntry {
+    pub(crate) fn summary_text(&self) -> String {
         let [turning, sliding] = self.joints;
         let mut parts = Vec::new();
         for (n, one, many) in [
@@ -199,7 +199,7 @@ pub(crate) const ABOUT: [&str; 2] = [
 ];
 
 /// The atlas as a page in Markdown; pictures and pages of the mechanisms stand in the folder `atlas` beside it.
-pub fn page(entries: &[Entry]) -> String {
+pub fn page(entries: &[AtlasEntry]) -> String {
     let mut text = format!(
         "# Atlas of mechanisms\n\n{}\n\n\
         | | mechanism | joints | passive | loops | drives | general | weightless | at values | with effects | regressor | \

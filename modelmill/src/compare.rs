@@ -1,52 +1,52 @@
 //! `compare`: how far a model is off along recordings, and where the error lives.
 
 use modelmill_identify::{
-    BandError, Comparison, Figures, FilteredFigures, LocateOptions, Note, Region, TIME_COLUMN,
-    in_band, locate,
+    BandError, ErrorAccumulator, ErrorFigures, FilteredFigures, LocateOptions, RecordingNote, ErrorRegion, TIME_COLUMN,
+    add_filtered_forces, locate_errors,
 };
 
-use crate::along::{self, interleaved, variables};
+use crate::along::{self, interleave, variables};
 use crate::error::Outcome;
 use crate::model::Model;
-use crate::recording::{self, Recording};
-use crate::stretch::Stretch;
+use crate::recording::{self, PreparedRecording};
+use crate::stretch::RecordingSegment;
 
 /// How far a model is off along recordings.
-pub struct Compared {
+pub struct ModelComparison {
     /// What the JSON calls the model.
     pub model: String,
     /// Names of the stretches, in order.
     pub files: Vec<String>,
     /// Error figures, in all and for each drive.
-    pub figures: Figures,
+    pub figures: ErrorFigures,
     /// Where the error lives.
-    pub places: Places,
+    pub places: ErrorLocations,
     /// Remarks on the recordings.
-    pub notes: Vec<Note>,
+    pub notes: Vec<RecordingNote>,
 }
 
 impl Model {
     /// Holds the model against recordings; `values` are those of its base parameters, in its order and their units.
     ///
     /// Fails when a recording lacks the force of a drive, or leads where the mechanism cannot stand.
-    pub fn compare(&self, recordings: &[&Recording], values: &[f64]) -> Outcome<Compared> {
-        let [data, _] = recording::stretches(self, recordings, &[]);
+    pub fn compare(&self, recordings: &[&PreparedRecording], values: &[f64]) -> Outcome<ModelComparison> {
+        let [data, _] = recording::segments(self, recordings, &[]);
         let forces = data
             .iter()
             .map(|one| along::forces(self, one, values))
             .collect::<Outcome<Vec<_>>>()?;
         let figures = figures(self, &data, &forces, band(&data))?;
-        let measured = (data.iter().map(along::measured)).collect::<Outcome<Vec<_>>>()?;
+        let measured = (data.iter().map(along::measured_forces)).collect::<Outcome<Vec<_>>>()?;
         let forces = (forces.into_iter().zip(&data))
-            .map(|(forces, one)| along::decimated(forces, one))
+            .map(|(forces, one)| along::filter_and_decimate(forces, one))
             .collect::<Outcome<Vec<_>>>()?;
-        Ok(Compared {
+        Ok(ModelComparison {
             model: self.name.clone(),
             files: data.iter().map(|one| one.run.file.clone()).collect(),
             figures,
-            places: places(self, &data, &measured, &forces)?,
+            places: error_locations(self, &data, &measured, &forces)?,
             notes: {
-                let notes = data.iter().flat_map(Stretch::notes).cloned();
+                let notes = data.iter().flat_map(RecordingSegment::notes).cloned();
                 self.caution().into_iter().chain(notes).collect()
             },
         })
@@ -54,7 +54,7 @@ impl Model {
 }
 
 /// Up to which frequency forces along some recordings are compared, Hz: the lowest of their bands.
-pub fn band(data: &[Stretch]) -> Option<f64> {
+pub fn band(data: &[RecordingSegment]) -> Option<f64> {
     let bands = data.iter().filter_map(|one| one.run.prepared.band_hz);
     bands.reduce(f64::min)
 }
@@ -63,26 +63,26 @@ pub fn band(data: &[Stretch]) -> Option<f64> {
 /// model's, `[drive][sample]` for each.
 pub fn figures(
     model: &Model,
-    data: &[Stretch],
+    data: &[RecordingSegment],
     forces: &[Vec<Vec<f64>>],
     band_hz: Option<f64>,
-) -> Outcome<Figures> {
+) -> Outcome<ErrorFigures> {
     let mut raw = comparison(model);
     for (one, forces) in data.iter().zip(forces) {
-        let measured = one.run.measured()?;
+        let measured = one.run.measured_forces()?;
         raw.add_counted(
-            &interleaved(measured),
-            &interleaved(forces),
-            |sample, drive| one.run.counts(drive, sample),
+            &interleave(measured),
+            &interleave(forces),
+            |sample, drive| one.run.is_force_measured(drive, sample),
         )?;
     }
     let mut figures = raw.finish()?;
     figures.band = band_hz.and_then(|band_hz| {
         let mut filtered = comparison(model);
         for (one, forces) in data.iter().zip(forces) {
-            let measured = one.run.measured().ok()?;
+            let measured = one.run.measured_forces().ok()?;
             // A stretch that is too short for the filter has no samples left between its ends.
-            match in_band(&mut filtered, &one.run.time, measured, forces, band_hz) {
+            match add_filtered_forces(&mut filtered, &one.run.time, measured, forces, band_hz) {
                 Ok(()) | Err(BandError::Filter(_)) => {}
                 Err(BandError::Figures(_)) => return None,
             }
@@ -96,7 +96,7 @@ pub fn figures(
 /// Error figures of the rows that a fit was made from, where the parallel filter made fewer of them.
 pub fn figures_of_rows(
     model: &Model,
-    data: &[Stretch],
+    data: &[RecordingSegment],
     forces: &[Vec<Vec<f64>>],
 ) -> Outcome<Option<FilteredFigures>> {
     let Some(first) = data.iter().find(|one| one.decimation() > 1) else {
@@ -104,19 +104,19 @@ pub fn figures_of_rows(
     };
     let mut rows = comparison(model);
     for (one, forces) in data.iter().zip(forces) {
-        let measured = along::measured(one)?;
-        let forces = along::decimated(forces.clone(), one)?;
-        rows.add(&interleaved(&measured), &interleaved(&forces))?;
+        let measured = along::measured_forces(one)?;
+        let forces = along::filter_and_decimate(forces.clone(), one)?;
+        rows.add(&interleave(&measured), &interleave(&forces))?;
     }
-    let passed = along::passed_by_decimation(first);
+    let passed = along::decimation_passband(first);
     Ok(Some(FilteredFigures::new(passed, &rows.finish()?)))
 }
 
 /// A comparison of the model's drives, without samples yet.
-fn comparison(model: &Model) -> Comparison {
+fn comparison(model: &Model) -> ErrorAccumulator {
     let drives = model.drives();
     let units = (0..drives.len()).map(|d| model.force_unit(d).to_owned());
-    Comparison::new(drives.clone()).with_units(units)
+    ErrorAccumulator::new(drives.clone()).with_units(units)
 }
 
 /// Errors below this fraction of the measured force are rounding of the numbers in the recording; where they sit says
@@ -124,9 +124,9 @@ fn comparison(model: &Model) -> Comparison {
 pub const ROUNDING: f64 = 1e-6;
 
 /// Where errors live.
-pub struct Places {
+pub struct ErrorLocations {
     /// Regions that hold more than their share.
-    pub regions: Vec<Region>,
+    pub regions: Vec<ErrorRegion>,
     /// Drives whose error is so small that it was not looked at.
     pub rounding: Vec<String>,
 }
@@ -134,12 +134,12 @@ pub struct Places {
 /// Regions of coordinates, rates, loads and time that hold more than their share of the error.
 ///
 /// With several recordings, time is looked at in each of them on its own.
-pub fn places(
+pub fn error_locations(
     model: &Model,
-    data: &[Stretch],
+    data: &[RecordingSegment],
     measured: &[Vec<Vec<f64>>],
     forces: &[Vec<Vec<f64>>],
-) -> Outcome<Places> {
+) -> Outcome<ErrorLocations> {
     let mut rounding = Vec::new();
     let mut drives = Vec::new();
     for (d, drive) in model.drives().into_iter().enumerate() {
@@ -150,7 +150,7 @@ pub fn places(
         }
     }
     if drives.is_empty() {
-        return Ok(Places {
+        return Ok(ErrorLocations {
             regions: Vec::new(),
             rounding,
         });
@@ -170,7 +170,7 @@ pub fn places(
         } else {
             for (d, drive) in &drives {
                 let error = errors_of(k, *d);
-                let mut found = locate(
+                let mut found = locate_errors(
                     &[(drive, &error)],
                     &[(TIME_COLUMN, &time)],
                     &LocateOptions::default(),
@@ -203,11 +203,11 @@ pub fn places(
         .collect();
     let mut regions = model
         .host()
-        .watched("looking where the error lives", 0, |_| {
-            locate(&errors, &variables, &LocateOptions::default())
+        .run_job("looking where the error lives", 0, |_| {
+            locate_errors(&errors, &variables, &LocateOptions::default())
         })?;
     regions.extend(in_time);
-    Ok(Places { regions, rounding })
+    Ok(ErrorLocations { regions, rounding })
 }
 
 /// Whether the error of a drive is rounding beside its force.

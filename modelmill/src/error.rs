@@ -15,7 +15,7 @@ pub type Outcome<T = ()> = Result<T, Error>;
 #[non_exhaustive]
 pub enum Error {
     /// A model, rig or plan file has no meaning; every finding has its place.
-    Model(Box<modelmill_spec::Failure>),
+    Model(Box<modelmill_spec::LoadFailure>),
     /// The mechanism cannot be derived.
     Derivation {
         /// What messages call the model file.
@@ -79,8 +79,8 @@ impl fmt::Display for Error {
 
 impl std::error::Error for Error {}
 
-impl From<modelmill_spec::Failure> for Error {
-    fn from(failure: modelmill_spec::Failure) -> Self {
+impl From<modelmill_spec::LoadFailure> for Error {
+    fn from(failure: modelmill_spec::LoadFailure) -> Self {
         Self::Model(Box::new(failure))
     }
 }

@@ -2,17 +2,17 @@
 
 use std::path::Path;
 
-use modelmill_codegen::Reactions;
+use modelmill_codegen::ReactionPrograms;
 
 use crate::along;
 use crate::error::{Error, Outcome};
 use crate::model::Model;
-use crate::recording::{self, Reading};
+use crate::recording::{self, RecordingOptions};
 use crate::text::csv::csv;
 
 /// Columns of numbers along a recording.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Evaluated {
+pub struct RecordingEvaluation {
     /// Times of the samples that are kept, s.
     pub time: Vec<f64>,
     /// Names and values of the columns, N or N m.
@@ -29,13 +29,13 @@ impl Model {
     pub fn evaluate(
         &self,
         path: impl AsRef<Path>,
-        reading: &Reading,
+        reading: &RecordingOptions,
         values: &[f64],
-    ) -> Outcome<Evaluated> {
-        let mut found = Evaluated::new(self.drives(), Vec::new());
+    ) -> Outcome<RecordingEvaluation> {
+        let mut found = RecordingEvaluation::new(self.drives(), Vec::new());
         for stretch in &recording::read_as_recorded(self, path.as_ref(), reading)? {
             let forces = along::forces(self, stretch, values)?;
-            found.extend(&stretch.time(), along::decimated(forces, stretch)?);
+            found.extend(&stretch.time(), along::filter_and_decimate(forces, stretch)?);
         }
         Ok(found)
     }
@@ -47,12 +47,12 @@ impl Model {
     pub fn evaluate_reactions(
         &self,
         path: impl AsRef<Path>,
-        reading: &Reading,
-    ) -> Outcome<Evaluated> {
+        reading: &RecordingOptions,
+    ) -> Outcome<RecordingEvaluation> {
         let derived = self.derivation.reactions();
         let reactions = derived.map_err(|error| Error::derivation(&self.path, error))?;
-        let components = components(&reactions);
-        let mut found = Evaluated::new(components.determined, components.left_out);
+        let components = reaction_components(&reactions);
+        let mut found = RecordingEvaluation::new(components.determined, components.left_out);
         for stretch in &recording::read_as_recorded(self, path.as_ref(), reading)? {
             found.extend(
                 &stretch.time(),
@@ -63,7 +63,7 @@ impl Model {
     }
 }
 
-impl Evaluated {
+impl RecordingEvaluation {
     fn new(names: Vec<String>, left_out: Vec<String>) -> Self {
         Self {
             time: Vec::new(),
@@ -89,14 +89,14 @@ impl Evaluated {
 }
 
 /// Names of the components of all reactions, such as `elbow.Fx`, `elbow.Mz`, and of a loop `closure.Fx`.
-pub(crate) struct Components {
+pub(crate) struct ReactionComponents {
     /// Those that equations of motion determine, in the order of the program's outputs.
     pub(crate) determined: Vec<String>,
     pub(crate) left_out: Vec<String>,
 }
 
-pub(crate) fn components(reactions: &Reactions) -> Components {
-    let mut found = Components {
+pub(crate) fn reaction_components(reactions: &ReactionPrograms) -> ReactionComponents {
+    let mut found = ReactionComponents {
         determined: Vec::new(),
         left_out: Vec::new(),
     };

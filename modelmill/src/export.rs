@@ -1,7 +1,7 @@
 //! `export`: a model as a robot description of other programs.
 
-use modelmill_identify::{FitFile, Note};
-use modelmill_spec::Loaded;
+use modelmill_identify::{FitFile, RecordingNote};
+use modelmill_spec::LoadedModel;
 
 pub use modelmill_reduction::ExportFormat as Format;
 
@@ -10,22 +10,22 @@ use crate::model::Model;
 
 /// A robot description that was made of a model.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Exported {
+pub struct ExportedRobot {
     /// Its text.
     pub text: String,
     /// What the format does not say, and what no body can be.
-    pub notes: Vec<Note>,
+    pub notes: Vec<RecordingNote>,
 }
 
 /// Writes a model file that was read from `path` with its nominal values as a URDF or MJCF. Nothing is derived for it.
 ///
 /// Fails when the format does not know how a joint or a lumped mass of the model is.
-pub fn description(path: &str, loaded: &Loaded, format: Format) -> Outcome<Exported> {
+pub fn description(path: &str, loaded: &LoadedModel, format: DescriptionFormat) -> Outcome<ExportedRobot> {
     let exported = modelmill_reduction::export(&loaded.mechanism, format)
         .map_err(|error| Error::input(format!("{path}: {error}")))?;
-    Ok(Exported {
+    Ok(ExportedRobot {
         text: exported.text,
-        notes: exported.remarks.into_iter().map(Note::warning).collect(),
+        notes: exported.remarks.into_iter().map(RecordingNote::warning).collect(),
     })
 }
 
@@ -34,11 +34,11 @@ impl Model {
     /// what messages call it.
     ///
     /// Fails when a fit has base parameters only, since these say nothing of single bodies, and as [`description`] does.
-    pub fn export(&self, format: Format, fit: Option<(&FitFile, &str)>) -> Outcome<Exported> {
+    pub fn export(&self, format: DescriptionFormat, fit: Option<(&FitFile, &str)>) -> Outcome<ExportedRobot> {
         let Some((fit, file)) = fit else {
             return description(&self.path, &self.loaded, format);
         };
-        if fit.physical().is_empty() {
+        if fit.physical_parameters().is_empty() {
             return Err(Error::input(format!(
                 "{file} has base parameters only, and simulators need ten numbers of every body; identify with option `physical`"
             )));

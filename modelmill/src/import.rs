@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use modelmill_identify::Note;
+use modelmill_identify::RecordingNote;
 
 pub use modelmill_reduction::{ImportOptions as Options, ImportedJoint};
 
@@ -14,13 +14,13 @@ const LARGEST_DESCRIPTION: u64 = modelmill_reduction::LARGEST_DESCRIPTION as u64
 
 /// A model file that was made of a robot description.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Imported {
+pub struct ImportedRobot {
     /// The text of the model file.
     pub model: String,
     /// Joints of the description that move, with the coordinates of the model.
     pub joints: Vec<ImportedJoint>,
     /// What was left out or rounded.
-    pub notes: Vec<Note>,
+    pub notes: Vec<RecordingNote>,
 }
 
 impl Host {
@@ -29,7 +29,7 @@ impl Host {
     /// includes are read beside it.
     ///
     /// Fails when the text is none of these formats, or describes what a model file cannot.
-    pub fn import(&self, name: &str, text: &str, options: &Options) -> Outcome<Imported> {
+    pub fn import(&self, name: &str, text: &str, options: &Options) -> Outcome<ImportedRobot> {
         let read = |file: &str| {
             let path = Path::new(name).with_file_name(file);
             let text = self.files().read_text(&path, LARGEST_DESCRIPTION);
@@ -39,11 +39,11 @@ impl Host {
             .map_err(|fault| Error::input(format!("{name}: {fault}")))?;
         let imported = modelmill_reduction::import(&text, options)
             .map_err(|error| Error::input(format!("{name}: {error}")))?;
-        let notes: Vec<Note> = imported.remarks.into_iter().map(Note::warning).collect();
+        let notes: Vec<RecordingNote> = imported.remarks.into_iter().map(RecordingNote::warning).collect();
         for note in &notes {
             self.note(note);
         }
-        Ok(Imported {
+        Ok(ImportedRobot {
             joints: imported.joints,
             model: imported.model,
             notes,

@@ -1,9 +1,9 @@
 //! `interpret`: physical parameters from identified base parameters, the others held at their nominal values.
 
 use modelmill_identify::interpret::{
-    Interpretation, Physical, Polynomial, System, exact, interpret,
+    PhysicalInterpretation, PhysicalSolution, Polynomial, InterpretationProblem, exact_decimal, interpret,
 };
-use modelmill_identify::{Direction, FitFile, Note, Status};
+use modelmill_identify::{NullDirection, FitFile, RecordingNote, ParameterStatus};
 use modelmill_spec::Sign;
 
 use crate::error::{Error, Outcome};
@@ -11,7 +11,7 @@ use crate::model::Model;
 use crate::text::table::{count, number};
 
 /// Physical parameters that were solved for.
-pub struct Interpreted {
+pub struct InterpretationResult {
     /// The model.
     pub model: Model,
     /// Indices of the unknown parameters.
@@ -19,9 +19,9 @@ pub struct Interpreted {
     /// Base parameters that hold unknowns.
     pub used: Vec<usize>,
     /// All real solutions, or what is not determined.
-    pub found: Interpretation,
+    pub found: PhysicalInterpretation,
     /// Remarks.
-    pub notes: Vec<Note>,
+    pub notes: Vec<RecordingNote>,
 }
 
 impl Model {
@@ -30,24 +30,24 @@ impl Model {
     ///
     /// Fails when a name is none of the model's parameters, when the fit belongs to another model, or when the equations
     /// are too many to be solved exactly.
-    pub fn interpret(&self, fit: &FitFile, file: &str, unknown: &[String]) -> Outcome<Interpreted> {
-        let unknown = self::unknown(self, unknown)?;
+    pub fn interpret(&self, fit: &FitFile, file: &str, unknown: &[String]) -> Outcome<InterpretationResult> {
+        let unknown = self::unknown_indices(self, unknown)?;
         let values = self.values_of(fit, file)?;
         let (system, used) = system(self, &unknown, &values.values, fit);
         let found = self
             .host()
-            .watched("solving for the unknown parameters", 0, |_| {
+            .run_job("solving for the unknown parameters", 0, |_| {
                 interpret(&system)
             })?
             .map_err(|error| Error::input(format!("{}: {error}", self.path)))?;
-        let mut interpreted = Interpreted {
+        let mut interpreted = InterpretationResult {
             model: self.clone(),
             unknown,
             used,
             found,
             notes: values.notes,
         };
-        let remarks = interpreted.remarks(fit).into_iter().map(Note::warning);
+        let remarks = interpreted.remarks(fit).into_iter().map(RecordingNote::warning);
         interpreted.notes.extend(remarks);
         for note in &interpreted.notes {
             self.host().note(note);
@@ -57,7 +57,7 @@ impl Model {
 }
 
 /// Indices of the unknown parameters, in the order in which they are asked for.
-pub fn unknown(model: &Model, names: &[String]) -> Outcome<Vec<usize>> {
+pub fn unknown_indices(model: &Model, names: &[String]) -> Outcome<Vec<usize>> {
     let parameters = &model.derivation.mechanism.parameters;
     let mut found = Vec::new();
     for name in names.iter().map(|name| name.trim()) {
@@ -85,13 +85,13 @@ pub fn system(
     unknown: &[usize],
     values: &[f64],
     fit: &FitFile,
-) -> (System, Vec<usize>) {
+) -> (InterpretationProblem, Vec<usize>) {
     let mechanism = &model.derivation.mechanism;
-    let constants: Vec<_> = mechanism.constants.iter().map(|c| exact(c.value)).collect();
+    let constants: Vec<_> = mechanism.constants.iter().map(|c| exact_decimal(c.value)).collect();
     let nominal: Vec<_> = mechanism
         .parameters
         .iter()
-        .map(|p| exact(p.nominal))
+        .map(|p| exact_decimal(p.nominal))
         .collect();
     let mut equations = Vec::new();
     for terms in model.derivation.base_polynomials(&constants) {
@@ -113,7 +113,7 @@ pub fn system(
         equations.push(equation);
     }
     let used: Vec<usize> = (0..equations.len())
-        .filter(|k| (0..unknown.len()).any(|i| equations[*k].mentions(i)))
+        .filter(|k| (0..unknown.len()).any(|i| equations[*k].has_unknown(i)))
         .collect();
     // Positions in the fit's own order.
     let at: Vec<usize> = used
@@ -123,7 +123,7 @@ pub fn system(
             fit.parameters.iter().position(|p| p.name == *name)
         })
         .collect();
-    let system = System {
+    let system = InterpretationProblem {
         equations: used.iter().map(|k| equations[*k].clone()).collect(),
         values: used.iter().map(|k| values[*k]).collect(),
         covariance: fit.covariance_of(&at).map(|(covariance, _)| covariance),
@@ -135,7 +135,7 @@ pub fn system(
     (system, used)
 }
 
-impl Interpreted {
+impl InterpretationResult {
     /// Names of the unknown parameters.
     pub fn names(&self) -> Vec<String> {
         let parameters = &self.model.derivation.mechanism.parameters;
@@ -144,24 +144,24 @@ impl Interpreted {
     }
 
     /// All real solutions; none where something is not determined.
-    pub fn solutions(&self) -> &[Physical] {
+    pub fn solutions(&self) -> &[PhysicalSolution] {
         match &self.found {
-            Interpretation::Exact { solutions }
-            | Interpretation::LeastSquares { solutions, .. } => solutions,
-            Interpretation::Undetermined { .. } => &[],
+            PhysicalInterpretation::Exact { solutions }
+            | PhysicalInterpretation::LeastSquares { solutions, .. } => solutions,
+            PhysicalInterpretation::Undetermined { .. } => &[],
         }
     }
 
     /// Directions in which the unknowns may change without any effect.
-    pub fn directions(&self) -> &[Direction] {
+    pub fn directions(&self) -> &[NullDirection] {
         match &self.found {
-            Interpretation::Undetermined { directions, .. } => directions,
+            PhysicalInterpretation::Undetermined { directions, .. } => directions,
             _ => &[],
         }
     }
 
     /// What is not determined, in words.
-    pub(crate) fn undetermined(&self) -> Vec<String> {
+    pub(crate) fn undetermined_directions(&self) -> Vec<String> {
         let names = self.names();
         let directions = self.directions().iter();
         directions
@@ -176,7 +176,7 @@ impl Interpreted {
     }
 
     /// Why a value cannot be, if it cannot.
-    pub(crate) fn objection(&self, i: usize, value: f64) -> Option<&'static str> {
+    pub(crate) fn sign_violation(&self, i: usize, value: f64) -> Option<&'static str> {
         match self.model.sign_of(self.unknown[i]) {
             Sign::Positive if value < 0.0 => Some("must not be negative"),
             Sign::Negative if value > 0.0 => Some("must not be positive"),
@@ -197,7 +197,7 @@ impl Interpreted {
             .collect();
         let undetermined: Vec<&str> = used
             .iter()
-            .filter(|p| p.status == Status::Undetermined)
+            .filter(|p| p.status == ParameterStatus::Undetermined)
             .map(|p| p.name.as_str())
             .collect();
         if !undetermined.is_empty() {
@@ -217,7 +217,7 @@ impl Interpreted {
                 );
             }
         }
-        if let (Interpretation::LeastSquares { .. }, Some(best)) =
+        if let (PhysicalInterpretation::LeastSquares { .. }, Some(best)) =
             (&self.found, self.solutions().first())
             && let Some(chi_squared) = best.chi_squared
         {

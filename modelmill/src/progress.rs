@@ -4,41 +4,41 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-use modelmill_identify::Note;
+use modelmill_identify::RecordingNote;
 
 use crate::error::{Error, Outcome};
 
 /// What a caller wants to hear while a verb works. All methods do nothing unless they are written.
-pub trait Progress: Send + Sync {
+pub trait ProgressListener: Send + Sync {
     /// A job begins. `total` counts its steps; 0 if nobody knows how many there are. `job` lives until the job ends, so
     /// that a watcher may look at it whenever it likes.
-    fn begins(&self, what: &str, total: usize, job: &Arc<Job>) {
+    fn on_job_start(&self, what: &str, total: usize, job: &Arc<JobHandle>) {
         let _ = (what, total, job);
     }
 
     /// The last job that began ends, whether it succeeded or not.
-    fn ends(&self) {}
+    fn on_job_end(&self) {}
 
     /// A remark that comes up on the way. The verb's result holds it as well.
-    fn notes(&self, note: &Note) {
+    fn on_note(&self, note: &RecordingNote) {
         let _ = note;
     }
 }
 
 /// Nobody listens.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Silent;
+pub struct SilentProgress;
 
-impl Progress for Silent {}
+impl ProgressListener for SilentProgress {}
 
 /// A job that goes on: how far it has come, and whether it is to stop.
 #[derive(Debug, Default)]
-pub struct Job {
+pub struct JobHandle {
     done: AtomicU64,
     is_cancelled: AtomicBool,
 }
 
-impl Job {
+impl JobHandle {
     /// Steps that are done.
     pub fn done(&self) -> u64 {
         self.done.load(Ordering::Relaxed)
@@ -80,26 +80,26 @@ impl Job {
 }
 
 /// Ends a job when it goes out of scope, also by an early return.
-struct Ending<'a>(&'a dyn Progress);
+struct JobGuard<'a>(&'a dyn ProgressListener);
 
-impl Drop for Ending<'_> {
+impl Drop for JobGuard<'_> {
     fn drop(&mut self) {
-        self.0.ends();
+        self.0.on_job_end();
     }
 }
 
 /// Runs a job while `progress` watches it.
 ///
 /// Fails with [`Error::Cancelled`] if somebody asked it to stop, whatever it found until then.
-pub(crate) fn watched<T>(
-    progress: &dyn Progress,
+pub(crate) fn run_job<T>(
+    progress: &dyn ProgressListener,
     what: &str,
     total: usize,
-    work: impl FnOnce(&Job) -> T,
+    work: impl FnOnce(&JobHandle) -> T,
 ) -> Outcome<T> {
-    let job = Arc::new(Job::default());
-    progress.begins(what, total, &job);
-    let ending = Ending(progress);
+    let job = Arc::new(JobHandle::default());
+    progress.on_job_start(what, total, &job);
+    let ending = JobGuard(progress);
     if job.is_cancelled() {
         return Err(Error::Cancelled);
     }
@@ -124,15 +124,15 @@ mod tests {
         stops: &'static str,
     }
 
-    impl Progress for Listener {
-        fn begins(&self, what: &str, total: usize, job: &Arc<Job>) {
+    impl ProgressListener for Listener {
+        fn on_job_start(&self, what: &str, total: usize, job: &Arc<JobHandle>) {
             self.heard.lock().unwrap().push(format!("{what} {total}"));
             if what == self.stops {
                 job.cancel();
             }
         }
 
-        fn ends(&self) {
+        fn on_job_end(&self) {
             self.heard.lock().unwrap().push("end".to_owned());
         }
     }
@@ -143,8 +143,8 @@ mod tests {
             stops: "long",
             ..Listener::default()
         };
-        assert!(matches!(watched(&listener, "short", 2, Job::done), Ok(0)));
-        let found = watched(&listener, "long", 0, |_| unreachable!("it was cancelled"));
+        assert!(matches!(run_job(&listener, "short", 2, JobHandle::done), Ok(0)));
+        let found = run_job(&listener, "long", 0, |_| unreachable!("it was cancelled"));
         assert!(matches!(found, Err::<(), _>(Error::Cancelled)));
         assert_eq!(
             *listener.heard.lock().unwrap(),

@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use modelmill_boundary::files::Memory;
-use modelmill_codegen::{Evaluator, States};
-use modelmill_reduction::{Reduction, sampled_forces};
-use modelmill_rig::{Rig, State};
+use modelmill_boundary::files::MemoryFiles;
+use modelmill_codegen::{ModelEvaluator, MotionStates};
+use modelmill_reduction::{PlanarReduction, sampled_forces};
+use modelmill_rig::{Rig, RigState};
 
 use crate::error::{Error, Outcome};
 use crate::host::Host;
@@ -14,13 +14,13 @@ use crate::host::Host;
 const POSES: (usize, f64) = (100, 0.2);
 
 /// A rig that was reduced to a planar model.
-pub struct Reduced {
+pub struct RigReduction {
     /// The rig's name.
     pub rig: String,
     /// The model file and the report of what was assumed.
-    pub reduction: Reduction,
+    pub reduction: PlanarReduction,
     /// How far the model's forces are from the rig's, drive by drive.
-    pub forces: Vec<Compared>,
+    pub forces: Vec<DriveForceError>,
     /// Poses at which they were held against each other.
     pub poses: usize,
 }
@@ -31,16 +31,16 @@ impl Host {
     ///
     /// Fails with every finding about rig and plan, each with its place, and where the mechanism is none that the reduction
     /// knows.
-    pub fn reduce(&self, path: &Path, plan: Option<&Path>) -> Outcome<Reduced> {
+    pub fn reduce(&self, path: &Path, plan: Option<&Path>) -> Outcome<RigReduction> {
         let loaded = self.rig(path)?;
         let made = match plan {
             Some(plan) => modelmill_reduction::plan_file_with(plan, self.files())?,
-            None => modelmill_reduction::plan_for(&loaded.rig)
+            None => modelmill_reduction::default_plan(&loaded.rig)
                 .map_err(|says| Error::input(format!("{}: {says}", path.display())))?,
         };
         let rig = made.rig(&loaded.rig);
         let reduction = self
-            .watched(&format!("reducing {}", rig.name), 0, |_| {
+            .run_job(&format!("reducing {}", rig.name), 0, |_| {
                 modelmill_reduction::reduce(rig, &made)
             })?
             .map_err(|failure| match plan {
@@ -51,10 +51,10 @@ impl Host {
                     failure.render(false).trim_end()
                 )),
             })?;
-        let forces = self.watched("holding the model against the rig", 0, |_| {
+        let forces = self.run_job("holding the model against the rig", 0, |_| {
             compare(rig, &reduction)
         })??;
-        Ok(Reduced {
+        Ok(RigReduction {
             rig: rig.name.clone(),
             reduction,
             forces,
@@ -65,7 +65,7 @@ impl Host {
 
 /// How far the forces of a drive are from the rig's.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Compared {
+pub struct DriveForceError {
     /// The drive.
     pub drive: String,
     /// Norm of the difference over that of the rig's force.
@@ -73,8 +73,8 @@ pub struct Compared {
 }
 
 /// The model's forces with its nominal values against the rig's own: two programs that share no mechanics.
-fn compare(rig: &Rig, reduction: &Reduction) -> Outcome<Vec<Compared>> {
-    let loaded = modelmill_spec::load("the reduced model", &reduction.model, &Memory::default())?;
+fn compare(rig: &Rig, reduction: &PlanarReduction) -> Outcome<Vec<DriveForceError>> {
+    let loaded = modelmill_spec::load("the reduced model", &reduction.model, &MemoryFiles::default())?;
     let derivation = modelmill_codegen::derive(&loaded.mechanism)
         .map_err(|error| Error::derivation("the reduced model", error))?;
     let mechanism = &derivation.mechanism;
@@ -91,7 +91,7 @@ fn compare(rig: &Rig, reduction: &Reduction) -> Outcome<Vec<Compared>> {
                 .position(|known| known.name == c.name)
         })
         .collect();
-    let column = |of: fn(&State) -> &Vec<f64>| -> Vec<Vec<f64>> {
+    let column = |of: fn(&RigState) -> &Vec<f64>| -> Vec<Vec<f64>> {
         order
             .iter()
             .map(|k| sampled.iter().map(|(state, _)| of(state)[*k]).collect())
@@ -104,13 +104,13 @@ fn compare(rig: &Rig, reduction: &Reduction) -> Outcome<Vec<Compared>> {
         .filter_map(|drive| rig.drives.iter().position(|known| known.name == drive.name))
         .map(|d| sampled.iter().map(|(_, forces)| forces[d]).collect())
         .collect();
-    let states = States {
+    let states = MotionStates {
         q: slices(&q),
         qd: slices(&qd),
         qdd: slices(&qdd),
         load: slices(&truth),
     };
-    let model = Evaluator::new(&derivation)
+    let model = ModelEvaluator::new(&derivation)
         .inverse_dynamics(&states, &derivation.nominal_base_values())
         .map_err(|fault| {
             Error::input(format!(
@@ -122,7 +122,7 @@ fn compare(rig: &Rig, reduction: &Reduction) -> Outcome<Vec<Compared>> {
         .drives
         .iter()
         .zip(model.iter().zip(&truth))
-        .map(|(drive, (model, truth))| Compared {
+        .map(|(drive, (model, truth))| DriveForceError {
             drive: drive.name.clone(),
             nrms: norm(&mut model.iter().zip(truth).map(|(x, y)| x - y))
                 / norm(&mut truth.iter().copied()),

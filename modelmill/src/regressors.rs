@@ -1,37 +1,37 @@
 //! Columns of a regressor along recordings, one after the other, each channel decimated alike.
 
-use modelmill_codegen::Evaluator;
-use modelmill_identify::diagnose::Column;
+use modelmill_codegen::ModelEvaluator;
+use modelmill_identify::diagnose::ForceColumn;
 
-use crate::along::decimated;
+use crate::along::filter_and_decimate;
 use crate::error::{Error, Outcome};
 use crate::model::Model;
-use crate::stretch::Stretch;
+use crate::stretch::RecordingSegment;
 
 /// Recordings, each with whether it is one of the check.
-pub(crate) type Runs<'a> = [(&'a Stretch, bool)];
+pub(crate) type SegmentList<'a> = [(&'a RecordingSegment, bool)];
 
 /// Columns of a regressor along all recordings.
 pub(crate) fn regressor(
-    all: &Runs<'_>,
-    evaluator: &Evaluator<'_>,
+    all: &SegmentList<'_>,
+    evaluator: &ModelEvaluator<'_>,
     model: &Model,
-) -> Outcome<Vec<Column>> {
+) -> Outcome<Vec<ForceColumn>> {
     regressor_of(all, evaluator, model, &|_| true)
 }
 
 /// The same of some columns only; the others are zero.
 pub(crate) fn regressor_of(
-    all: &Runs<'_>,
-    evaluator: &Evaluator<'_>,
+    all: &SegmentList<'_>,
+    evaluator: &ModelEvaluator<'_>,
     model: &Model,
     wanted: &dyn Fn(usize) -> bool,
-) -> Outcome<Vec<Column>> {
+) -> Outcome<Vec<ForceColumn>> {
     let n_drives = model.drives().len();
     let mut stacked: Vec<Option<Vec<f64>>> = Vec::new();
     let mut before = 0;
     for (one, _) in all {
-        let columns = moving(one, evaluator, model, wanted)?;
+        let columns = nonzero_columns(one, evaluator, model, wanted)?;
         stacked.resize(columns.len(), None);
         let (slots, mut columns): (Vec<_>, Vec<_>) = (stacked.iter_mut().zip(columns))
             .filter_map(|(slot, column)| Some((slot, column?)))
@@ -44,7 +44,7 @@ pub(crate) fn regressor_of(
                 *is_none = true;
             }
         }
-        let columns = decimated(columns, one)?.into_iter().zip(is_none);
+        let columns = filter_and_decimate(columns, one)?.into_iter().zip(is_none);
         for (slot, (mut column, is_none)) in slots.into_iter().zip(columns) {
             if is_none {
                 column.fill(f64::NAN);
@@ -58,7 +58,7 @@ pub(crate) fn regressor_of(
     }
     let n = stacked.len() / n_drives.max(1);
     // Drives are outermost.
-    let mut by_column = vec![Column::default(); n];
+    let mut by_column = vec![ForceColumn::default(); n];
     for (k, values) in stacked.into_iter().enumerate() {
         by_column[k % n].0.push(values);
     }
@@ -66,9 +66,9 @@ pub(crate) fn regressor_of(
 }
 
 /// Columns along one recording, drive by drive; `None` where they are zero throughout, as most are on most drives.
-fn moving(
-    one: &Stretch,
-    evaluator: &Evaluator<'_>,
+fn nonzero_columns(
+    one: &RecordingSegment,
+    evaluator: &ModelEvaluator<'_>,
     model: &Model,
     wanted: &dyn Fn(usize) -> bool,
 ) -> Outcome<Vec<Option<Vec<f64>>>> {
@@ -79,7 +79,7 @@ fn moving(
     let mut is_wanted: Vec<bool> = Vec::new();
     one.for_each_block(model, |states| {
         Ok::<_, Error>(
-            evaluator.regressor_blocks_of(states, wanted, |samples, block| {
+            evaluator.regressor_column_blocks(states, wanted, |samples, block| {
                 if columns.is_empty() {
                     let n = block.len() / n_drives;
                     columns.resize(block.len(), None);

@@ -2,29 +2,29 @@
 
 use std::path::Path;
 
-use modelmill_boundary::files::Kind;
-use modelmill_identify::{ReadOptions, Recording, RecordingFile};
-use modelmill_rig::{Rig, Run, Samples, SimulationError, Trajectory, TrajectoryError};
+use modelmill_boundary::files::PathKind;
+use modelmill_identify::{ReadOptions, SignalRecording, RecordingFile};
+use modelmill_rig::{Rig, RigRecording, CoordinateSamples, SimulationError, Trajectory, TrajectoryError};
 
 use crate::error::{Error, Outcome};
 use crate::host::Host;
 use crate::text::csv::csv;
 
 /// A run of a rig.
-pub struct Simulated {
+pub struct RigSimulation {
     /// The rig's name.
     pub rig: String,
     /// Names of its drives.
     pub drives: Vec<String>,
     /// What its sensors read: the columns by name, all of one length.
-    pub run: Run,
+    pub run: RigRecording,
     /// The seed of its noise.
     pub seed: u64,
     /// Remarks on the trajectory and the run.
     pub notes: Vec<String>,
 }
 
-impl Simulated {
+impl RigSimulation {
     /// Samples of the run.
     pub fn samples(&self) -> usize {
         self.run.columns.first().map_or(0, |(_, time)| time.len())
@@ -42,8 +42,8 @@ impl Host {
     /// Reads a rig file.
     ///
     /// Fails with every finding about it, each with its place.
-    pub fn rig(&self, path: &Path) -> Outcome<modelmill_rig::Loaded> {
-        if self.files().kind(path) == Kind::Folder {
+    pub fn rig(&self, path: &Path) -> Outcome<modelmill_rig::LoadedRig> {
+        if self.files().kind(path) == PathKind::Folder {
             return Err(Error::input(format!(
                 "{} is a folder; a rig file (TOML) is expected, such as those in model-spec/rigs",
                 path.display()
@@ -71,7 +71,7 @@ impl Host {
         trajectory: &Path,
         columns: &[(String, String)],
         seed: Option<u64>,
-    ) -> Outcome<Simulated> {
+    ) -> Outcome<RigSimulation> {
         let rig = self.rig(path)?.rig;
         let file = RecordingFile::open(self.files(), trajectory)?;
         let recording = file.read(&ReadOptions {
@@ -82,12 +82,12 @@ impl Host {
         let trajectory = self::trajectory(&rig, &recording, &mut notes)?;
         let steps = modelmill_rig::n_instants(&rig, &trajectory);
         let run = self
-            .watched(&format!("simulating {}", rig.name), steps, |job| {
+            .run_job(&format!("simulating {}", rig.name), steps, |job| {
                 modelmill_rig::simulate(&rig, &trajectory, seed, || job.add(1))
             })?
             .map_err(|error| refusal(&rig, path, &recording, &trajectory, &error))?;
         notes.extend(run.notes.iter().cloned());
-        Ok(Simulated {
+        Ok(RigSimulation {
             drives: rig.drives.iter().map(|drive| drive.name.clone()).collect(),
             seed: seed.unwrap_or(rig.seed),
             rig: rig.name,
@@ -98,9 +98,9 @@ impl Host {
 }
 
 /// The columns `t` and, per coordinate, its values and what there is of its derivatives.
-fn trajectory(rig: &Rig, recording: &Recording, notes: &mut Vec<String>) -> Outcome<Trajectory> {
+fn trajectory(rig: &Rig, recording: &SignalRecording, notes: &mut Vec<String>) -> Outcome<Trajectory> {
     let given = |name: String| -> Outcome<Option<Vec<f64>>> {
-        if recording.has(&name) {
+        if recording.has_column(&name) {
             Ok(Some(recording.column(&name)?.to_vec()))
         } else {
             Ok(None)
@@ -110,7 +110,7 @@ fn trajectory(rig: &Rig, recording: &Recording, notes: &mut Vec<String>) -> Outc
     let mut found = Vec::new();
     for coordinate in &rig.coordinates {
         let name = &coordinate.name;
-        let one = Samples {
+        let one = CoordinateSamples {
             q: recording.column(name)?.to_vec(),
             qd: given(format!("{name}_d"))?,
             qdd: given(format!("{name}_dd"))?,
@@ -152,7 +152,7 @@ fn trajectory(rig: &Rig, recording: &Recording, notes: &mut Vec<String>) -> Outc
 fn refusal(
     rig: &Rig,
     path: &Path,
-    recording: &Recording,
+    recording: &SignalRecording,
     trajectory: &Trajectory,
     error: &SimulationError,
 ) -> Error {
@@ -167,7 +167,7 @@ fn refusal(
     };
     let after = trajectory.time().partition_point(|t| t <= time);
     let line = recording.line(after.saturating_sub(1)).unwrap_or(0);
-    let state = trajectory.at(*time);
+    let state = trajectory.state_at(*time);
     let pose: Vec<String> = rig
         .coordinates
         .iter()

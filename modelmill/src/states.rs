@@ -4,11 +4,11 @@
 use std::ops::Range;
 use std::sync::OnceLock;
 
-use modelmill_codegen::{Dynamics, Evaluator, PoseFault, PoseReason, Reactions, States, vectors_c};
+use modelmill_codegen::{DynamicsPrograms, ModelEvaluator, PoseFault, PoseReason, ReactionPrograms, MotionStates, vectors_c};
 use rayon::prelude::*;
 
 use crate::error::{Error, Outcome};
-use crate::evaluate::components;
+use crate::evaluate::reaction_components;
 use crate::model::Model;
 
 /// States that are evaluated at once; large beside the preparation of a program, small beside the cache.
@@ -16,7 +16,7 @@ const CHUNK: usize = 4096;
 
 /// Numbers of many states, such as positions: a row for each state, a column for each coordinate or drive.
 #[derive(Clone, Copy, Debug)]
-pub struct Rows<'a> {
+pub struct StateMatrix<'a> {
     /// The numbers, as many as rows times columns.
     pub numbers: &'a [f64],
     /// How many there are of each state.
@@ -25,7 +25,7 @@ pub struct Rows<'a> {
     pub by_state: bool,
 }
 
-impl Rows<'_> {
+impl StateMatrix<'_> {
     fn len(&self) -> usize {
         self.numbers.len() / self.width.max(1)
     }
@@ -48,20 +48,20 @@ impl Rows<'_> {
 
 /// States, and the forces that go with them. What a function does not read may be left out.
 #[derive(Clone, Copy, Debug)]
-pub struct Given<'a> {
+pub struct StateSamples<'a> {
     /// Positions of the active coordinates, rad or m, in the order of [`Model::active`].
-    pub q: Rows<'a>,
+    pub q: StateMatrix<'a>,
     /// Rates, rad/s or m/s.
-    pub qd: Option<Rows<'a>>,
+    pub qd: Option<StateMatrix<'a>>,
     /// Accelerations, rad/s^2 or m/s^2.
-    pub qdd: Option<Rows<'a>>,
+    pub qdd: Option<StateMatrix<'a>>,
     /// Forces of the drives, N or N m: what forward dynamics starts from, and what effects by load depend on.
-    pub forces: Option<Rows<'a>>,
+    pub forces: Option<StateMatrix<'a>>,
 }
 
 /// A function of a state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Function {
+pub enum ModelFunction {
     /// Forces of the drives, N or N m.
     InverseDynamics,
     /// H_min of eq. (4): a row for each drive, a column for each base parameter.
@@ -77,9 +77,9 @@ pub enum Function {
     Reactions,
 }
 
-impl Function {
+impl ModelFunction {
     /// Whether rates, accelerations and forces are read.
-    fn reads(self) -> [bool; 3] {
+    fn required_inputs(self) -> [bool; 3] {
         match self {
             Self::InverseDynamics | Self::Regressor | Self::Reactions => [true, true, false],
             Self::MassMatrix => [false, false, false],
@@ -90,16 +90,16 @@ impl Function {
 }
 
 /// The functions of a model; what is derived for one of them is kept.
-pub struct Functions {
+pub struct ModelFunctions {
     model: Model,
-    dynamics: OnceLock<Dynamics>,
-    reactions: OnceLock<Reactions>,
+    dynamics: OnceLock<DynamicsPrograms>,
+    reactions: OnceLock<ReactionPrograms>,
 }
 
 impl Model {
     /// The model's functions at states that are given as numbers.
-    pub fn functions(&self) -> Functions {
-        Functions {
+    pub fn functions(&self) -> ModelFunctions {
+        ModelFunctions {
             model: self.clone(),
             dynamics: OnceLock::new(),
             reactions: OnceLock::new(),
@@ -108,33 +108,33 @@ impl Model {
 }
 
 /// What is made once for all states.
-struct Prepared<'a> {
-    evaluator: Evaluator<'a>,
-    dynamics: Option<&'a Dynamics>,
-    reactions: Option<&'a Reactions>,
+struct FunctionPrograms<'a> {
+    evaluator: ModelEvaluator<'a>,
+    dynamics: Option<&'a DynamicsPrograms>,
+    reactions: Option<&'a ReactionPrograms>,
 }
 
-impl Functions {
+impl ModelFunctions {
     /// Names of the components that [`Function::Reactions`] gives, such as `elbow.Fx`, and of those that equations of motion do
     /// not determine.
     ///
     /// Fails when reactions cannot be derived.
     pub fn reactions(&self) -> Outcome<(Vec<String>, Vec<String>)> {
-        let named = components(self.derived_reactions()?);
+        let named = reaction_components(self.derived_reactions()?);
         Ok((named.determined, named.left_out))
     }
 
     /// How many numbers a function has of one state: rows and columns, 1 column for a vector.
     ///
     /// Fails when the function cannot be derived.
-    pub fn shape(&self, function: Function) -> Outcome<[usize; 2]> {
-        let (active, drives) = (self.model.active().len(), self.model.drives().len());
+    pub fn shape(&self, function: ModelFunction) -> Outcome<[usize; 2]> {
+        let (active, drives) = (self.model.active_coordinates().len(), self.model.drives().len());
         Ok(match function {
-            Function::InverseDynamics => [drives, 1],
-            Function::Regressor => [drives, self.model.base.len()],
-            Function::MassMatrix => [active, active],
-            Function::Bias | Function::ForwardDynamics => [active, 1],
-            Function::Reactions => [self.reactions()?.0.len(), 1],
+            ModelFunction::InverseDynamics => [drives, 1],
+            ModelFunction::Regressor => [drives, self.model.base.len()],
+            ModelFunction::MassMatrix => [active, active],
+            ModelFunction::Bias | ModelFunction::ForwardDynamics => [active, 1],
+            ModelFunction::Reactions => [self.reactions()?.0.len(), 1],
         })
     }
 
@@ -143,8 +143,8 @@ impl Functions {
     ///
     /// Fails when something that the function reads is not given or has another length, and at the first state without an
     /// answer.
-    pub fn at(&self, function: Function, given: &Given<'_>, values: &[f64]) -> Outcome<Vec<f64>> {
-        let parts = self.parts(function, given)?;
+    pub fn evaluate_at(&self, function: ModelFunction, given: &StateSamples<'_>, values: &[f64]) -> Outcome<Vec<f64>> {
+        let parts = self.checked_inputs(function, given)?;
         if values.len() != self.model.base.len() {
             return Err(Error::input(format!(
                 "{} values of base parameters are given; the model has {}",
@@ -154,9 +154,9 @@ impl Functions {
         }
         let n = given.q.len();
         let width: usize = self.shape(function)?.iter().product();
-        let prepared = self.prepared(function)?;
+        let prepared = self.programs_for(function)?;
         let mut out = vec![0.0; n * width];
-        let chunk = if self.model.follows_loops() {
+        let chunk = if self.model.has_iterative_loops() {
             n.max(1)
         } else {
             CHUNK
@@ -177,7 +177,7 @@ impl Functions {
             return Ok(out);
         }
         let what = "evaluating states";
-        let found = self.model.host().watched(what, n, |job| {
+        let found = self.model.host().run_job(what, n, |job| {
             let chunks = out.par_chunks_mut(chunk * width).enumerate();
             let done = chunks.map(|(k, out)| {
                 job.step(out.len() / width)?;
@@ -196,13 +196,13 @@ impl Functions {
     /// other values those of the model.
     ///
     /// Fails for forward dynamics, which is no straight-line program, and where each state starts from the one before.
-    pub fn vectors_c(&self, function: Function) -> Outcome<String> {
+    pub fn vectors_c(&self, function: ModelFunction) -> Outcome<String> {
         let derivation = &self.model.derivation;
-        if self.model.follows_loops() || function == Function::ForwardDynamics {
+        if self.model.has_iterative_loops() || function == ModelFunction::ForwardDynamics {
             return Err(Error::input(format!(
                 "{}: {} takes steps that depend on the state and is not compiled",
                 self.model.path,
-                if function == Function::ForwardDynamics {
+                if function == ModelFunction::ForwardDynamics {
                     "forward dynamics"
                 } else {
                     "closing the loops by Newton's method"
@@ -210,21 +210,21 @@ impl Functions {
             )));
         }
         let program = match function {
-            Function::InverseDynamics => &derivation.programs.inverse_dynamics,
-            Function::Regressor => &derivation.programs.regressor,
-            Function::MassMatrix => &self.dynamics()?.mass_matrix,
-            Function::Bias | Function::ForwardDynamics => &self.dynamics()?.bias,
-            Function::Reactions => &self.derived_reactions()?.program,
+            ModelFunction::InverseDynamics => &derivation.programs.inverse_dynamics,
+            ModelFunction::Regressor => &derivation.programs.regressor,
+            ModelFunction::MassMatrix => &self.dynamics()?.mass_matrix,
+            ModelFunction::Bias | ModelFunction::ForwardDynamics => &self.dynamics()?.bias,
+            ModelFunction::Reactions => &self.derived_reactions()?.program,
         };
         let width = self.shape(function)?.iter().product();
         Ok(vectors_c(derivation, program, width))
     }
 
     /// Positions, rates, accelerations and forces as far as they are read, with their lengths looked at.
-    fn parts<'a>(&self, function: Function, given: &Given<'a>) -> Outcome<[Option<Rows<'a>>; 4]> {
-        let (active, drives) = (self.model.active().len(), self.model.drives().len());
-        let [rates, accelerations, forces] = function.reads();
-        let by_load = self.model.load_dependent();
+    fn checked_inputs<'a>(&self, function: ModelFunction, given: &StateSamples<'a>) -> Outcome<[Option<StateMatrix<'a>>; 4]> {
+        let (active, drives) = (self.model.active_coordinates().len(), self.model.drives().len());
+        let [rates, accelerations, forces] = function.required_inputs();
+        let by_load = self.model.load_dependent_effects();
         let n = given.q.len();
         let parts = [
             ("positions", Some(given.q), true, active),
@@ -261,37 +261,37 @@ impl Functions {
         Ok(found)
     }
 
-    fn prepared(&self, function: Function) -> Outcome<Prepared<'_>> {
+    fn programs_for(&self, function: ModelFunction) -> Outcome<FunctionPrograms<'_>> {
         let needs_dynamics = matches!(
             function,
-            Function::MassMatrix | Function::Bias | Function::ForwardDynamics
+            ModelFunction::MassMatrix | ModelFunction::Bias | ModelFunction::ForwardDynamics
         );
-        Ok(Prepared {
-            evaluator: Evaluator::new(&self.model.derivation),
+        Ok(FunctionPrograms {
+            evaluator: ModelEvaluator::new(&self.model.derivation),
             dynamics: needs_dynamics.then(|| self.dynamics()).transpose()?,
-            reactions: (function == Function::Reactions)
+            reactions: (function == ModelFunction::Reactions)
                 .then(|| self.derived_reactions())
                 .transpose()?,
         })
     }
 
-    fn dynamics(&self) -> Outcome<&Dynamics> {
+    fn dynamics(&self) -> Outcome<&DynamicsPrograms> {
         if let Some(known) = self.dynamics.get() {
             return Ok(known);
         }
         let what = "deriving the equation of motion";
-        let derived = (self.model.host()).watched(what, 0, |_| self.model.derivation.dynamics())?;
+        let derived = (self.model.host()).run_job(what, 0, |_| self.model.derivation.dynamics())?;
         let derived = derived.map_err(|error| Error::derivation(&self.model.path, error))?;
         Ok(self.dynamics.get_or_init(|| derived))
     }
 
-    fn derived_reactions(&self) -> Outcome<&Reactions> {
+    fn derived_reactions(&self) -> Outcome<&ReactionPrograms> {
         if let Some(known) = self.reactions.get() {
             return Ok(known);
         }
         let what = "deriving the reactions";
         let derived =
-            (self.model.host()).watched(what, 0, |_| self.model.derivation.reactions())?;
+            (self.model.host()).run_job(what, 0, |_| self.model.derivation.reactions())?;
         let derived = derived.map_err(|error| Error::derivation(&self.model.path, error))?;
         Ok(self.reactions.get_or_init(|| derived))
     }
@@ -299,9 +299,9 @@ impl Functions {
 
 /// Writes a function of some states to `out`, a row for each.
 fn fill(
-    function: Function,
-    prepared: &Prepared<'_>,
-    parts: &[Option<Rows<'_>>; 4],
+    function: ModelFunction,
+    prepared: &FunctionPrograms<'_>,
+    parts: &[Option<StateMatrix<'_>>; 4],
     states: &Range<usize>,
     values: &[f64],
     out: &mut [f64],
@@ -313,7 +313,7 @@ fn fill(
         .map(|columns| columns.iter().map(Vec::as_slice).collect::<Vec<_>>());
     // What a function does not read is not given, but has its place.
     let all_zeros: Vec<&[f64]> = q.iter().map(|_| zeros.as_slice()).collect();
-    let given = States {
+    let given = MotionStates {
         qd: if qd.is_empty() { all_zeros.clone() } else { qd },
         qdd: if qdd.is_empty() { all_zeros } else { qdd },
         q,
@@ -323,16 +323,16 @@ fn fill(
     let evaluator = &prepared.evaluator;
     let (dynamics, reactions) = (prepared.dynamics, prepared.reactions);
     let found = match (function, dynamics, reactions) {
-        (Function::InverseDynamics, ..) => evaluator.inverse_dynamics(&given, values)?,
-        (Function::MassMatrix, Some(dynamics), _) => {
+        (ModelFunction::InverseDynamics, ..) => evaluator.inverse_dynamics(&given, values)?,
+        (ModelFunction::MassMatrix, Some(dynamics), _) => {
             evaluator.mass_matrix(dynamics, &given, values)?
         }
-        (Function::Bias, Some(dynamics), _) => evaluator.bias(dynamics, &given, values)?,
-        (Function::ForwardDynamics, Some(dynamics), _) => {
+        (ModelFunction::Bias, Some(dynamics), _) => evaluator.bias(dynamics, &given, values)?,
+        (ModelFunction::ForwardDynamics, Some(dynamics), _) => {
             evaluator.forward_dynamics(dynamics, &given, values, &forces)?
         }
-        (Function::Reactions, _, Some(reactions)) => evaluator.reactions(reactions, &given)?,
-        (Function::Regressor, ..) => {
+        (ModelFunction::Reactions, _, Some(reactions)) => evaluator.reactions(reactions, &given)?,
+        (ModelFunction::Regressor, ..) => {
             let mut start = 0;
             return evaluator.regressor_blocks(&given, |len, columns| {
                 scatter(

@@ -7,14 +7,14 @@ mod made;
 
 use made::{Made, STEP, bundled, run_of, with_part};
 use modelmill::Model;
-use modelmill::identify::Estimation;
-use modelmill::recording::Reading;
+use modelmill::identify::EstimatorOptions;
+use modelmill::recording::RecordingOptions;
 
 /// Events that are told of a run: from, to and the sentence.
 fn told(model: &Model, name: &str, seed: u64, made: Made) -> Vec<(f64, f64, String)> {
     let file = run_of(model, name, seed, made);
     let recording = model
-        .recording(file, &Reading::default())
+        .recording(file, &RecordingOptions::default())
         .expect("the recording");
     let events = recording
         .notes()
@@ -81,13 +81,13 @@ fn a_push_is_left_out_on_request() {
     let model = Model::open(bundled("puma560")).expect("the model");
     let weight = kilogram(4);
     let error = |made: Made, leave_out_events: bool| -> f64 {
-        let reading = Reading {
+        let reading = RecordingOptions {
             leave_out_events,
-            ..Reading::default()
+            ..RecordingOptions::default()
         };
         let file = run_of(&model, "puma560", 77, made);
         let recording = model.recording(file, &reading).expect("the recording");
-        let found = model.identify(&[&recording], &[], &Estimation::default());
+        let found = model.identify(&[&recording], &[], &EstimatorOptions::default());
         let channels = found.expect("a fit").fit.fit.channels;
         let (_, second) = channels.get_index(1).expect("a drive");
         second.nrms.expect("forces")

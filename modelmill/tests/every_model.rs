@@ -8,11 +8,11 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use modelmill::Model;
-use modelmill::diagnose::{Question, Verdict};
-use modelmill::identify::Estimation;
-use modelmill::recording::Reading;
-use modelmill_codegen::{Derivation, Evaluator, States};
-use modelmill_identify::Figures;
+use modelmill::diagnose::{DiagnosisOptions, DiagnosisVerdict};
+use modelmill::identify::EstimatorOptions;
+use modelmill::recording::RecordingOptions;
+use modelmill_codegen::{Derivation, ModelEvaluator, MotionStates};
+use modelmill_identify::ErrorFigures;
 use modelmill_spec::Mechanism;
 
 use draws::Draws;
@@ -93,14 +93,14 @@ fn with_values(mut mechanism: Mechanism) -> Mechanism {
 
 /// Forces along the widest of some motions that the mechanism can follow.
 fn forces(derivation: &Derivation) -> (Moving, Vec<Vec<f64>>) {
-    let evaluator = Evaluator::new(derivation);
+    let evaluator = ModelEvaluator::new(derivation);
     let base = derivation.nominal_base_values();
     let mut reach = 1.0;
     loop {
         let moving = motion(&derivation.mechanism, reach);
         let [q, qd, qdd] = &moving;
         let still = vec![vec![0.0; SAMPLES]; derivation.mechanism.drives.len()];
-        let states = States {
+        let states = MotionStates {
             q: q.iter().map(Vec::as_slice).collect(),
             qd: qd.iter().map(Vec::as_slice).collect(),
             qdd: qdd.iter().map(Vec::as_slice).collect(),
@@ -153,7 +153,7 @@ fn recording(name: &str, derivation: &Derivation) -> PathBuf {
 }
 
 /// Relative error over all drives, also of those with different units, each beside its own force.
-fn relative(figures: &Figures) -> f64 {
+fn relative(figures: &ErrorFigures) -> f64 {
     figures.nrms.unwrap_or_else(|| {
         let squares = figures.channels.values().filter_map(|one| one.nrms);
         let squares = squares.map(|nrms| nrms * nrms);
@@ -163,8 +163,8 @@ fn relative(figures: &Figures) -> f64 {
 
 /// The twist of a free body is recorded, its derivative is made: without decimation, so that figures are of all samples as they
 /// are where accelerations are recorded too.
-fn reading(mechanism: &Mechanism) -> Reading {
-    let mut reading = Reading::default();
+fn reading(mechanism: &Mechanism) -> RecordingOptions {
+    let mut reading = RecordingOptions::default();
     let coordinates = &mechanism.coordinates;
     if coordinates.iter().any(|c| c.motion.is_quaternion()) {
         reading.preparation.cutoff_hz = Some(8.0);
@@ -194,7 +194,7 @@ fn check(name: &str, path: &Path) {
     let fault = |error: modelmill::Error| -> ! { panic!("{name}: {error}") };
     let run = (model.recording(&run, &reading(mechanism))).unwrap_or_else(|e| fault(e));
 
-    let identified = model.identify(&[&run], &[], &Estimation::default());
+    let identified = model.identify(&[&run], &[], &EstimatorOptions::default());
     let identified = identified.unwrap_or_else(|e| fault(e)).fit;
     let fit = relative(&identified.fit);
     // Base parameters take a little of the noise along.
@@ -224,16 +224,16 @@ fn check(name: &str, path: &Path) {
         assert!(nominal.is_finite(), "{name}");
     }
 
-    let found = model.diagnose(&[&run], &[], &Question::default());
+    let found = model.diagnose(&[&run], &[], &DiagnosisOptions::default());
     let diagnosis = found.unwrap_or_else(|e| fault(e)).diagnosis;
     let effects: Vec<_> = diagnosis
         .effects
         .iter()
         .map(|found| &found.effect)
         .collect();
-    assert_eq!(diagnosis.verdict, Verdict::Adequate, "{name}: {effects:?}");
+    assert_eq!(diagnosis.verdict, DiagnosisVerdict::Adequate, "{name}: {effects:?}");
     assert!(effects.is_empty(), "{name}: {effects:?}");
-    for error in [diagnosis.ladder[0].fit, diagnosis.ladder[0].check] {
+    for error in [diagnosis.steps[0].fit, diagnosis.steps[0].check] {
         assert!(
             (0.7 * NOISE..1.3 * NOISE).contains(&error),
             "{name}: {error}"

@@ -7,13 +7,13 @@ mod made;
 
 use made::{Made, bundled, run_of};
 use modelmill::Model;
-use modelmill::recording::Reading;
+use modelmill::recording::RecordingOptions;
 
 /// What is said of gravity when a recording of one model is read for another.
 fn told(of: &Model, by: &Model, name: &str, seed: u64) -> Vec<String> {
     let file = run_of(of, name, seed, Made::Friction(0, 0.2, 0.3));
     let recording = by
-        .recording(file, &Reading::default())
+        .recording(file, &RecordingOptions::default())
         .expect("the recording");
     let notes = recording.notes().map(|note| note.says.clone());
     let is_its = |says: &String| says.to_lowercase().contains("gravity");

@@ -9,29 +9,29 @@ mod made;
 use std::path::Path;
 
 use modelmill::Model;
-use modelmill::diagnose::{Findings, Held, Missing, Question, Verdict};
-use modelmill::identify::Estimation;
-use modelmill::recording::Reading;
+use modelmill::diagnose::{DiagnosisFindings, FixedParameters, MissingEffect, DiagnosisOptions, DiagnosisVerdict};
+use modelmill::identify::EstimatorOptions;
+use modelmill::recording::RecordingOptions;
 
 use made::{Made, bundled, run, run_of};
 
 const ARM: &str = "puma560";
 
-fn diagnosed(file: &Path, held: Held) -> Findings {
+fn diagnosed(file: &Path, held: FixedParameters) -> DiagnosisFindings {
     let model = Model::open(bundled(ARM)).expect("the model");
     let recording = model
-        .recording(file, &Reading::default())
+        .recording(file, &RecordingOptions::default())
         .expect("the recording");
-    let question = Question {
-        held,
-        again_with_nominal: false,
+    let question = DiagnosisOptions {
+        fixed: held,
+        repeat_with_nominal: false,
     };
     (model.diagnose(&[&recording], &[], &question)).expect("an answer")
 }
 
 /// The only effect that was found, at its place.
 #[track_caller]
-fn only<'a>(findings: &'a Findings, kind: &str, at: &str) -> &'a Missing {
+fn only<'a>(findings: &'a DiagnosisFindings, kind: &str, at: &str) -> &'a MissingEffect {
     let [found] = &findings.missing[..] else {
         panic!("{:#?}", findings.missing);
     };
@@ -43,7 +43,7 @@ fn only<'a>(findings: &'a Findings, kind: &str, at: &str) -> &'a Missing {
 }
 
 #[track_caller]
-fn near(found: &Missing, name: &str, truth: f64, part: f64) {
+fn near(found: &MissingEffect, name: &str, truth: f64, part: f64) {
     let estimate = found.estimates.iter().find(|one| one.name == name);
     let value = estimate.expect("an estimate").value;
     assert!(
@@ -57,12 +57,12 @@ fn a_load_on_the_flange_is_weighed_and_placed_while_the_base_is_held() {
     let part = "\n[[part]]\nname = \"tool\"\non = \"link6\"\nmass = 2.8\ncentre = [0.03, -0.02, 0.08]\n\
                 inertia = { xx = 0.004, yy = 0.005, zz = 0.006 }\n";
     let file = run(ARM, 700, Made::Body(part));
-    let findings = diagnosed(&file, Held::All);
+    let findings = diagnosed(&file, FixedParameters::All);
     let found = only(&findings, "payload", "link6");
     near(found, "mass", 2.8, 0.05);
     near(found, "mz", 2.8 * 0.08, 0.1);
     // Beside free base parameters it is none of what may be missing.
-    let free = diagnosed(&file, Held::Known);
+    let free = diagnosed(&file, FixedParameters::Known);
     assert!(free.missing.is_empty(), "{:#?}", free.missing);
     let candidates = &free.diagnosis.candidates;
     assert!(candidates.iter().all(|one| one.effect.kind != "payload"));
@@ -72,7 +72,7 @@ fn a_load_on_the_flange_is_weighed_and_placed_while_the_base_is_held() {
 fn nothing_is_carried_where_nothing_was_added() {
     for seed in 710..713 {
         let file = run(ARM, seed, Made::Nothing);
-        let findings = diagnosed(&file, Held::All);
+        let findings = diagnosed(&file, FixedParameters::All);
         assert!(findings.missing.is_empty(), "{:#?}", findings.missing);
     }
 }
@@ -84,14 +84,14 @@ fn a_length_that_is_off_is_found_with_its_error() {
     assert_ne!(text, longer);
     let truth = Model::from_text("longer", &longer).expect("the model");
     let file = run_of(&truth, ARM, 720, Made::Nothing);
-    let findings = diagnosed(&file, Held::Known);
+    let findings = diagnosed(&file, FixedParameters::Known);
     near(only(&findings, "constant_error", "r4"), "error", 0.1, 0.1);
 }
 
 #[test]
 fn a_gear_that_yields_is_found_with_its_compliance() {
     let file = run(ARM, 730, Made::Yields(1, 4e-4));
-    let findings = diagnosed(&file, Held::All);
+    let findings = diagnosed(&file, FixedParameters::All);
     let drive = findings.channels()[1].clone();
     near(
         only(&findings, "drive_compliance", &drive),
@@ -105,10 +105,10 @@ fn a_gear_that_yields_is_found_with_its_compliance() {
 #[test]
 fn an_encoder_with_another_zero_is_found_with_its_shift() {
     for (seed, joint, held) in [
-        (750, 1, Held::Known),
-        (751, 2, Held::Known),
-        (752, 1, Held::All),
-        (753, 2, Held::All),
+        (750, 1, FixedParameters::Known),
+        (751, 2, FixedParameters::Known),
+        (752, 1, FixedParameters::All),
+        (753, 2, FixedParameters::All),
     ] {
         let file = run(ARM, seed, Made::Zero(joint, 0.05));
         let findings = diagnosed(&file, held);
@@ -134,11 +134,11 @@ fn friction_of_another_day_is_no_further_friction() {
     let text = format!("{text}\n{}", friction.replace("PLACE", &drive));
     let model = Model::from_text("with friction", &text).expect("the model");
     let file = run(ARM, 760, Made::Friction(1, 5.0, 7.0));
-    let recording = model.recording(&file, &Reading::default());
+    let recording = model.recording(&file, &RecordingOptions::default());
     let recording = recording.expect("the recording");
-    let question = Question {
-        held: Held::All,
-        again_with_nominal: false,
+    let question = DiagnosisOptions {
+        fixed: FixedParameters::All,
+        repeat_with_nominal: false,
     };
     let findings = model.diagnose(&[&recording], &[], &question);
     let findings = findings.expect("an answer");
@@ -164,10 +164,10 @@ fn friction_of_another_day_is_no_further_friction() {
 fn a_hose_that_gives_way_is_one_effect() {
     for (seed, way) in [(732, 0.35), (733, 0.5)] {
         let file = run(ARM, seed, Made::Hose(2, 12.0, way));
-        let findings = diagnosed(&file, Held::All);
+        let findings = diagnosed(&file, FixedParameters::All);
         let drive = findings.channels()[2].clone();
         only(&findings, "cable_torque", &drive);
-        assert_eq!(findings.diagnosis.verdict, Verdict::MissingEffect);
+        assert_eq!(findings.diagnosis.verdict, DiagnosisVerdict::MissingEffect);
     }
 }
 
@@ -177,19 +177,19 @@ fn a_hose_that_gives_way_is_one_effect() {
 fn what_a_fit_does_not_know_is_no_error_of_the_model() {
     let model = Model::open(bundled(ARM)).expect("the model");
     let read = |file: &Path| {
-        let recording = model.recording(file, &Reading::default());
+        let recording = model.recording(file, &RecordingOptions::default());
         recording.expect("the recording")
     };
     let before = read(&run(ARM, 740, Made::Nothing));
-    let found = model.identify(&[&before], &[], &Estimation::default());
+    let found = model.identify(&[&before], &[], &EstimatorOptions::default());
     let found = found.expect("a fit");
     let values = model.values_of(&found.fit, "fit.json");
     let values = values.expect("its values");
     assert!(values.covariance.is_some());
     let fitted = model.with_fit(&values);
-    let question = Question {
-        held: Held::All,
-        again_with_nominal: false,
+    let question = DiagnosisOptions {
+        fixed: FixedParameters::All,
+        repeat_with_nominal: false,
     };
     let asked = |file: &Path| {
         let recording = read(file);
@@ -199,7 +199,7 @@ fn what_a_fit_does_not_know_is_no_error_of_the_model() {
     };
     let same = asked(&run(ARM, 741, Made::Nothing));
     assert!(same.missing.is_empty(), "{:#?}", same.missing);
-    assert_eq!(same.diagnosis.verdict, Verdict::Adequate);
+    assert_eq!(same.diagnosis.verdict, DiagnosisVerdict::Adequate);
     let part = "\n[[part]]\nname = \"tool\"\non = \"link6\"\nmass = 1.4\ncentre = [0.03, -0.02, 0.08]\n\
                 inertia = { xx = 0.004, yy = 0.005, zz = 0.006 }\n";
     let loaded = asked(&run(ARM, 742, Made::Body(part)));
@@ -214,11 +214,11 @@ fn what_turns_the_sign_of_bodies_is_suspected() {
         let model = Model::from_text("spidermill.toml", text).expect("a model");
         let runs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../recordings/spidermill-mbs");
         let recording = |name: &str| {
-            (model.recording(runs.join(name), &Reading::default())).expect("a recording")
+            (model.recording(runs.join(name), &RecordingOptions::default())).expect("a recording")
         };
-        let question = Question {
-            held: Held::Known,
-            again_with_nominal: false,
+        let question = DiagnosisOptions {
+            fixed: FixedParameters::Known,
+            repeat_with_nominal: false,
         };
         let [fit, check] = ["plain-fit.csv", "plain-check.csv"].map(recording);
         let found = model.diagnose(&[&fit], &[&check], &question);

@@ -8,34 +8,34 @@ mod made;
 use std::path::PathBuf;
 
 use modelmill::Model;
-use modelmill::recording::{Reading, Recording};
-use modelmill::runs::{Asked, Changed, Compared, Estimate, KnownLoad, PerRun, Unread, What};
+use modelmill::recording::{RecordingOptions, PreparedRecording};
+use modelmill::runs::{RunsOptions, RunChange, RunsComparison, ChangeEstimate, KnownLoad, PerRunSelection, UnreadRun, PhysicalChange};
 
 use made::{Made, bundled, run};
 
 /// What is told of a run against one to which nothing was done.
-fn told(name: &str, seed: u64, made: Made) -> Vec<Changed> {
+fn told(name: &str, seed: u64, made: Made) -> Vec<RunChange> {
     let model = Model::open(bundled(name)).expect("the model");
     let files = [run(name, seed, Made::Nothing), run(name, seed + 1, made)];
-    let read = |file: &PathBuf| -> Recording {
+    let read = |file: &PathBuf| -> PreparedRecording {
         model
-            .recording(file, &Reading::default())
+            .recording(file, &RecordingOptions::default())
             .expect("the recording")
     };
     let [before, later] = files.each_ref().map(read);
-    let mut found = held(&model, &[&before, &later], &Asked::default());
+    let mut found = held(&model, &[&before, &later], &RunsOptions::default());
     assert!(found.runs[0].changes.is_empty());
     found.runs.remove(1).changes
 }
 
-fn held(model: &Model, recordings: &[&Recording], asked: &Asked) -> Compared {
+fn held(model: &Model, recordings: &[&PreparedRecording], asked: &RunsOptions) -> RunsComparison {
     let recordings = recordings.iter().map(|one| Ok(*one));
     model.runs(recordings, asked).expect("an answer")
 }
 
 /// A value within five deviations of the truth and so many parts of it.
 #[track_caller]
-fn is_near(found: &Estimate, truth: f64, part: f64) {
+fn is_near(found: &ChangeEstimate, truth: f64, part: f64) {
     let off = (found.value - truth).abs();
     assert!(
         off < part * truth.abs() && off < 6.0 * found.deviation,
@@ -61,9 +61,9 @@ fn a_load_is_weighed_and_placed() {
                 inertia = { xx = 0.004, yy = 0.005, zz = 0.006 }\n";
     let found = told("puma560", 300, Made::Body(part));
     let [
-        Changed {
-            what:
-                What::Payload {
+        RunChange {
+            change:
+                PhysicalChange::Payload {
                     frame,
                     mass: Some(mass),
                     centre,
@@ -94,8 +94,8 @@ fn a_load_in_a_loop_is_told_where_it_is() {
     );
     let found = told("five_bar", 400, Made::Body(&part));
     let [
-        Changed {
-            what: What::Payload { frame, .. },
+        RunChange {
+            change: PhysicalChange::Payload { frame, .. },
             rivals,
             ..
         },
@@ -111,9 +111,9 @@ fn a_load_in_a_loop_is_told_where_it_is() {
 fn drives_and_clocks_are_told_apart() {
     let found = told("scara", 500, Made::Friction(1, 0.6, 0.3));
     let [
-        Changed {
-            what:
-                What::Friction {
+        RunChange {
+            change:
+                PhysicalChange::Friction {
                     drive,
                     dry,
                     viscous,
@@ -131,8 +131,8 @@ fn drives_and_clocks_are_told_apart() {
 
     let found = told("puma560", 600, Made::Scale(2, 1.05));
     let [
-        Changed {
-            what: What::Scale { drive, factor },
+        RunChange {
+            change: PhysicalChange::Scale { drive, factor },
             ..
         },
     ] = &found[..]
@@ -145,8 +145,8 @@ fn drives_and_clocks_are_told_apart() {
 
     let found = told("puma560", 700, Made::Offset(1, 4.0));
     let [
-        Changed {
-            what: What::Offset { drive, force },
+        RunChange {
+            change: PhysicalChange::Offset { drive, force },
             ..
         },
     ] = &found[..]
@@ -158,8 +158,8 @@ fn drives_and_clocks_are_told_apart() {
 
     let found = told("puma560", 800, Made::Clock(1.02));
     let [
-        Changed {
-            what: What::Clock { factor },
+        RunChange {
+            change: PhysicalChange::Clock { factor },
             ..
         },
     ] = &found[..]
@@ -173,9 +173,9 @@ fn drives_and_clocks_are_told_apart() {
 #[test]
 fn lost_forces_move_nothing() {
     let model = Model::open(bundled("puma560")).expect("the model");
-    let reading = Reading {
+    let reading = RecordingOptions {
         skip_bad_samples: true,
-        ..Reading::default()
+        ..RecordingOptions::default()
     };
     let files = [
         run("puma560", 1000, Made::Nothing),
@@ -183,7 +183,7 @@ fn lost_forces_move_nothing() {
     ];
     let read = |file: &PathBuf| model.recording(file, &reading).expect("the recording");
     let [before, later] = files.each_ref().map(read);
-    let found = held(&model, &[&before, &later], &Asked::default());
+    let found = held(&model, &[&before, &later], &RunsOptions::default());
     assert!(found.runs[1].changes.is_empty(), "{:#?}", found.runs[1]);
     assert!(found.runs[1].moved.is_empty(), "{:?}", found.runs[1].moved);
 }
@@ -193,17 +193,17 @@ fn one_run_alone_is_refused() {
     let model = Model::open(bundled("scara")).expect("the model");
     let file = run("scara", 900, Made::Nothing);
     let one = model
-        .recording(&file, &Reading::default())
+        .recording(&file, &RecordingOptions::default())
         .expect("the recording");
-    let runs = |all: Vec<Result<&Recording, Unread>>| model.runs(all, &Asked::default());
+    let runs = |all: Vec<Result<&PreparedRecording, UnreadRun>>| model.runs(all, &RunsOptions::default());
     let error = runs(vec![Ok(&one)]).err().expect("a refusal");
     assert!(error.to_string().contains("two or more"), "{error}");
     // A run that cannot be read is no reason to fail, unless nothing is left.
     let unread = || {
-        let missing = model.recording("nowhere.csv", &Reading::default());
+        let missing = model.recording("nowhere.csv", &RecordingOptions::default());
         let error = missing.err().expect("a refusal");
         let file = "nowhere.csv".to_owned();
-        Err(Unread { file, error })
+        Err(UnreadRun { file, error })
     };
     let error = runs(vec![Ok(&one), unread()]).err().expect("a refusal");
     assert!(error.to_string().contains("nowhere.csv"), "{error}");
@@ -220,9 +220,9 @@ const TOOL: &str = "\n[[part]]\nname = \"tool\"\non = \"link6\"\nmass = 2.8\ncen
 fn a_push_is_told_with_its_times() {
     let found = told("puma560", 1200, Made::Bump(&[1, 2], 900, 1000, 0.8));
     let [
-        Changed {
-            what:
-                What::ContactEvent {
+        RunChange {
+            change:
+                PhysicalChange::ContactEvent {
                     drives,
                     interval: [from, to],
                 },
@@ -257,13 +257,13 @@ fn what_is_each_runs_own_is_told_in_one_fit() {
     ];
     let read = |file: &PathBuf| {
         model
-            .recording(file, &Reading::default())
+            .recording(file, &RecordingOptions::default())
             .expect("the recording")
     };
     let [a, b, c] = files.each_ref().map(read);
     let drive = &model.drives()[3];
-    let parse = |text: &str| PerRun::parse(text).expect("a place");
-    let asked = Asked {
+    let parse = |text: &str| PerRunSelection::parse(text).expect("a place");
+    let asked = RunsOptions {
         per_run: vec![parse("payload@link6"), parse(&format!("friction@{drive}"))],
         loads: Vec::new(),
     };
@@ -273,7 +273,7 @@ fn what_is_each_runs_own_is_told_in_one_fit() {
         let mut values = fit.runs[run].1.iter();
         let value = values.find(|one| one.name == name).expect("a value").value;
         let deviation = value.deviation.expect("a deviation");
-        Estimate {
+        ChangeEstimate {
             value: value.value,
             deviation,
         }
@@ -291,14 +291,14 @@ fn what_is_each_runs_own_is_told_in_one_fit() {
     let more = |name: &str| {
         let [before, now] = [own(1, name), own(2, name)];
         let deviation = before.deviation.hypot(now.deviation);
-        Estimate {
+        ChangeEstimate {
             value: now.value - before.value,
             deviation,
         }
     };
     is_near(&more("Fc"), 0.9, 0.2);
     is_near(&more("Fv"), 0.4, 0.2);
-    let asked = Asked {
+    let asked = RunsOptions {
         per_run: vec![parse("payload@nowhere")],
         loads: Vec::new(),
     };
@@ -320,11 +320,11 @@ fn a_known_load_tells_the_scales_of_all_forces() {
     ];
     let read = |file: &PathBuf| {
         model
-            .recording(file, &Reading::default())
+            .recording(file, &RecordingOptions::default())
             .expect("the recording")
     };
     let [bare, loaded] = files.each_ref().map(read);
-    let load = |text: &str| Asked {
+    let load = |text: &str| RunsOptions {
         per_run: Vec::new(),
         loads: vec![KnownLoad::parse(text).expect("a load")],
     };
@@ -359,19 +359,19 @@ fn what_changed_and_stayed_is_told_with_its_run() {
     let recordings = (0..12).map(|k| {
         let file = run("emps", 1500 + k, made(k));
         Ok(model
-            .recording(file, &Reading::default())
+            .recording(file, &RecordingOptions::default())
             .expect("the recording"))
     });
     let found = model
-        .runs(recordings, &Asked::default())
+        .runs(recordings, &RunsOptions::default())
         .expect("an answer");
     let [point] = &found.points[..] else {
         panic!("{:#?}", found.points);
     };
     assert_eq!(point.run, 7);
     let [
-        Changed {
-            what: What::Friction { drive, dry, .. },
+        RunChange {
+            change: PhysicalChange::Friction { drive, dry, .. },
             ..
         },
     ] = &point.changes[..]

@@ -8,12 +8,12 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use modelmill::Model;
-use modelmill::diagnose::{Question, Verdict};
-use modelmill::identify::Estimation;
-use modelmill::recording::Reading;
-use modelmill::variants::Variants;
-use modelmill_codegen::{Dynamics, Evaluator, States};
-use modelmill_spec::{FreeBody, Step, TwistAxes};
+use modelmill::diagnose::{DiagnosisOptions, DiagnosisVerdict};
+use modelmill::identify::EstimatorOptions;
+use modelmill::recording::RecordingOptions;
+use modelmill::variants::VariantComparison;
+use modelmill_codegen::{DynamicsPrograms, ModelEvaluator, MotionStates};
+use modelmill_spec::{FreeBody, FrameStep, TwistAxes};
 
 use draws::Draws;
 
@@ -138,7 +138,7 @@ fn free_body(model: &Model) -> Option<FreeBody> {
     let frames = &model.derivation.mechanism.frames;
     let mut steps = frames.iter().flat_map(|frame| &frame.steps);
     steps.find_map(|step| match step {
-        Step::Free(body) => Some(*body),
+        FrameStep::Free(body) => Some(*body),
         _ => None,
     })
 }
@@ -146,8 +146,8 @@ fn free_body(model: &Model) -> Option<FreeBody> {
 /// A plant: accelerations from the model's own equation of motion, poses from rates.
 struct Plant<'a> {
     model: &'a Model,
-    evaluator: Evaluator<'a>,
-    dynamics: Dynamics,
+    evaluator: ModelEvaluator<'a>,
+    dynamics: DynamicsPrograms,
     body: Option<FreeBody>,
 }
 
@@ -159,7 +159,7 @@ impl Plant<'_> {
         let (q, qd, qdd, load) = (one(q), one(qd), one(&still), one(forces));
         let slices = |all: &'_ [Vec<f64>]| -> Vec<Vec<f64>> { all.to_vec() };
         let (q, qd, qdd, load) = (slices(&q), slices(&qd), slices(&qdd), slices(&load));
-        let states = States {
+        let states = MotionStates {
             q: q.iter().map(Vec::as_slice).collect(),
             qd: qd.iter().map(Vec::as_slice).collect(),
             qdd: qdd.iter().map(Vec::as_slice).collect(),
@@ -236,7 +236,7 @@ fn recording(model: &Model, name: &str, made: &Made) -> PathBuf {
     let body = free_body(model);
     let plant = Plant {
         model,
-        evaluator: Evaluator::new(&model.derivation),
+        evaluator: ModelEvaluator::new(&model.derivation),
         dynamics: model.derivation.dynamics().expect("an equation of motion"),
         body,
     };
@@ -332,10 +332,10 @@ fn check(name: &str, text: &str, push: f64, accuracy: f64) {
     };
     let file = recording(&model, name, &made);
     let recording = model
-        .recording(&file, &Reading::default())
+        .recording(&file, &RecordingOptions::default())
         .expect("a recording");
     let found = model
-        .identify(&[&recording], &[], &Estimation::default())
+        .identify(&[&recording], &[], &EstimatorOptions::default())
         .expect("an identification");
     assert_eq!(found.fit.parameters.len(), model.base.len());
     for (k, parameter) in found.fit.parameters.iter().enumerate() {
@@ -403,17 +403,17 @@ fn told(name: &str, text: &str, effect: &str, push: f64) -> Vec<(String, Vec<Str
             step: Some(1e-4),
         };
         let file = recording(&machine, &format!("{name}-{}-{seed}", effect.len()), &made);
-        (model.recording(&file, &Reading::default())).expect("a recording")
+        (model.recording(&file, &RecordingOptions::default())).expect("a recording")
     };
     let (fit, check) = (run(17), run(29));
-    let found = (model.diagnose(&[&fit], &[&check], &Question::default())).expect("a diagnosis");
+    let found = (model.diagnose(&[&fit], &[&check], &DiagnosisOptions::default())).expect("a diagnosis");
     let diagnosis = found.diagnosis;
-    let error = diagnosis.ladder[0].check;
+    let error = diagnosis.steps[0].check;
     assert!(!effect.is_empty() || error < 0.15, "{name}: {error}");
     let expected = if effect.is_empty() {
-        Verdict::Adequate
+        DiagnosisVerdict::Adequate
     } else {
-        Verdict::MissingEffect
+        DiagnosisVerdict::MissingEffect
     };
     assert_eq!(diagnosis.verdict, expected, "{name}");
     let effects = diagnosis.effects.into_iter();
@@ -540,13 +540,13 @@ fn cables_are_more_than_freedoms() {
         .map(|o| (0..3).map(|i| column(o, i)).collect())
         .collect();
     let slices = |o: usize| -> Vec<&[f64]> { columns[o].iter().map(Vec::as_slice).collect() };
-    let states = States {
+    let states = MotionStates {
         q: slices(0),
         qd: slices(1),
         qdd: slices(2),
         load: Vec::new(),
     };
-    let forces = Evaluator::new(&model.derivation)
+    let forces = ModelEvaluator::new(&model.derivation)
         .inverse_dynamics(&states, &model.nominal)
         .expect("forces");
     let mut text = "t,x,y,a,cable1,cable2,cable3,cable4".to_owned();
@@ -587,10 +587,10 @@ fn cables_are_more_than_freedoms() {
     let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join("undriven-cables.csv");
     std::fs::write(&file, text + "\n").expect("a recording");
     let recording = model
-        .recording(&file, &Reading::default())
+        .recording(&file, &RecordingOptions::default())
         .expect("a recording");
     let found = model
-        .identify(&[&recording], &[], &Estimation::default())
+        .identify(&[&recording], &[], &EstimatorOptions::default())
         .expect("a fit");
     for (parameter, truth) in found.fit.parameters.iter().zip(&model.nominal) {
         let error = (parameter.value - truth).abs() / 0.05;
@@ -599,7 +599,7 @@ fn cables_are_more_than_freedoms() {
 
     // Beside a variant, figures are those of the rows.
     let found =
-        Variants::along([&model, &model.clone()], [&[&recording], &[&recording]]).expect("figures");
+        VariantComparison::along_recordings([&model, &model.clone()], [&[&recording], &[&recording]]).expect("figures");
     let drives: Vec<&str> = found.drives.iter().map(|one| &*one.drive).collect();
     assert_eq!(drives, model.drives());
     assert!(

@@ -5,9 +5,9 @@ use std::f64::consts::TAU;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use modelmill::recording::{Reading, Recording};
-use modelmill::variants::{Crossing, DriveVariants, Variants};
-use modelmill::{Model, Severity, along};
+use modelmill::recording::{RecordingOptions, PreparedRecording};
+use modelmill::variants::{LimitCrossing, DriveVariants, VariantComparison};
+use modelmill::{Model, NoteSeverity, along};
 
 /// Two links in a vertical plane with a tool at the end of the second.
 const ARM: &str = r#"
@@ -106,14 +106,14 @@ fn arm(changes: &[(&str, &str)]) -> Model {
 }
 
 /// Both models along a file, each as it reads it.
-fn along(before: &Model, after: &Model, file: &Path) -> Variants {
+fn along(before: &Model, after: &Model, file: &Path) -> VariantComparison {
     let read = |model: &Model| {
         model
-            .recording(file, &Reading::default())
+            .recording(file, &RecordingOptions::default())
             .expect("a recording")
     };
-    let (first, second): (Recording, Recording) = (read(before), read(after));
-    Variants::along([before, after], [&[&first], &[&second]]).expect("both along the motion")
+    let (first, second): (PreparedRecording, PreparedRecording) = (read(before), read(after));
+    VariantComparison::along_recordings([before, after], [&[&first], &[&second]]).expect("both along the motion")
 }
 
 #[track_caller]
@@ -205,9 +205,9 @@ fn a_share_is_what_the_summand_alone_projects_on_the_difference() {
     let file = recording("projection", &[]);
     let found = along(&before, &after, &file);
     let states = &before
-        .recording(&file, &Reading::default())
+        .recording(&file, &RecordingOptions::default())
         .expect("a recording")
-        .stretches[0];
+        .segments[0];
     let forces = |values: &[f64]| along::forces(&before, states, values).expect("forces");
     let first = forces(&before.nominal);
     let last = forces(&after.nominal);
@@ -257,11 +257,11 @@ fn figures_are_those_of_evaluated_forces() {
         (&after, |one: &DriveVariants| one.after),
     ] {
         let forces = model
-            .evaluate(&file, &Reading::default(), &model.nominal)
+            .evaluate(&file, &RecordingOptions::default(), &model.nominal)
             .expect("forces");
         for (d, (drive, force)) in forces.columns.iter().enumerate() {
             assert_eq!(&found.drives[d].drive, drive);
-            let effort: modelmill::variants::Effort = pick(&found.drives[d]);
+            let effort: modelmill::variants::DriveEffort = pick(&found.drives[d]);
             let power: Vec<f64> = (0..=SAMPLES).map(|k| force[k] * states(k)[d][1]).collect();
             let largest = |all: &[f64]| all.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
             close(effort.peak, largest(force), 1e-9);
@@ -324,15 +324,15 @@ fn limits_tell_what_the_variant_exceeds() {
             .unwrap_or_else(|| panic!("{name}"))
     };
     assert_eq!(found.limits.len(), 4);
-    assert_eq!(of("shoulder").crossing(), Crossing::NowExceeded);
-    assert_eq!(of("boom").crossing(), Crossing::NowExceeded);
+    assert_eq!(of("shoulder").crossing(), LimitCrossing::NowExceeded);
+    assert_eq!(of("boom").crossing(), LimitCrossing::NowExceeded);
     close(
         of("boom").used[1].expect("a limit"),
         found.drives[1].after.peak / 100.0,
         1e-12,
     );
     close(of("q1").used[0].expect("a limit"), 1.1 / 3.0, 1e-9);
-    assert_eq!(of("q1_d").crossing(), Crossing::Kept);
+    assert_eq!(of("q1_d").crossing(), LimitCrossing::Kept);
     // Each model has the limits of its own file.
     let strong = arm(&[
         ("nominal = 5.0", "nominal = 45.0"),
@@ -347,8 +347,8 @@ fn limits_tell_what_the_variant_exceeds() {
             .find(|one| one.limit == name)
             .expect("a limit")
     };
-    assert_eq!(of("shoulder").crossing(), Crossing::NoLongerExceeded);
-    assert_eq!(of("boom").crossing(), Crossing::NoLongerExceeded);
+    assert_eq!(of("shoulder").crossing(), LimitCrossing::NoLongerExceeded);
+    assert_eq!(of("boom").crossing(), LimitCrossing::NoLongerExceeded);
     assert_eq!((of("boom").used[1], of("boom").ranges[1]), (None, None));
 }
 
@@ -378,7 +378,7 @@ fn other_columns_are_told_apart_and_errors_are_those_of_compare() {
     );
     for (model, errors) in [&before, &after].into_iter().zip(&found.errors) {
         let run = model
-            .recording(&file, &Reading::default())
+            .recording(&file, &RecordingOptions::default())
             .expect("a recording");
         let compared = model.compare(&[&run], &model.nominal).expect("figures");
         assert_eq!(errors.as_ref(), Some(&compared.figures));
@@ -428,7 +428,7 @@ fn coordinates_may_stand_in_another_order() {
         "q1 = { nominal = 0.4 }\nq2 = { nominal = 0.8 }",
         "q2 = { nominal = 0.8 }\nq1 = { nominal = 0.4 }",
     )]);
-    assert_ne!(before.active(), turned.active());
+    assert_ne!(before.active_coordinates(), turned.active_coordinates());
     for drive in &along(&before, &turned, &recording("order", &[])).drives {
         assert!(
             drive.difference.rms < 1e-12 * drive.before.rms,
@@ -441,7 +441,7 @@ fn coordinates_may_stand_in_another_order() {
 #[test]
 fn what_has_no_counterpart_is_said() {
     let before = arm(&[]);
-    let says = |after: &Model| match Variants::check([&before, after]) {
+    let says = |after: &Model| match VariantComparison::check([&before, after]) {
         Err(error) => error.to_string(),
         Ok(()) => panic!("{} is no counterpart", after.path),
     };
@@ -470,7 +470,7 @@ fn what_has_no_counterpart_is_said() {
     let found = along(&before, &one, &recording("names", &[]));
     assert_eq!(found.drives.len(), 1);
     let warned: Vec<&str> = (found.notes.iter())
-        .filter(|note| note.severity == Severity::Warning && note.says.starts_with("Left out"))
+        .filter(|note| note.severity == NoteSeverity::Warning && note.says.starts_with("Left out"))
         .map(|note| note.says.as_str())
         .collect();
     assert!(

@@ -4,10 +4,10 @@ use modelmill::states::Rows;
 use numpy::{PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
-use crate::errors::refused;
+use crate::errors::input_error;
 
 /// The numbers of an array of shape (states, columns), in C or Fortran order.
-pub(crate) fn rows<'a>(py: Python<'_>, array: &'a PyReadonlyArray2<'_, f64>) -> PyResult<Rows<'a>> {
+pub(crate) fn state_matrix<'a>(py: Python<'_>, array: &'a PyReadonlyArray2<'_, f64>) -> PyResult<Rows<'a>> {
     let by_state = array.is_c_contiguous();
     let width = array.shape()[1];
     match array.as_slice() {
@@ -16,7 +16,7 @@ pub(crate) fn rows<'a>(py: Python<'_>, array: &'a PyReadonlyArray2<'_, f64>) -> 
             width,
             by_state,
         }),
-        _ => Err(refused(
+        _ => Err(input_error(
             py,
             "an array lies in memory neither row by row nor column by column",
         )),

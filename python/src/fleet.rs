@@ -8,7 +8,7 @@ use numpy::PyReadonlyArray1;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
-use crate::errors::refused;
+use crate::errors::input_error;
 
 /// A plan with its model derived.
 #[pyclass(frozen)]
@@ -16,8 +16,8 @@ pub(crate) struct FleetGround {
     ground: Ground,
 }
 
-fn of_fleet(py: Python<'_>, fault: &Fault) -> PyErr {
-    refused(py, &fault.to_string())
+fn fleet_error(py: Python<'_>, fault: &Fault) -> PyErr {
+    input_error(py, &fault.to_string())
 }
 
 /// The plan that reference recordings make, as JSON.
@@ -46,7 +46,7 @@ pub(crate) fn fleet_plan(
         let reference: Vec<&Path> = reference.iter().map(PathBuf::as_path).collect();
         Plan::make(&model, &reading, &reference).map(|plan| plan.json())
     });
-    made.map_err(|fault| of_fleet(py, &fault))
+    made.map_err(|fault| fleet_error(py, &fault))
 }
 
 /// Adds summaries; `None` without any.
@@ -66,7 +66,7 @@ pub(crate) fn fleet_merge(
         }
         Ok(sum.map(|sum| sum.bytes()))
     });
-    let merged = merged.map_err(|fault| of_fleet(py, &fault))?;
+    let merged = merged.map_err(|fault| fleet_error(py, &fault))?;
     Ok(merged.map(|bytes| PyBytes::new(py, &bytes)))
 }
 
@@ -75,7 +75,7 @@ impl FleetGround {
     #[new]
     fn new(py: Python<'_>, plan: &str) -> PyResult<Self> {
         let made = py.detach(|| Plan::parse("the plan", plan).and_then(|plan| plan.ground()));
-        let ground = made.map_err(|fault| of_fleet(py, &fault))?;
+        let ground = made.map_err(|fault| fleet_error(py, &fault))?;
         Ok(Self { ground })
     }
 
@@ -117,7 +117,7 @@ impl FleetGround {
             let fit = self.ground.solve(&summary)?;
             Ok(self.ground.json(&fit).to_string())
         });
-        solved.map_err(|fault: Fault| of_fleet(py, &fault))
+        solved.map_err(|fault: Fault| fleet_error(py, &fault))
     }
 
     /// The days of a robot in order, each with its summary, as JSON.
@@ -130,6 +130,6 @@ impl FleetGround {
             let robot = modelmill_fleet::robot::robot(&self.ground, name, &days)?;
             Ok(robot.json(&self.ground).to_string())
         });
-        found.map_err(|fault: Fault| of_fleet(py, &fault))
+        found.map_err(|fault: Fault| fleet_error(py, &fault))
     }
 }

@@ -21,7 +21,7 @@ mod _core {
     #[pymodule_export]
     use crate::model::{CoreModel, contents, import_text, kinds, load, load_text};
     #[pymodule_export]
-    use crate::results::{Excited, Found, Recorded};
+    use crate::results::{PythonExcitation, PythonResult, PythonRecording};
     #[pymodule_export]
-    use crate::rigs::{Simulated, reduce, simulate};
+    use crate::rigs::{PythonSimulation, reduce, simulate};
 }

@@ -19,23 +19,23 @@ use modelmill::{Error, FitFile, Host, Model, Outcome, export, import, print};
 use numpy::{PyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 
-use crate::arrays::rows;
-use crate::errors::refused;
-use crate::options::{self, EstimationOptions, ExcitationOptions, ReadingOptions, Says};
-use crate::results::{Excited, Found, Recorded, Remarks, Source, remarks};
-use crate::spelling::{self, spelled};
-use crate::work::{Listener, at_once, work};
+use crate::arrays::state_matrix;
+use crate::errors::input_error;
+use crate::options::{self, EstimationOptions, ExcitationOptions, ReadingOptions, OptionResult};
+use crate::results::{PythonExcitation, PythonResult, PythonRecording, RemarkList, PythonSource, remarks};
+use crate::spelling::{self, format_advice};
+use crate::work::{JobListener, run_blocking, run_interruptible};
 
 /// States whose functions are computed in this thread, without looking for interrupts.
 const FEW: usize = 256;
 /// No robot description is longer, bytes.
 const LARGEST_DESCRIPTION: u64 = 16 << 20;
 
-pub(crate) type Callback<'a, 'py> = Option<&'a Bound<'py, PyAny>>;
+pub(crate) type ProgressCallback<'a, 'py> = Option<&'a Bound<'py, PyAny>>;
 
 /// A host whose jobs the listener hears.
-pub(crate) fn host(libraries: Vec<PathBuf>, at_values: bool) -> (Host, Arc<Listener>) {
-    let listener = Arc::new(Listener::default());
+pub(crate) fn new_host(libraries: Vec<PathBuf>, at_values: bool) -> (Host, Arc<JobListener>) {
+    let listener = Arc::new(JobListener::default());
     let host = Host::new()
         .with_libraries(libraries)
         .at_values(at_values)
@@ -44,8 +44,8 @@ pub(crate) fn host(libraries: Vec<PathBuf>, at_values: bool) -> (Host, Arc<Liste
 }
 
 /// Options that make sense, or an exception.
-fn asked<T>(py: Python<'_>, says: Says<T>) -> PyResult<T> {
-    says.map_err(|says| refused(py, &says))
+fn valid_options<T>(py: Python<'_>, says: OptionResult<T>) -> PyResult<T> {
+    says.map_err(|says| input_error(py, &says))
 }
 
 /// Reads a model file.
@@ -57,8 +57,8 @@ pub(crate) fn load(
     at_values: bool,
     progress: Option<Bound<'_, PyAny>>,
 ) -> PyResult<CoreModel> {
-    let (host, listener) = host(libraries, at_values);
-    let model = work(py, &listener, progress.as_ref(), || host.model(&path))?;
+    let (host, listener) = new_host(libraries, at_values);
+    let model = run_interruptible(py, &listener, progress.as_ref(), || host.model(&path))?;
     Ok(CoreModel::new(model, listener))
 }
 
@@ -72,8 +72,8 @@ pub(crate) fn load_text(
     at_values: bool,
     progress: Option<Bound<'_, PyAny>>,
 ) -> PyResult<CoreModel> {
-    let (host, listener) = host(libraries, at_values);
-    let model = work(py, &listener, progress.as_ref(), || {
+    let (host, listener) = new_host(libraries, at_values);
+    let model = run_interruptible(py, &listener, progress.as_ref(), || {
         host.derive(name, host.load_text(Path::new(name), text)?)
     })?;
     Ok(CoreModel::new(model, listener))
@@ -90,8 +90,8 @@ pub(crate) fn import_text(
     round_angles: bool,
     closures: Option<PathBuf>,
     pose: Vec<(String, f64)>,
-) -> PyResult<(String, Remarks)> {
-    let (host, listener) = host(Vec::new(), false);
+) -> PyResult<(String, RemarkList)> {
+    let (host, listener) = new_host(Vec::new(), false);
     let read = |path: &Path| {
         let read = host.files().read_text(path, LARGEST_DESCRIPTION);
         read.map_err(|error| {
@@ -102,7 +102,7 @@ pub(crate) fn import_text(
             ))
         })
     };
-    let imported = work(py, &listener, None, || {
+    let imported = run_interruptible(py, &listener, None, || {
         let (text, path) = match text {
             Some(text) => (text, None),
             None => (read(Path::new(name))?, Some(Path::new(name))),
@@ -128,11 +128,11 @@ pub(crate) fn import_text(
 pub(crate) struct CoreModel {
     model: Model,
     functions: Arc<Functions>,
-    listener: Arc<Listener>,
+    listener: Arc<JobListener>,
 }
 
 impl CoreModel {
-    fn new(model: Model, listener: Arc<Listener>) -> Self {
+    fn new(model: Model, listener: Arc<JobListener>) -> Self {
         Self {
             functions: Arc::new(model.functions()),
             model,
@@ -150,22 +150,22 @@ impl CoreModel {
     }
 
     /// Another model of the same host.
-    fn like(&self, model: Model) -> Self {
+    fn with_same_host(&self, model: Model) -> Self {
         Self::new(model, Arc::clone(&self.listener))
     }
 
-    fn work<T: Send>(
+    fn run_interruptible<T: Send>(
         &self,
         py: Python<'_>,
-        progress: Callback<'_, '_>,
+        progress: ProgressCallback<'_, '_>,
         job: impl FnOnce() -> Outcome<T> + Send,
     ) -> PyResult<T> {
-        work(py, &self.listener, progress, job)
+        run_interruptible(py, &self.listener, progress, job)
     }
 }
 
 /// A function by the name of its method.
-fn named(py: Python<'_>, function: &str) -> PyResult<Function> {
+fn function_by_name(py: Python<'_>, function: &str) -> PyResult<Function> {
     Ok(match function {
         "inverse_dynamics" => Function::InverseDynamics,
         "regressor" => Function::Regressor,
@@ -173,15 +173,15 @@ fn named(py: Python<'_>, function: &str) -> PyResult<Function> {
         "bias" => Function::Bias,
         "forward_dynamics" => Function::ForwardDynamics,
         "reactions" => Function::Reactions,
-        other => return Err(refused(py, &format!("there is no function `{other}`"))),
+        other => return Err(input_error(py, &format!("there is no function `{other}`"))),
     })
 }
 
-fn recordings(all: &[PyRef<'_, Recorded>]) -> Vec<Arc<Recording>> {
+fn recordings(all: &[PyRef<'_, PythonRecording>]) -> Vec<Arc<Recording>> {
     all.iter().map(|one| Arc::clone(&one.recording)).collect()
 }
 
-fn borrowed(all: &[Arc<Recording>]) -> Vec<&Recording> {
+fn borrow_recordings(all: &[Arc<Recording>]) -> Vec<&Recording> {
     all.iter().map(|one| &**one).collect()
 }
 
@@ -247,15 +247,15 @@ impl CoreModel {
 
     /// Warnings about the model file, and remarks on the model.
     #[getter]
-    fn notes(&self) -> Remarks {
+    fn notes(&self) -> RemarkList {
         let of_file = self.model.loaded.warnings.iter();
-        let of_file = of_file.map(|one| ("warning", spelled(&one.message).into_owned()));
+        let of_file = of_file.map(|one| ("warning", format_advice(&one.message).into_owned()));
         of_file.chain(remarks(&self.model.notes)).collect()
     }
 
     /// What there is to know about nominal values that are missing.
     #[getter]
-    fn nominal_notes(&self) -> Remarks {
+    fn nominal_notes(&self) -> RemarkList {
         remarks(&self.model.nominal_values().notes)
     }
 
@@ -269,23 +269,23 @@ impl CoreModel {
             other => {
                 let says =
                     format!("format={other:?}: expected text, markdown, latex, html or json");
-                return Err(refused(py, &says));
+                return Err(input_error(py, &says));
             }
         };
         let model = &self.model;
-        let written = self.work(py, None, || match format {
+        let written = self.run_interruptible(py, None, || match format {
             Some(format) => model.equations(format),
             None => model.equations_json(),
         })?;
         Ok(written.text)
     }
 
-    fn check(&self, py: Python<'_>) -> PyResult<Found> {
-        let checked = self.work(py, None, || self.model.check())?;
-        Ok(Found::new(
+    fn check(&self, py: Python<'_>) -> PyResult<PythonResult> {
+        let checked = self.run_interruptible(py, None, || self.model.check())?;
+        Ok(PythonResult::new(
             &checked.json(),
             &checked.text(Style::PLAIN),
-            Remarks::new(),
+            RemarkList::new(),
         ))
     }
 
@@ -300,17 +300,17 @@ impl CoreModel {
             from: view,
             ..Drawing::default()
         };
-        self.work(py, None, || self.model.picture(&drawing, None))
+        self.run_interruptible(py, None, || self.model.picture(&drawing, None))
     }
 
     /// Names of the components of the reactions, and of those that are not determined.
     fn reaction_names(&self, py: Python<'_>) -> PyResult<(Vec<String>, Vec<String>)> {
-        self.work(py, None, || self.functions.reactions())
+        self.run_interruptible(py, None, || self.functions.reactions())
     }
 
     /// A function at states, its numbers row by row and state by state, and its shape.
     #[allow(clippy::too_many_arguments, reason = "each is an array of Python")]
-    fn at<'py>(
+    fn evaluate_at<'py>(
         &self,
         py: Python<'py>,
         function: &str,
@@ -320,12 +320,12 @@ impl CoreModel {
         forces: Option<PyReadonlyArray2<'py, f64>>,
         values: Vec<f64>,
     ) -> PyResult<(Bound<'py, PyArray1<f64>>, [usize; 2])> {
-        let function = named(py, function)?;
+        let function = function_by_name(py, function)?;
         let given = Given {
-            q: rows(py, &q)?,
-            qd: qd.as_ref().map(|array| rows(py, array)).transpose()?,
-            qdd: qdd.as_ref().map(|array| rows(py, array)).transpose()?,
-            forces: forces.as_ref().map(|array| rows(py, array)).transpose()?,
+            q: state_matrix(py, &q)?,
+            qd: qd.as_ref().map(|array| state_matrix(py, array)).transpose()?,
+            qdd: qdd.as_ref().map(|array| state_matrix(py, array)).transpose()?,
+            forces: forces.as_ref().map(|array| state_matrix(py, array)).transpose()?,
         };
         let few = given.q.numbers.len() <= FEW * given.q.width;
         let functions = &self.functions;
@@ -334,17 +334,17 @@ impl CoreModel {
             Ok((functions.at(function, &given, &values)?, shape))
         };
         let (found, shape) = if few {
-            at_once(py, job)?
+            run_blocking(py, job)?
         } else {
-            self.work(py, None, job)?
+            self.run_interruptible(py, None, job)?
         };
         Ok((PyArray1::from_vec(py, found), shape))
     }
 
     /// A function as C for many states, and its shape.
     fn vectors_c(&self, py: Python<'_>, function: &str) -> PyResult<(String, [usize; 2])> {
-        let function = named(py, function)?;
-        self.work(py, None, || {
+        let function = function_by_name(py, function)?;
+        self.run_interruptible(py, None, || {
             Ok((
                 self.functions.vectors_c(function)?,
                 self.functions.shape(function)?,
@@ -357,29 +357,29 @@ impl CoreModel {
         &self,
         py: Python<'_>,
         name: &str,
-        source: Source<'_>,
+        source: PythonSource<'_>,
         options: ReadingOptions,
         progress: Option<Bound<'_, PyAny>>,
-    ) -> PyResult<Recorded> {
-        let reading = asked(py, options.reading())?;
+    ) -> PyResult<PythonRecording> {
+        let reading = valid_options(py, options.reading())?;
         let model = &self.model;
         let recording = match source {
-            Source::Files(files) => self.work(py, progress.as_ref(), || {
+            PythonSource::Files(files) => self.run_interruptible(py, progress.as_ref(), || {
                 let files: Vec<&Path> = files.iter().map(PathBuf::as_path).collect();
                 model.recording_of(&files, &reading)
             }),
-            Source::Table(columns) => {
+            PythonSource::Table(columns) => {
                 let columns = columns.into_iter().map(|(name, values)| {
                     let values = values.as_array().iter().copied().collect();
                     (name, values)
                 });
                 let columns = columns.collect();
-                self.work(py, progress.as_ref(), || {
+                self.run_interruptible(py, progress.as_ref(), || {
                     model.recording_of_table(name, columns, &reading)
                 })
             }
         }?;
-        Ok(Recorded {
+        Ok(PythonRecording {
             recording: Arc::new(recording),
         })
     }
@@ -387,16 +387,16 @@ impl CoreModel {
     fn compare(
         &self,
         py: Python<'_>,
-        data: Vec<PyRef<'_, Recorded>>,
+        data: Vec<PyRef<'_, PythonRecording>>,
         values: Vec<f64>,
         name: &str,
         progress: Option<Bound<'_, PyAny>>,
-    ) -> PyResult<Found> {
+    ) -> PyResult<PythonResult> {
         let data = recordings(&data);
-        self.work(py, progress.as_ref(), || {
-            let found = self.model.compare(&borrowed(&data), &values)?;
+        self.run_interruptible(py, progress.as_ref(), || {
+            let found = self.model.compare(&borrow_recordings(&data), &values)?;
             let text = found.text(name, Style::PLAIN);
-            Ok(Found::new(&found.json(name)?, &text, remarks(&found.notes)))
+            Ok(PythonResult::new(&found.json(name)?, &text, remarks(&found.notes)))
         })
     }
 
@@ -404,29 +404,29 @@ impl CoreModel {
     fn identify(
         &self,
         py: Python<'_>,
-        data: Vec<PyRef<'_, Recorded>>,
-        check: Vec<PyRef<'_, Recorded>>,
+        data: Vec<PyRef<'_, PythonRecording>>,
+        check: Vec<PyRef<'_, PythonRecording>>,
         options: EstimationOptions,
-        instruments: Vec<PyRef<'_, Recorded>>,
+        instruments: Vec<PyRef<'_, PythonRecording>>,
         instrument_period: Option<f64>,
         progress: Option<Bound<'_, PyAny>>,
-    ) -> PyResult<Found> {
-        let estimation = asked(py, options.estimation())?;
+    ) -> PyResult<PythonResult> {
+        let estimation = valid_options(py, options.estimation())?;
         let (data, check) = (recordings(&data), recordings(&check));
         let instruments = recordings(&instruments);
-        self.work(py, progress.as_ref(), || {
-            let recorded = borrowed(&instruments);
+        self.run_interruptible(py, progress.as_ref(), || {
+            let recorded = borrow_recordings(&instruments);
             let instruments = match instrument_period {
                 Some(period) => Instruments::Period(period),
                 None if recorded.is_empty() => Instruments::None,
                 None => Instruments::Recordings(&recorded),
             };
-            let (data, check) = (borrowed(&data), borrowed(&check));
+            let (data, check) = (borrow_recordings(&data), borrow_recordings(&check));
             let found = self
                 .model
                 .identify_with(&data, &instruments, &check, &estimation)?;
             let text = found.text(&self.model, Style::PLAIN);
-            let told = Found::new(&found.json(&self.model)?, &text, remarks(&found.notes));
+            let told = PythonResult::new(&found.json(&self.model)?, &text, remarks(&found.notes));
             Ok(told.with_values(found.values()))
         })
     }
@@ -434,28 +434,28 @@ impl CoreModel {
     fn diagnose(
         &self,
         py: Python<'_>,
-        data: Vec<PyRef<'_, Recorded>>,
-        check: Vec<PyRef<'_, Recorded>>,
+        data: Vec<PyRef<'_, PythonRecording>>,
+        check: Vec<PyRef<'_, PythonRecording>>,
         held: bool,
         progress: Option<Bound<'_, PyAny>>,
-    ) -> PyResult<Found> {
+    ) -> PyResult<PythonResult> {
         let (data, check) = (recordings(&data), recordings(&check));
         let question = Question {
             held: if held { Held::All } else { Held::Known },
             ..Question::default()
         };
-        self.work(py, progress.as_ref(), || {
+        self.run_interruptible(py, progress.as_ref(), || {
             let found = self
                 .model
-                .diagnose(&borrowed(&data), &borrowed(&check), &question)?;
-            let spelling = spelling::Python;
+                .diagnose(&borrow_recordings(&data), &borrow_recordings(&check), &question)?;
+            let spelling = spelling::NotebookAdvice;
             let text = found.text(Style::PLAIN, &spelling).join("\n");
             let better = match found.entries.as_slice() {
                 [] => None,
-                entries => Some(self.like(self.model.with(entries)?)),
+                entries => Some(self.with_same_host(self.model.with(entries)?)),
             };
             Ok(
-                Found::new(&found.json(&spelling), &text, remarks(&found.notes))
+                PythonResult::new(&found.json(&spelling), &text, remarks(&found.notes))
                     .with_page(page(&found, &spelling)?)
                     .with_model(better),
             )
@@ -466,23 +466,23 @@ impl CoreModel {
     fn runs(
         &self,
         py: Python<'_>,
-        data: Vec<PyRef<'_, Recorded>>,
+        data: Vec<PyRef<'_, PythonRecording>>,
         unread: Vec<(usize, String, String)>,
         per_run: Vec<String>,
         loads: Vec<String>,
         progress: Option<Bound<'_, PyAny>>,
-    ) -> PyResult<Found> {
-        let what = asked(py, options::asked(&per_run, &loads))?;
+    ) -> PyResult<PythonResult> {
+        let what = valid_options(py, options::runs_options(&per_run, &loads))?;
         let mut all: Vec<Result<Arc<Recording>, Unread>> =
             recordings(&data).into_iter().map(Ok).collect();
         for (place, file, says) in unread {
             let error = Error::input(says);
             all.insert(place.min(all.len()), Err(Unread { file, error }));
         }
-        self.work(py, progress.as_ref(), || {
+        self.run_interruptible(py, progress.as_ref(), || {
             let found = self.model.runs(all, &what)?;
             let text = found.text(Style::PLAIN);
-            let told = Found::new(&found.json(), &text, remarks(&found.notes));
+            let told = PythonResult::new(&found.json(), &text, remarks(&found.notes));
             Ok(told.with_page(runs_page(&found)))
         })
     }
@@ -491,15 +491,15 @@ impl CoreModel {
         &self,
         py: Python<'_>,
         options: ExcitationOptions,
-        data: Vec<PyRef<'_, Recorded>>,
+        data: Vec<PyRef<'_, PythonRecording>>,
         progress: Option<Bound<'_, PyAny>>,
-    ) -> PyResult<Excited> {
-        let request = asked(py, options.request())?;
+    ) -> PyResult<PythonExcitation> {
+        let request = valid_options(py, options.request())?;
         let data = recordings(&data);
-        let found = self.work(py, progress.as_ref(), || {
-            self.model.excite(&request, &borrowed(&data))
+        let found = self.run_interruptible(py, progress.as_ref(), || {
+            self.model.excite(&request, &borrow_recordings(&data))
         })?;
-        Ok(Excited { found })
+        Ok(PythonExcitation { found })
     }
 
     /// The model with an effect; settings are values, or names of parameters.
@@ -521,11 +521,11 @@ impl CoreModel {
         let settings: Vec<Setting> = settings
             .map(|(symbol, said)| Setting { symbol, said })
             .collect();
-        let model = self.work(py, None, || {
+        let model = self.run_interruptible(py, None, || {
             let effect = new_effect(&self.model.loaded.kinds, kind, &at, &settings)?;
             self.model.with(&[effect])
         })?;
-        Ok(self.like(model))
+        Ok(self.with_same_host(model))
     }
 
     /// The model with other values of its base parameters.
@@ -535,14 +535,14 @@ impl CoreModel {
                 "{} finite values are expected, one for each base parameter",
                 self.model.base.len()
             );
-            return Err(refused(py, &says));
+            return Err(input_error(py, &says));
         }
-        Ok(self.like(self.model.with_values(&values)))
+        Ok(self.with_same_host(self.model.with_values(&values)))
     }
 
     /// Values of a fit that `identify` wrote to a file.
-    fn values_of_fit(&self, py: Python<'_>, path: PathBuf) -> PyResult<(Vec<f64>, Remarks)> {
-        let found = at_once(py, || {
+    fn values_of_fit(&self, py: Python<'_>, path: PathBuf) -> PyResult<(Vec<f64>, RemarkList)> {
+        let found = run_blocking(py, || {
             let fit = self.model.host().fit(&path)?;
             self.model.values_of(&fit, &path.display().to_string())
         })?;
@@ -556,25 +556,25 @@ impl CoreModel {
         fit: Option<&str>,
         name: &str,
         unknown: Vec<String>,
-    ) -> PyResult<Found> {
-        self.work(py, None, || {
+    ) -> PyResult<PythonResult> {
+        self.run_interruptible(py, None, || {
             let found = self
                 .model
                 .interpret(&self.fit(fit, name)?, name, &unknown)?;
             let text = found.text(Style::PLAIN);
-            Ok(Found::new(&found.json(), &text, remarks(&found.notes)))
+            Ok(PythonResult::new(&found.json(), &text, remarks(&found.notes)))
         })
     }
 
     /// The model with a fit in its file, and remarks.
-    fn adopt(&self, py: Python<'_>, fit: Option<&str>, name: &str) -> PyResult<(Self, Remarks)> {
-        let (model, notes) = self.work(py, None, || {
+    fn adopt(&self, py: Python<'_>, fit: Option<&str>, name: &str) -> PyResult<(Self, RemarkList)> {
+        let (model, notes) = self.run_interruptible(py, None, || {
             let adoption = self.model.adopt(&self.fit(fit, name)?, name)?;
             let host = self.model.host();
             let model = host.derive(&self.model.path, adoption.loaded)?;
             Ok((model, remarks(&adoption.notes)))
         })?;
-        Ok((self.like(model), notes))
+        Ok((self.with_same_host(model), notes))
     }
 
     /// A robot description of the model, with the physical parameters of a fit if there is one; and remarks.
@@ -584,14 +584,14 @@ impl CoreModel {
         format: &str,
         fit: Option<&str>,
         name: Option<&str>,
-    ) -> PyResult<(String, Remarks)> {
+    ) -> PyResult<(String, RemarkList)> {
         let mut formats = export::Format::ALL.into_iter();
         let Some(format) = formats.find(|one| one.name() == format) else {
             let known = export::Format::ALL.map(export::Format::name).join(", ");
             let says = format!("format={format:?}: expected one of {known}");
-            return Err(refused(py, &says));
+            return Err(input_error(py, &says));
         };
-        self.work(py, None, || {
+        self.run_interruptible(py, None, || {
             let fit = name.map(|name| self.fit(fit, name)).transpose()?;
             let exported = self.model.export(format, fit.as_ref().zip(name))?;
             Ok((exported.text, remarks(&exported.notes)))
@@ -603,26 +603,26 @@ impl CoreModel {
         &self,
         py: Python<'_>,
         other: PyRef<'_, Self>,
-        data: Vec<PyRef<'_, Recorded>>,
-        other_data: Vec<PyRef<'_, Recorded>>,
+        data: Vec<PyRef<'_, PythonRecording>>,
+        other_data: Vec<PyRef<'_, PythonRecording>>,
         progress: Option<Bound<'_, PyAny>>,
-    ) -> PyResult<Found> {
+    ) -> PyResult<PythonResult> {
         let models = [&self.model, &other.model.clone()];
         let runs = [recordings(&data), recordings(&other_data)];
-        self.work(py, progress.as_ref(), || {
+        self.run_interruptible(py, progress.as_ref(), || {
             let [before, after] = models;
             let changes = Changes::between(before, after);
             let mut object = changes.json(before, after);
             let mut text = changes.text(before, after, Style::PLAIN);
-            let mut notes = Remarks::new();
+            let mut notes = RemarkList::new();
             if !runs[0].is_empty() {
-                let [first, second] = [&runs[0], &runs[1]].map(|runs| borrowed(runs));
+                let [first, second] = [&runs[0], &runs[1]].map(|runs| borrow_recordings(runs));
                 let variants = Variants::along(models, [&first, &second])?;
                 object["along"] = variants.json();
                 text = format!("{text}\n\n{}", variants.text(Style::PLAIN));
                 notes = remarks(&variants.notes);
             }
-            Ok(Found::new(&object, &text, notes))
+            Ok(PythonResult::new(&object, &text, notes))
         })
     }
 
@@ -641,7 +641,7 @@ impl CoreModel {
                 "language={language:?}: expected one of {}",
                 known.join(", ")
             );
-            return Err(refused(py, &says));
+            return Err(input_error(py, &says));
         };
         let code = Code {
             language,
@@ -649,7 +649,7 @@ impl CoreModel {
             reactions,
             self_test,
         };
-        let files = self.work(py, None, || self.model.generate(&code))?;
+        let files = self.run_interruptible(py, None, || self.model.generate(&code))?;
         Ok(files
             .into_iter()
             .map(|file| (file.path, file.text))
@@ -659,20 +659,20 @@ impl CoreModel {
 
 /// What a log holds, before a model reads it.
 #[pyfunction]
-pub(crate) fn contents(py: Python<'_>, path: PathBuf) -> PyResult<Found> {
-    let (host, listener) = host(Vec::new(), false);
-    let found = work(py, &listener, None, || host.recordings(&path))?;
-    Ok(Found::new(
+pub(crate) fn contents(py: Python<'_>, path: PathBuf) -> PyResult<PythonResult> {
+    let (host, listener) = new_host(Vec::new(), false);
+    let found = run_interruptible(py, &listener, None, || host.recordings(&path))?;
+    Ok(PythonResult::new(
         &found.json(),
         &found.text(Style::PLAIN),
-        Remarks::new(),
+        RemarkList::new(),
     ))
 }
 
 /// Kinds of effects that a model may have: name and description.
 #[pyfunction]
 pub(crate) fn kinds(py: Python<'_>, libraries: Vec<PathBuf>) -> PyResult<String> {
-    let (host, _) = host(libraries, false);
-    let kinds = at_once(py, || host.kinds())?;
+    let (host, _) = new_host(libraries, false);
+    let kinds = run_blocking(py, || host.kinds())?;
     Ok(print::effects::json(&kinds).to_string())
 }

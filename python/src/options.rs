@@ -8,7 +8,7 @@ use modelmill::runs::{Asked, KnownLoad, PerRun};
 use pyo3::prelude::*;
 
 /// What is wrong with an option.
-pub(crate) type Says<T> = Result<T, String>;
+pub(crate) type OptionResult<T> = Result<T, String>;
 
 /// How a recording is read and prepared; the keywords of every method that takes recordings.
 #[derive(FromPyObject)]
@@ -29,7 +29,7 @@ pub(crate) struct ReadingOptions {
 }
 
 impl ReadingOptions {
-    pub(crate) fn reading(&self) -> Says<Reading> {
+    pub(crate) fn reading(&self) -> OptionResult<Reading> {
         let usual = Preparation::default();
         let order = self.order.unwrap_or(usual.order);
         if !(1..=MAX_FILTER_ORDER).contains(&order) {
@@ -52,15 +52,15 @@ impl ReadingOptions {
         Ok(Reading {
             columns: self.columns.clone(),
             preparation: Preparation {
-                cutoff_hz: positive("cutoff_hz", self.cutoff_hz, "a frequency in Hz such as 25")?,
+                cutoff_hz: check_positive("cutoff_hz", self.cutoff_hz, "a frequency in Hz such as 25")?,
                 order,
                 trim: self.trim,
                 decimate: self.decimate,
-                band_hz: positive("band_hz", self.band_hz, "a frequency in Hz such as 25")?,
+                band_hz: check_positive("band_hz", self.band_hz, "a frequency in Hz such as 25")?,
                 source: match self.source.as_str() {
                     "recorded" => DerivativeSource::RecordedFirst,
                     "positions" => DerivativeSource::Positions,
-                    other => return Err(one_of("source", other, &["recorded", "positions"])),
+                    other => return Err(expected_one_of("source", other, &["recorded", "positions"])),
                 },
                 smoothing: self.smoothing()?,
                 ..usual
@@ -71,8 +71,8 @@ impl ReadingOptions {
         })
     }
 
-    fn smoothing(&self) -> Says<Smoothing> {
-        let period = positive("period", self.period, "a time in s such as 7.29")?;
+    fn smoothing(&self) -> OptionResult<Smoothing> {
+        let period = check_positive("period", self.period, "a time in s such as 7.29")?;
         Ok(match (self.smoothing.as_str(), period) {
             ("auto", None) => Smoothing::Automatic,
             ("auto" | "fourier", period) => Smoothing::Fourier { period },
@@ -80,7 +80,7 @@ impl ReadingOptions {
             ("savitzky_golay", _) => Smoothing::SavitzkyGolay,
             (other, _) => {
                 let known = ["auto", "butterworth", "savitzky_golay", "fourier"];
-                return Err(one_of("smoothing", other, &known));
+                return Err(expected_one_of("smoothing", other, &known));
             }
         })
     }
@@ -99,8 +99,8 @@ pub(crate) struct EstimationOptions {
 }
 
 impl EstimationOptions {
-    pub(crate) fn estimation(&self) -> Says<Estimation> {
-        let prior = positive("prior", self.prior, "a relative deviation such as 0.2")?;
+    pub(crate) fn estimation(&self) -> OptionResult<Estimation> {
+        let prior = check_positive("prior", self.prior, "a relative deviation such as 0.2")?;
         let refinement = match (prior, self.physical, self.essential) {
             (None, false, false) => Refinement::None,
             (Some(sigma), false, false) => Refinement::Prior(sigma),
@@ -121,14 +121,14 @@ impl EstimationOptions {
                 "channels" => Weights::Channels,
                 "variance" => Weights::Variance,
                 other => {
-                    return Err(one_of(
+                    return Err(expected_one_of(
                         "weights",
                         other,
                         &["auto", "none", "channels", "variance"],
                     ));
                 }
             },
-            robust: positive("robust", self.robust, "a bound such as 1.345")?,
+            robust: check_positive("robust", self.robust, "a bound such as 1.345")?,
             refinement,
             standstill: self.standstill,
         })
@@ -154,7 +154,7 @@ pub(crate) struct ExcitationOptions {
 }
 
 impl ExcitationOptions {
-    pub(crate) fn request(&self) -> Says<Request> {
+    pub(crate) fn request(&self) -> OptionResult<Request> {
         let within = |name: &str, value: f64, least: f64, most: f64| {
             if (least..=most).contains(&value) {
                 Ok(())
@@ -178,7 +178,7 @@ impl ExcitationOptions {
         let named = |all: &[String]| {
             all.iter()
                 .map(|text| Named::parse(text))
-                .collect::<Says<_>>()
+                .collect::<OptionResult<_>>()
         };
         let separate = match &self.separate {
             None => None,
@@ -192,7 +192,7 @@ impl ExcitationOptions {
                 effect: Named::parse(effect)?,
                 from: named(&self.apart_from)?,
                 beside: named(&self.beside)?,
-                noise: positive("noise", self.noise, "a standard deviation in N or N m")?,
+                noise: check_positive("noise", self.noise, "a standard deviation in N or N m")?,
             }),
         };
         Ok(Request {
@@ -202,7 +202,7 @@ impl ExcitationOptions {
                 criterion: match self.criterion.as_str() {
                     "condition" => Criterion::Condition,
                     "log_det" => Criterion::LogDet,
-                    other => return Err(one_of("criterion", other, &["condition", "log_det"])),
+                    other => return Err(expected_one_of("criterion", other, &["condition", "log_det"])),
                 },
                 random: self.random,
                 starts: self.starts,
@@ -214,27 +214,27 @@ impl ExcitationOptions {
                 .limits
                 .iter()
                 .map(|text| Limit::parse(text))
-                .collect::<Says<_>>()?,
+                .collect::<OptionResult<_>>()?,
             separate,
         })
     }
 }
 
 /// What is asked of runs beside what changed.
-pub(crate) fn asked(per_run: &[String], loads: &[String]) -> Says<Asked> {
+pub(crate) fn runs_options(per_run: &[String], loads: &[String]) -> OptionResult<Asked> {
     Ok(Asked {
         per_run: per_run
             .iter()
             .map(|text| PerRun::parse(text))
-            .collect::<Says<_>>()?,
+            .collect::<OptionResult<_>>()?,
         loads: loads
             .iter()
             .map(|text| KnownLoad::parse(text))
-            .collect::<Says<_>>()?,
+            .collect::<OptionResult<_>>()?,
     })
 }
 
-fn positive(name: &str, value: Option<f64>, expected: &str) -> Says<Option<f64>> {
+fn check_positive(name: &str, value: Option<f64>, expected: &str) -> OptionResult<Option<f64>> {
     match value {
         Some(value) if !(value > 0.0 && value.is_finite()) => {
             Err(format!("{name}={value}: expected {expected}, above 0"))
@@ -243,6 +243,6 @@ fn positive(name: &str, value: Option<f64>, expected: &str) -> Says<Option<f64>>
     }
 }
 
-fn one_of(name: &str, given: &str, known: &[&str]) -> String {
+fn expected_one_of(name: &str, given: &str, known: &[&str]) -> String {
     format!("{name}={given:?}: expected one of {}", known.join(", "))
 }

@@ -10,49 +10,49 @@ use pyo3::prelude::*;
 use serde_json::Value;
 
 use crate::model::CoreModel;
-use crate::spelling::{spelled, spelled_in};
+use crate::spelling::{format_advice, format_advice_in_json};
 
 /// Remarks: severity and text.
-pub(crate) type Remarks = Vec<(&'static str, String)>;
+pub(crate) type RemarkList = Vec<(&'static str, String)>;
 
-pub(crate) fn remarks<'a>(notes: impl IntoIterator<Item = &'a Note>) -> Remarks {
+pub(crate) fn remarks<'a>(notes: impl IntoIterator<Item = &'a Note>) -> RemarkList {
     let one = |note: &Note| {
         let severity = match note.severity {
             Severity::Warning => "warning",
             Severity::Info => "info",
         };
-        (severity, spelled(&note.says).into_owned())
+        (severity, format_advice(&note.says).into_owned())
     };
     notes.into_iter().map(one).collect()
 }
 
 /// Where a recording comes from: files of one run, or columns with their names.
 #[derive(FromPyObject)]
-pub(crate) enum Source<'py> {
+pub(crate) enum PythonSource<'py> {
     Files(Vec<PathBuf>),
     Table(Vec<(String, PyReadonlyArray1<'py, f64>)>),
 }
 
 /// A recording that was read and prepared for a model.
 #[pyclass(frozen)]
-pub(crate) struct Recorded {
+pub(crate) struct PythonRecording {
     pub(crate) recording: Arc<Recording>,
 }
 
 #[pymethods]
-impl Recorded {
+impl PythonRecording {
     #[getter]
     fn file(&self) -> String {
         self.recording.file().to_owned()
     }
 
     #[getter]
-    fn notes(&self) -> Remarks {
+    fn notes(&self) -> RemarkList {
         remarks(self.recording.notes())
     }
 
     /// Times of the prepared samples, then one list per coordinate of positions, rates, accelerations, then forces.
-    fn prepared<'py>(&self, py: Python<'py>) -> Prepared<'py> {
+    fn prepared_arrays<'py>(&self, py: Python<'py>) -> PreparedArrays<'py> {
         let runs = || self.recording.stretches.iter().map(|stretch| &stretch.run);
         let joined = |of: &dyn Fn(&modelmill::recording::Run) -> &[Vec<f64>]| {
             let width = runs().next().map_or(0, |run| of(run).len());
@@ -72,34 +72,34 @@ impl Recorded {
     }
 }
 
-type Columns<'py> = Vec<Bound<'py, PyArray1<f64>>>;
-type Prepared<'py> = (
+type ArrayColumns<'py> = Vec<Bound<'py, PyArray1<f64>>>;
+type PreparedArrays<'py> = (
     Bound<'py, PyArray1<f64>>,
-    Columns<'py>,
-    Columns<'py>,
-    Columns<'py>,
+    ArrayColumns<'py>,
+    ArrayColumns<'py>,
+    ArrayColumns<'py>,
 );
 
 /// What a verb found.
 #[pyclass(frozen)]
 #[derive(Default)]
-pub(crate) struct Found {
+pub(crate) struct PythonResult {
     /// As the program prints it with `--json`.
     json: String,
     text: String,
     /// One page of it, where there is one.
     page: Option<String>,
-    notes: Remarks,
+    notes: RemarkList,
     values: Vec<f64>,
     /// The model with what was found.
     model: Option<CoreModel>,
 }
 
-impl Found {
-    pub(crate) fn new(json: &Value, text: &str, notes: Remarks) -> Self {
+impl PythonResult {
+    pub(crate) fn new(json: &Value, text: &str, notes: RemarkList) -> Self {
         Self {
-            json: spelled_in(json).to_string(),
-            text: spelled(text).into_owned(),
+            json: format_advice_in_json(json).to_string(),
+            text: format_advice(text).into_owned(),
             notes,
             ..Self::default()
         }
@@ -122,7 +122,7 @@ impl Found {
 }
 
 #[pymethods]
-impl Found {
+impl PythonResult {
     #[getter]
     fn json(&self) -> &str {
         &self.json
@@ -139,7 +139,7 @@ impl Found {
     }
 
     #[getter]
-    fn notes(&self) -> Remarks {
+    fn notes(&self) -> RemarkList {
         self.notes.clone()
     }
 
@@ -156,24 +156,24 @@ impl Found {
 
 /// A trajectory that was found.
 #[pyclass(frozen)]
-pub(crate) struct Excited {
+pub(crate) struct PythonExcitation {
     pub(crate) found: modelmill::excite::Excited,
 }
 
 #[pymethods]
-impl Excited {
+impl PythonExcitation {
     #[getter]
     fn json(&self) -> String {
-        spelled_in(&self.found.json()).to_string()
+        format_advice_in_json(&self.found.json()).to_string()
     }
 
     #[getter]
     fn text(&self) -> String {
-        spelled(&self.found.text(modelmill::text::style::Style::PLAIN)).into_owned()
+        format_advice(&self.found.text(modelmill::text::style::Style::PLAIN)).into_owned()
     }
 
     #[getter]
-    fn notes(&self) -> Remarks {
+    fn notes(&self) -> RemarkList {
         remarks(&self.found.notes)
     }
 
@@ -188,8 +188,8 @@ impl Excited {
     }
 
     /// Times, then positions, rates and accelerations, a list per coordinate.
-    fn motion<'py>(&self, py: Python<'py>) -> Prepared<'py> {
-        let all = |columns: &[Vec<f64>]| -> Columns<'py> {
+    fn motion<'py>(&self, py: Python<'py>) -> PreparedArrays<'py> {
+        let all = |columns: &[Vec<f64>]| -> ArrayColumns<'py> {
             columns
                 .iter()
                 .map(|column| PyArray1::from_slice(py, column))

@@ -7,18 +7,18 @@ use numpy::PyArray1;
 use pyo3::prelude::*;
 use serde_json::json;
 
-use crate::model::host;
-use crate::results::{Found, Remarks};
-use crate::work::work;
+use crate::model::new_host;
+use crate::results::{PythonResult, RemarkList};
+use crate::work::run_interruptible;
 
 /// What the sensors of a rig read.
 #[pyclass(frozen)]
-pub(crate) struct Simulated {
+pub(crate) struct PythonSimulation {
     made: modelmill::simulate::Simulated,
 }
 
 #[pymethods]
-impl Simulated {
+impl PythonSimulation {
     #[getter]
     fn json(&self) -> String {
         let made = &self.made;
@@ -43,7 +43,7 @@ impl Simulated {
     }
 
     #[getter]
-    fn notes(&self) -> Remarks {
+    fn notes(&self) -> RemarkList {
         let notes = self.made.notes.iter();
         notes.map(|says| ("info", says.clone())).collect()
     }
@@ -70,12 +70,12 @@ pub(crate) fn simulate(
     columns: Vec<(String, String)>,
     seed: Option<u64>,
     progress: Option<Bound<'_, PyAny>>,
-) -> PyResult<Simulated> {
-    let (host, listener) = host(Vec::new(), false);
-    let made = work(py, &listener, progress.as_ref(), || {
+) -> PyResult<PythonSimulation> {
+    let (host, listener) = new_host(Vec::new(), false);
+    let made = run_interruptible(py, &listener, progress.as_ref(), || {
         host.simulate(&rig, &trajectory, &columns, seed)
     })?;
-    Ok(Simulated { made })
+    Ok(PythonSimulation { made })
 }
 
 /// Reduces a rig to a planar model: what was assumed, and the text of the model file.
@@ -85,15 +85,15 @@ pub(crate) fn reduce(
     rig: PathBuf,
     plan: Option<PathBuf>,
     progress: Option<Bound<'_, PyAny>>,
-) -> PyResult<(Found, String)> {
-    let (host, listener) = host(Vec::new(), false);
-    let reduced = work(py, &listener, progress.as_ref(), || {
+) -> PyResult<(PythonResult, String)> {
+    let (host, listener) = new_host(Vec::new(), false);
+    let reduced = run_interruptible(py, &listener, progress.as_ref(), || {
         host.reduce(&rig, plan.as_deref())
     })?;
     let mut object = reduced.json("");
     if let Some(object) = object.as_object_mut() {
         object.shift_remove("out");
     }
-    let found = Found::new(&object, &reduced.text(), Remarks::new());
+    let found = PythonResult::new(&object, &reduced.text(), RemarkList::new());
     Ok((found, reduced.reduction.model))
 }

@@ -10,9 +10,9 @@ use modelmill::print::{self, Advised, Spelling};
 use serde_json::Value;
 
 /// Calls of methods of a model `m`.
-pub(crate) struct Python;
+pub(crate) struct NotebookAdvice;
 
-impl Spelling for Python {
+impl Spelling for NotebookAdvice {
     fn add(&self, _: &Model, effect: &NewEffect) -> String {
         let mut call = format!("m.with_effect({:?}, {}", effect.kind, places(&effect.at));
         let parameters = effect.parameters.iter();
@@ -29,10 +29,10 @@ impl Spelling for Python {
     }
 
     fn separate(&self, _: &Model, separation: &Separation) -> Option<String> {
-        let mut call = format!("m.excite(separate={:?}", named(&separation.effect));
+        let mut call = format!("m.excite(separate={:?}", effect_argument(&separation.effect));
         let rivals = separation.rivals.iter().map(|effect| {
             let effect = effect.clone();
-            named(&Named {
+            effect_argument(&Named {
                 effect,
                 values: Vec::new(),
             })
@@ -40,7 +40,7 @@ impl Spelling for Python {
         let list = |all: Vec<String>| format!("{all:?}");
         let _ = write!(call, ", apart_from={}", list(rivals.collect()));
         if !separation.beside.is_empty() {
-            let beside = separation.beside.iter().map(named).collect();
+            let beside = separation.beside.iter().map(effect_argument).collect();
             let _ = write!(call, ", beside={}", list(beside));
         }
         if let Some(noise) = separation.noise {
@@ -54,7 +54,7 @@ impl Spelling for Python {
     }
 
     fn text<'a>(&self, text: &'a str) -> Cow<'a, str> {
-        spelled(text)
+        format_advice(text)
     }
 }
 
@@ -66,7 +66,7 @@ fn places(at: &[String]) -> String {
 }
 
 /// An effect as `excite` takes it: `kind@place,place:name=value`.
-fn named(effect: &Named) -> String {
+fn effect_argument(effect: &Named) -> String {
     let mut text = format!("{}@{}", effect.effect.kind, effect.effect.at.join(","));
     for (name, value) in &effect.values {
         let _ = write!(text, ":{name}={value}");
@@ -75,7 +75,7 @@ fn named(effect: &Named) -> String {
 }
 
 /// A text of the library with its options as keywords and its verbs as methods.
-pub(crate) fn spelled(text: &str) -> Cow<'_, str> {
+pub(crate) fn format_advice(text: &str) -> Cow<'_, str> {
     print::spelled(text, |advised| match advised {
         Advised::Option("columns", Some(value)) => match value.split_once('=') {
             Some((ours, theirs)) => format!("`columns={{{ours:?}: {theirs:?}}}`"),
@@ -93,14 +93,14 @@ pub(crate) fn spelled(text: &str) -> Cow<'_, str> {
 }
 
 /// The same in all texts of an object.
-pub(crate) fn spelled_in(value: &Value) -> Value {
+pub(crate) fn format_advice_in_json(value: &Value) -> Value {
     match value {
-        Value::String(text) => Value::String(spelled(text).into_owned()),
-        Value::Array(all) => all.iter().map(spelled_in).collect(),
+        Value::String(text) => Value::String(format_advice(text).into_owned()),
+        Value::Array(all) => all.iter().map(format_advice_in_json).collect(),
         Value::Object(all) => {
             let all = all
                 .iter()
-                .map(|(key, value)| (key.clone(), spelled_in(value)));
+                .map(|(key, value)| (key.clone(), format_advice_in_json(value)));
             Value::Object(all.collect())
         }
         other => other.clone(),

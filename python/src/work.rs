@@ -12,24 +12,24 @@ use modelmill::Outcome;
 use modelmill::progress::{Job, Progress};
 use pyo3::prelude::*;
 
-use crate::errors::{of_library, refused};
+use crate::errors::{library_error, input_error};
 
 /// How often an interrupt is looked for and progress is told.
 const TICK: Duration = Duration::from_millis(50);
 
 /// Hears which jobs of a model go on, and stops them.
 #[derive(Default)]
-pub(crate) struct Listener(Mutex<Heard>);
+pub(crate) struct JobListener(Mutex<ListenerState>);
 
 #[derive(Default)]
-struct Heard {
+struct ListenerState {
     jobs: Vec<(String, usize, Arc<Job>)>,
     stops: bool,
 }
 
-impl Progress for Listener {
+impl Progress for JobListener {
     fn begins(&self, what: &str, total: usize, job: &Arc<Job>) {
-        let mut heard = self.heard();
+        let mut heard = self.lock_state();
         if heard.stops {
             job.cancel();
         }
@@ -37,31 +37,31 @@ impl Progress for Listener {
     }
 
     fn ends(&self) {
-        self.heard().jobs.pop();
+        self.lock_state().jobs.pop();
     }
 }
 
-impl Listener {
-    fn heard(&self) -> MutexGuard<'_, Heard> {
+impl JobListener {
+    fn lock_state(&self) -> MutexGuard<'_, ListenerState> {
         // What a panic leaves behind is a list of jobs, which is as good as before.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn stop(&self) {
-        let mut heard = self.heard();
+        let mut heard = self.lock_state();
         heard.stops = true;
         for (_, _, job) in &heard.jobs {
             job.cancel();
         }
     }
 
-    fn forget(&self) {
-        *self.heard() = Heard::default();
+    fn reset(&self) {
+        *self.lock_state() = ListenerState::default();
     }
 
     /// The job that began last: what it is, steps done, steps in all (0 if nobody knows).
-    fn now(&self) -> Option<(String, u64, usize)> {
-        let heard = self.heard();
+    fn current_job(&self) -> Option<(String, u64, usize)> {
+        let heard = self.lock_state();
         let (what, total, job) = heard.jobs.last()?;
         Some((what.clone(), job.done(), *total))
     }
@@ -69,9 +69,9 @@ impl Listener {
 
 /// Does work in a thread of its own while this one listens for interrupts and tells `progress` what goes on:
 /// `progress(what, done, total)`.
-pub(crate) fn work<T: Send>(
+pub(crate) fn run_interruptible<T: Send>(
     py: Python<'_>,
-    listener: &Listener,
+    listener: &JobListener,
     progress: Option<&Bound<'_, PyAny>>,
     work: impl FnOnce() -> Outcome<T> + Send,
 ) -> PyResult<T> {
@@ -89,7 +89,7 @@ pub(crate) fn work<T: Send>(
             else {
                 break;
             };
-            let told = match (progress, listener.now()) {
+            let told = match (progress, listener.current_job()) {
                 (Some(progress), Some(now)) if stopped.is_none() => progress.call1(now).map(|_| ()),
                 _ => Ok(()),
             };
@@ -101,33 +101,33 @@ pub(crate) fn work<T: Send>(
         (worker.join(), stopped)
     });
     if stopped.is_some() {
-        listener.forget();
+        listener.reset();
     }
     match (stopped, found) {
         (Some(error), _) => Err(error),
-        (None, Ok(found)) => found.map_err(|error| of_library(py, &error)),
-        (None, Err(panic)) => Err(of_panic(py, &*panic)),
+        (None, Ok(found)) => found.map_err(|error| library_error(py, &error)),
+        (None, Err(panic)) => Err(panic_error(py, &*panic)),
     }
 }
 
 /// Does short work in this thread.
-pub(crate) fn at_once<T: Send>(
+pub(crate) fn run_blocking<T: Send>(
     py: Python<'_>,
     work: impl FnOnce() -> Outcome<T> + Send,
 ) -> PyResult<T> {
     match catch_unwind(AssertUnwindSafe(work)) {
-        Ok(found) => found.map_err(|error| of_library(py, &error)),
-        Err(panic) => Err(of_panic(py, &*panic)),
+        Ok(found) => found.map_err(|error| library_error(py, &error)),
+        Err(panic) => Err(panic_error(py, &*panic)),
     }
 }
 
 /// A panic is a defect of the library.
-fn of_panic(py: Python<'_>, panic: &(dyn Any + Send)) -> PyErr {
+fn panic_error(py: Python<'_>, panic: &(dyn Any + Send)) -> PyErr {
     let said = panic.downcast_ref::<&str>().copied();
     let said = said.or_else(|| panic.downcast_ref::<String>().map(String::as_str));
     let says = format!(
         "modelmill met a defect of its own: {}. Please report it with the model file and the call.",
         said.unwrap_or("no message")
     );
-    refused(py, &says)
+    input_error(py, &says)
 }

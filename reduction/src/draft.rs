@@ -1,10 +1,10 @@
 //! The model in the making: numbers get names, names that several numbers share get their mean.
 
-use crate::report::{Report, Size};
+use crate::report::{ReductionReport, AssumptionSize};
 
 /// A named number and all that it stands for.
 #[derive(Clone, Debug)]
-pub(crate) struct Symbol {
+pub(crate) struct DraftSymbol {
     pub(crate) name: String,
     pub(crate) unit: &'static str,
     pub(crate) note: String,
@@ -12,15 +12,15 @@ pub(crate) struct Symbol {
     pub(crate) stands_for: Vec<(String, f64)>,
 }
 
-impl Symbol {
+impl DraftSymbol {
     /// The value that the model gets: the mean, at twelve digits.
     pub(crate) fn value(&self) -> f64 {
         let sum: f64 = self.stands_for.iter().map(|(_, value)| value).sum();
-        rounded(sum / self.stands_for.len().max(1) as f64)
+        round_to_12_digits(sum / self.stands_for.len().max(1) as f64)
     }
 
     /// The largest distance from that value.
-    fn deviation(&self) -> f64 {
+    fn largest_deviation(&self) -> f64 {
         let value = self.value();
         self.stands_for
             .iter()
@@ -29,17 +29,17 @@ impl Symbol {
 }
 
 /// Twelve significant digits: what follows is rounding of sums.
-pub(crate) fn rounded(value: f64) -> f64 {
+pub(crate) fn round_to_12_digits(value: f64) -> f64 {
     format!("{value:.11e}").parse().unwrap_or(value)
 }
 
 /// Named numbers in the order in which they came up.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Symbols(pub(crate) Vec<Symbol>);
+pub(crate) struct DraftSymbols(pub(crate) Vec<DraftSymbol>);
 
-impl Symbols {
+impl DraftSymbols {
     /// Lets `name` stand for one more value.
-    pub(crate) fn stand_for(
+    pub(crate) fn add_value(
         &mut self,
         name: &str,
         unit: &'static str,
@@ -49,7 +49,7 @@ impl Symbols {
     ) {
         let known = self.0.iter().position(|symbol| symbol.name == name);
         let at = known.unwrap_or_else(|| {
-            self.0.push(Symbol {
+            self.0.push(DraftSymbol {
                 name: name.to_owned(),
                 unit,
                 note: note.to_owned(),
@@ -65,11 +65,11 @@ impl Symbols {
         self.0
             .iter()
             .find(|symbol| symbol.name == name)
-            .map_or(0.0, Symbol::value)
+            .map_or(0.0, DraftSymbol::value)
     }
 
     /// Step 3: what shares a name, and by how much it differs.
-    pub(crate) fn report_ties(&self, report: &mut Report) {
+    pub(crate) fn report_ties(&self, report: &mut ReductionReport) {
         for symbol in self.0.iter().filter(|symbol| symbol.stands_for.len() > 1) {
             let who: Vec<&str> = symbol
                 .stands_for
@@ -80,7 +80,7 @@ impl Symbols {
                 3,
                 &symbol.name,
                 format!("stands for {}", who.join(" and ")),
-                vec![Size::new("hides", symbol.deviation(), symbol.unit)],
+                vec![AssumptionSize::new("hides", symbol.largest_deviation(), symbol.unit)],
             );
         }
     }
@@ -88,7 +88,7 @@ impl Symbols {
 
 /// A frame that turns about the normal.
 #[derive(Clone, Debug)]
-pub(crate) struct Frame {
+pub(crate) struct DraftFrame {
     pub(crate) name: String,
     pub(crate) on: String,
     /// Expressions of its origin in its carrier.
@@ -135,18 +135,18 @@ pub(crate) struct DraftEffect {
 
 /// Everything that a planar model file says.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Draft {
+pub(crate) struct PlanarDraft {
     pub(crate) name: String,
     pub(crate) title: String,
     /// Where it comes from, for the head of the file.
     pub(crate) origin: String,
     pub(crate) gravity: [String; 2],
-    pub(crate) constants: Symbols,
-    pub(crate) masses: Symbols,
-    pub(crate) centres: Symbols,
-    pub(crate) inertias: Symbols,
+    pub(crate) constants: DraftSymbols,
+    pub(crate) masses: DraftSymbols,
+    pub(crate) centres: DraftSymbols,
+    pub(crate) inertias: DraftSymbols,
     pub(crate) coordinates: Vec<DraftCoordinate>,
-    pub(crate) frames: Vec<Frame>,
+    pub(crate) frames: Vec<DraftFrame>,
     pub(crate) points: Vec<DraftPoint>,
     pub(crate) parts: Vec<DraftPart>,
     /// Name, symbol, number of shares, point.

@@ -1,34 +1,34 @@
 //! Step 4: drives of the rig on the reduced model, and how far their lengths and directions are from the true ones.
 
-use modelmill_rig::Anchor;
+use modelmill_rig::BodyAnchor;
 use nalgebra::Vector2;
 
-use crate::part::Part;
-use crate::report::{Report, Size};
-use crate::samples::{Moment, Plane, Samples};
+use crate::part::SubstitutionPart;
+use crate::report::{ReductionReport, AssumptionSize};
+use crate::samples::{MotionSample, MotionPlane, MotionSamples};
 
 /// A place as the model has it: on a part, in its frame, or in the plane.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Contact {
+pub(crate) struct ContactPlace {
     pub(crate) part: Option<usize>,
     pub(crate) at: Vector2<f64>,
 }
 
-impl Contact {
-    pub(crate) fn place(
+impl ContactPlace {
+    pub(crate) fn plane_position(
         &self,
-        parts: &[Part],
-        moment: &Moment,
-        plane: &Plane,
-        samples: &Samples,
+        parts: &[SubstitutionPart],
+        moment: &MotionSample,
+        plane: &MotionPlane,
+        samples: &MotionSamples,
     ) -> Vector2<f64> {
         self.part.map_or(self.at, |part| {
-            parts[part].placed(&self.at, moment, plane, samples)
+            parts[part].model_position(&self.at, moment, plane, samples)
         })
     }
 
     /// The nearest place on the longitudinal axis at the same distance from the joint.
-    pub(crate) fn on_axis(self) -> Self {
+    pub(crate) fn projected_on_axis(self) -> Self {
         let at = Vector2::new(self.at.norm().copysign(self.at.x), 0.0);
         if self.part.is_some() {
             Self { at, ..self }
@@ -41,16 +41,16 @@ impl Contact {
 /// Compares a linear drive of the model with the rig's along the samples.
 pub(crate) fn check_linear(
     name: &str,
-    ends: [Anchor; 2],
-    contacts: [Contact; 2],
-    parts: &[Part],
-    plane: &Plane,
-    samples: &Samples,
-    report: &mut Report,
+    ends: [BodyAnchor; 2],
+    contacts: [ContactPlace; 2],
+    parts: &[SubstitutionPart],
+    plane: &MotionPlane,
+    samples: &MotionSamples,
+    report: &mut ReductionReport,
 ) {
-    let vectors = |moment: &Moment| {
-        let truth = plane.place(&moment.place(&ends[1])) - plane.place(&moment.place(&ends[0]));
-        let [from, to] = contacts.map(|contact| contact.place(parts, moment, plane, samples));
+    let vectors = |moment: &MotionSample| {
+        let truth = plane.plane_position(&moment.place(&ends[1])) - plane.plane_position(&moment.place(&ends[0]));
+        let [from, to] = contacts.map(|contact| contact.plane_position(parts, moment, plane, samples));
         (truth, to - from)
     };
     let length = samples.largest(|moment| {
@@ -71,9 +71,9 @@ pub(crate) fn check_linear(
         name,
         "acts between the same points",
         vec![
-            Size::new("length is off by", length, "m"),
-            Size::new("direction by", direction, "rad"),
-            Size::new("leans out of the plane by", out, "m"),
+            AssumptionSize::new("length is off by", length, "m"),
+            AssumptionSize::new("direction by", direction, "rad"),
+            AssumptionSize::new("leans out of the plane by", out, "m"),
         ],
     );
 }

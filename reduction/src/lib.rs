@@ -28,13 +28,13 @@ mod report;
 mod samples;
 mod write;
 
-pub use export::{ExportError, Exported, Format as ExportFormat, export};
+pub use export::{ExportError, DescriptionExport, DescriptionFormat as ExportFormat, export};
 pub use import::{
-    ImportError, Imported, ImportedJoint, LARGEST_DESCRIPTION, Options as ImportOptions,
+    ImportError, DescriptionImport, ImportedJoint, LARGEST_DESCRIPTION, Options as ImportOptions,
     expand_includes, import,
 };
-pub use plan::{Plan, plan, plan_file, plan_file_with};
-pub use plan_for::plan_for;
-pub use reduce::{Reduction, reduce};
-pub use report::{Finding, Report, Size};
+pub use plan::{ReductionPlan, plan, plan_file, plan_file_with};
+pub use plan_for::default_plan;
+pub use reduce::{PlanarReduction, reduce};
+pub use report::{ReductionFinding, ReductionReport, AssumptionSize};
 pub use samples::sampled_forces;

@@ -1,23 +1,23 @@
 //! Names of a plan looked up in its rig: bodies, groups, points, parts. All findings are collected.
 
-use modelmill_rig::{Anchor, Log, Rig, span};
+use modelmill_rig::{BodyAnchor, RigLog, Rig, source_span};
 
-use crate::part::Part;
-use crate::plan::{Name, PlanEntry};
+use crate::part::SubstitutionPart;
+use crate::plan::{PlanName, PlanEntry};
 
 /// A name that leads nowhere, which was reported.
-pub(crate) struct Unknown;
+pub(crate) struct UnknownName;
 
 /// Names that a plan may use.
-pub(crate) struct Names<'a> {
+pub(crate) struct PlanNames<'a> {
     pub(crate) rig: &'a Rig,
     pub(crate) plan: &'a PlanEntry,
     /// Groups with their bodies; a body that no group names is one by itself.
     pub(crate) groups: Vec<(String, Vec<usize>)>,
 }
 
-impl<'a> Names<'a> {
-    pub(crate) fn new(rig: &'a Rig, plan: &'a PlanEntry, log: &mut Log) -> Self {
+impl<'a> PlanNames<'a> {
+    pub(crate) fn new(rig: &'a Rig, plan: &'a PlanEntry, log: &mut RigLog) -> Self {
         let bodies: Vec<&str> = rig.bodies.iter().map(|body| body.name.as_str()).collect();
         let mut groups: Vec<(String, Vec<usize>)> = Vec::new();
         let mut taken = vec![false; bodies.len()];
@@ -25,8 +25,8 @@ impl<'a> Names<'a> {
             let mut members = Vec::new();
             for name in &group.bodies {
                 match bodies.iter().position(|body| body == name.get_ref()) {
-                    None => log.unknown(0, name, "body of the rig", &bodies),
-                    Some(at) if taken[at] => twice(name, "group", log),
+                    None => log.unknown_name(0, name, "body of the rig", &bodies),
+                    Some(at) if taken[at] => report_duplicate(name, "group", log),
                     Some(at) => {
                         taken[at] = true;
                         members.push(at);
@@ -46,9 +46,9 @@ impl<'a> Names<'a> {
     /// Bodies of groups; each group may be used once.
     pub(crate) fn bodies(
         &self,
-        names: &[Name],
+        names: &[PlanName],
         used: &mut Vec<String>,
-        log: &mut Log,
+        log: &mut RigLog,
     ) -> Vec<usize> {
         let known: Vec<&str> = self.groups.iter().map(|(name, _)| name.as_str()).collect();
         let mut bodies = Vec::new();
@@ -58,8 +58,8 @@ impl<'a> Names<'a> {
                 .iter()
                 .find(|(group, _)| group == name.get_ref())
             {
-                None => log.unknown(0, name, "group", &known),
-                Some(_) if used.contains(name.get_ref()) => twice(name, "part or lumped mass", log),
+                None => log.unknown_name(0, name, "group", &known),
+                Some(_) if used.contains(name.get_ref()) => report_duplicate(name, "part or lumped mass", log),
                 Some((group, members)) => {
                     used.push(group.clone());
                     bodies.extend(members);
@@ -70,7 +70,7 @@ impl<'a> Names<'a> {
     }
 
     /// A point by its name in the model or, where `[points]` does not have it, in the rig.
-    pub(crate) fn point(&self, name: &Name, log: &mut Log) -> Option<Anchor> {
+    pub(crate) fn point(&self, name: &PlanName, log: &mut RigLog) -> Option<BodyAnchor> {
         let renamed = self
             .plan
             .points
@@ -89,13 +89,13 @@ impl<'a> Names<'a> {
                 .iter()
                 .map(|point| point.name.as_str())
                 .collect();
-            log.unknown(0, wanted, "point of the rig", &known);
+            log.unknown_name(0, wanted, "point of the rig", &known);
         }
         found.map(|point| point.anchor)
     }
 
     /// What the model calls a point of the rig.
-    pub(crate) fn point_name(&self, anchor: &Anchor) -> Option<String> {
+    pub(crate) fn point_name(&self, anchor: &BodyAnchor) -> Option<String> {
         let here = |name: &str| {
             self.rig
                 .points
@@ -120,11 +120,11 @@ impl<'a> Names<'a> {
     /// The part that a point is on, none for the base; only leading bodies have a place in the model.
     pub(crate) fn owner(
         &self,
-        parts: &[Part],
-        anchor: &Anchor,
-        name: &Name,
-        log: &mut Log,
-    ) -> Result<Option<usize>, Unknown> {
+        parts: &[SubstitutionPart],
+        anchor: &BodyAnchor,
+        name: &PlanName,
+        log: &mut RigLog,
+    ) -> Result<Option<usize>, UnknownName> {
         let Some(body) = anchor.body else {
             return Ok(None);
         };
@@ -141,7 +141,7 @@ impl<'a> Names<'a> {
                 })
                 .collect();
             log.error(
-                span(0, &name.span()),
+                source_span(0, &name.span()),
                 format!(
                     "`{}` is on `{}`, which leads no part",
                     name.get_ref(),
@@ -151,13 +151,13 @@ impl<'a> Names<'a> {
                 &format!("bodies that lead a part are {}", leads.join(", ")),
             );
         }
-        part.map(Some).ok_or(Unknown)
+        part.map(Some).ok_or(UnknownName)
     }
 }
 
-fn twice(name: &Name, what: &str, log: &mut Log) {
+fn report_duplicate(name: &PlanName, what: &str, log: &mut RigLog) {
     log.error(
-        span(0, &name.span()),
+        source_span(0, &name.span()),
         format!("`{}` is in more than one {what}", name.get_ref()),
         "this is the second time",
         "its mass would count twice; delete one of them",

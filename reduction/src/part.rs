@@ -4,60 +4,60 @@
 //! up to a shift that is constant in the plane, which changes no force. Then eq. (1) of the paper gives mass, centre
 //! and inertia of all together.
 
-use modelmill_rig::{Anchor, Rig};
+use modelmill_rig::{BodyAnchor, Rig};
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 
-use crate::planar::{Flat, flat};
-use crate::report::{Report, Size};
-use crate::samples::{Moment, Plane, Samples};
+use crate::planar::{PlanarBody, planar_body};
+use crate::report::{ReductionReport, AssumptionSize};
+use crate::samples::{MotionSample, MotionPlane, MotionSamples};
 
 /// A substitution part in the making.
 #[derive(Clone, Debug)]
-pub(crate) struct Part {
+pub(crate) struct SubstitutionPart {
     pub(crate) name: String,
     /// Bodies of all its groups, the leading one first.
     pub(crate) bodies: Vec<usize>,
     /// The part that carries it.
     pub(crate) parent: Option<usize>,
     /// Where its joint is: on its carrier, and on its leading body.
-    pub(crate) joint: [Anchor; 2],
+    pub(crate) joint: [BodyAnchor; 2],
     /// The end of its longitudinal axis.
-    pub(crate) to: Anchor,
+    pub(crate) to: BodyAnchor,
     /// By how much the model shifts it in the plane.
     pub(crate) shift: Vector2<f64>,
 }
 
-impl Part {
+impl SubstitutionPart {
     /// Direction of its longitudinal axis in the nominal configuration, rad.
-    pub(crate) fn nominal_angle(&self, plane: &Plane, samples: &Samples) -> f64 {
+    pub(crate) fn nominal_angle(&self, plane: &MotionPlane, samples: &MotionSamples) -> f64 {
         let nominal = &samples.nominal;
         let axis =
-            plane.place(&nominal.place(&self.to)) - plane.place(&nominal.place(&self.joint[1]));
+            plane.plane_position(&nominal.place(&self.to)) - plane.plane_position(&nominal.place(&self.joint[1]));
         axis.y.atan2(axis.x)
     }
 
     /// By how much it has turned since then, rad, within half a turn.
-    pub(crate) fn turned(&self, moment: &Moment, plane: &Plane, samples: &Samples) -> f64 {
-        turned(self.bodies[0], moment, plane, samples)
+    pub(crate) fn rotation_angle(&self, moment: &MotionSample, plane: &MotionPlane, samples: &MotionSamples) -> f64 {
+        body_rotation(self.bodies[0], moment, plane, samples)
     }
 
     /// A place of its leading body, in the part's frame.
-    pub(crate) fn local(&self, anchor: &Anchor, plane: &Plane, samples: &Samples) -> Vector2<f64> {
+    pub(crate) fn local_position(&self, anchor: &BodyAnchor, plane: &MotionPlane, samples: &MotionSamples) -> Vector2<f64> {
         let nominal = &samples.nominal;
-        let d = plane.place(&nominal.place(anchor)) - plane.place(&nominal.place(&self.joint[1]));
+        let d = plane.plane_position(&nominal.place(anchor)) - plane.plane_position(&nominal.place(&self.joint[1]));
         rotation(-self.nominal_angle(plane, samples)) * d
     }
 
     /// Where the model has a place of its frame.
-    pub(crate) fn placed(
+    pub(crate) fn model_position(
         &self,
         local: &Vector2<f64>,
-        moment: &Moment,
-        plane: &Plane,
-        samples: &Samples,
+        moment: &MotionSample,
+        plane: &MotionPlane,
+        samples: &MotionSamples,
     ) -> Vector2<f64> {
-        let angle = self.nominal_angle(plane, samples) + self.turned(moment, plane, samples);
-        plane.place(&moment.place(&self.joint[1])) + self.shift + rotation(angle) * local
+        let angle = self.nominal_angle(plane, samples) + self.rotation_angle(moment, plane, samples);
+        plane.plane_position(&moment.place(&self.joint[1])) + self.shift + rotation(angle) * local
     }
 }
 
@@ -68,14 +68,14 @@ pub(crate) fn rotation(angle: f64) -> Matrix2<f64> {
 }
 
 /// By how much a body has turned about the normal since the nominal configuration.
-fn turned(body: usize, moment: &Moment, plane: &Plane, samples: &Samples) -> f64 {
+fn body_rotation(body: usize, moment: &MotionSample, plane: &MotionPlane, samples: &MotionSamples) -> f64 {
     let then = samples.nominal.motion.bodies[body].R_WB.transpose() * plane.x;
-    let now = plane.flat(&(moment.motion.bodies[body].R_WB * then));
+    let now = plane.components(&(moment.motion.bodies[body].R_WB * then));
     now.y.atan2(now.x)
 }
 
 /// An angle within half a turn.
-fn wrapped(angle: f64) -> f64 {
+fn wrap_angle(angle: f64) -> f64 {
     let turn = 2.0 * std::f64::consts::PI;
     angle - turn * (angle / turn).round()
 }
@@ -83,25 +83,25 @@ fn wrapped(angle: f64) -> f64 {
 /// Mass, centre in the part's frame and inertia of all its bodies, eq. (1); how well they move alike is reported.
 pub(crate) fn substitute(
     rig: &Rig,
-    part: &Part,
-    plane: &Plane,
-    samples: &Samples,
-    report: &mut Report,
-) -> Flat {
+    part: &SubstitutionPart,
+    plane: &MotionPlane,
+    samples: &MotionSamples,
+    report: &mut ReductionReport,
+) -> PlanarBody {
     let lead = part.bodies[0];
     let angle = part.nominal_angle(plane, samples);
     let mut flats = Vec::new();
     for &body in &part.bodies {
-        let seen = flat(rig, body, plane, samples);
+        let seen = planar_body(rig, body, plane, samples);
         let twist = samples.largest(|moment| {
-            wrapped(turned(body, moment, plane, samples) - turned(lead, moment, plane, samples))
+            wrap_angle(body_rotation(body, moment, plane, samples) - body_rotation(lead, moment, plane, samples))
         });
-        let solid = crate::planar::solid(rig, body);
-        let at = Anchor {
+        let solid = crate::planar::spatial_body(rig, body);
+        let at = BodyAnchor {
             body: Some(body),
             at: solid.centre,
         };
-        let (arm, shift, strays) = ride(part, &at, plane, samples);
+        let (arm, shift, strays) = fit_carried_point(part, &at, plane, samples);
         if body != lead {
             report.add(
                 2,
@@ -110,38 +110,38 @@ pub(crate) fn substitute(
                     "`{}` moves like `{}`, shifted by ({}, {}) m, which changes no force",
                     rig.bodies[body].name,
                     rig.bodies[lead].name,
-                    crate::write::digits(shift.x, 6),
-                    crate::write::digits(shift.y, 6)
+                    crate::write::significant_digits(shift.x, 6),
+                    crate::write::significant_digits(shift.y, 6)
                 ),
                 vec![
-                    Size::new("angle between them changes by", twist, "rad"),
-                    Size::new("place strays by", strays, "m"),
+                    AssumptionSize::new("angle between them changes by", twist, "rad"),
+                    AssumptionSize::new("place strays by", strays, "m"),
                 ],
             );
         }
-        flats.push(Flat {
+        flats.push(PlanarBody {
             centre: rotation(-angle) * arm,
             ..seen
         });
     }
-    merge(&flats)
+    merge_bodies(&flats)
 }
 
 /// A place rides on a part if it is `joint + turn * arm + shift` at all times: arm and shift by least squares, and
 /// the largest distance from that.
-fn ride(
-    part: &Part,
-    at: &Anchor,
-    plane: &Plane,
-    samples: &Samples,
+fn fit_carried_point(
+    part: &SubstitutionPart,
+    at: &BodyAnchor,
+    plane: &MotionPlane,
+    samples: &MotionSamples,
 ) -> (Vector2<f64>, Vector2<f64>, f64) {
     let n = samples.moments.len() + 1;
     let mut matrix = DMatrix::zeros(2 * n, 4);
     let mut right = DVector::zeros(2 * n);
     let moments = || samples.moments.iter().chain([&samples.nominal]);
     for (i, moment) in moments().enumerate() {
-        let (s, c) = part.turned(moment, plane, samples).sin_cos();
-        let d = plane.place(&moment.place(at)) - plane.place(&moment.place(&part.joint[1]));
+        let (s, c) = part.rotation_angle(moment, plane, samples).sin_cos();
+        let d = plane.plane_position(&moment.place(at)) - plane.plane_position(&moment.place(&part.joint[1]));
         for (row, values) in [(2 * i, [c, -s, 1.0, 0.0]), (2 * i + 1, [s, c, 0.0, 1.0])] {
             for (k, value) in values.into_iter().enumerate() {
                 matrix[(row, k)] = value;
@@ -162,7 +162,7 @@ fn ride(
 }
 
 /// Eq. (1): total mass, common centre, inertia about it.
-pub(crate) fn merge(flats: &[Flat]) -> Flat {
+pub(crate) fn merge_bodies(flats: &[PlanarBody]) -> PlanarBody {
     let mass: f64 = flats.iter().map(|flat| flat.mass).sum();
     let moment: Vector2<f64> = flats.iter().map(|flat| flat.mass * flat.centre).sum();
     let centre = if mass > 0.0 {
@@ -174,7 +174,7 @@ pub(crate) fn merge(flats: &[Flat]) -> Flat {
         .iter()
         .map(|flat| flat.inertia + flat.mass * (flat.centre - centre).norm_squared())
         .sum();
-    Flat {
+    PlanarBody {
         mass,
         centre,
         inertia,
@@ -182,36 +182,36 @@ pub(crate) fn merge(flats: &[Flat]) -> Flat {
 }
 
 /// The three residuals of eq. (1) between what a part is and what the model says.
-pub(crate) fn residuals(whole: &Flat, said: &Flat) -> Vec<Size> {
+pub(crate) fn part_residuals(whole: &PlanarBody, said: &PlanarBody) -> Vec<AssumptionSize> {
     vec![
-        Size::new("eq. (1): mass", whole.mass - said.mass, "kg"),
-        Size::new("centre", (whole.centre - said.centre).norm(), "m"),
-        Size::new("inertia", whole.inertia - said.inertia, "kg m^2"),
+        AssumptionSize::new("eq. (1): mass", whole.mass - said.mass, "kg"),
+        AssumptionSize::new("centre", (whole.centre - said.centre).norm(), "m"),
+        AssumptionSize::new("inertia", whole.inertia - said.inertia, "kg m^2"),
     ]
 }
 
 /// A point mass in place of groups: residuals of eq. (1) in the nominal configuration, and whether they matter.
 ///
 /// `points` are the places of the masses, in equal shares, on the bodies of the rig that they ride on.
-pub(crate) fn lump(
+pub(crate) fn lump_mass(
     rig: &Rig,
     name: &str,
     bodies: &[usize],
-    points: &[Anchor],
-    plane: &Plane,
-    samples: &Samples,
-    report: &mut Report,
+    points: &[BodyAnchor],
+    plane: &MotionPlane,
+    samples: &MotionSamples,
+    report: &mut ReductionReport,
 ) -> f64 {
-    let flats: Vec<Flat> = bodies
+    let flats: Vec<PlanarBody> = bodies
         .iter()
-        .map(|body| flat(rig, *body, plane, samples))
+        .map(|body| planar_body(rig, *body, plane, samples))
         .collect();
-    let whole = merge(&flats);
-    let masses: Vec<Flat> = points
+    let whole = merge_bodies(&flats);
+    let masses: Vec<PlanarBody> = points
         .iter()
-        .map(|point| Flat {
+        .map(|point| PlanarBody {
             mass: whole.mass / points.len() as f64,
-            centre: plane.place(&samples.nominal.place(point)),
+            centre: plane.plane_position(&samples.nominal.place(point)),
             inertia: 0.0,
         })
         .collect();
@@ -223,21 +223,21 @@ pub(crate) fn lump(
     let strays = samples.largest(|moment| {
         let mut most: f64 = 0.0;
         for body in bodies {
-            let centre = Anchor {
+            let centre = BodyAnchor {
                 body: Some(*body),
-                at: crate::planar::solid(rig, *body).centre,
+                at: crate::planar::spatial_body(rig, *body).centre,
             };
             for point in points {
                 let difference = moment.acceleration(&centre) - moment.acceleration(point);
-                most = most.max(plane.flat(&difference).norm());
+                most = most.max(plane.components(&difference).norm());
             }
         }
         most
     });
-    let mut sizes = residuals(&whole, &merge(&masses));
-    sizes.push(Size::new("turns at up to", turns, "rad/s"));
-    sizes.push(Size::new("accelerates otherwise by up to", strays, "m/s^2"));
-    let says = if sizes[3].is_felt() || sizes[4].is_felt() {
+    let mut sizes = part_residuals(&whole, &merge_bodies(&masses));
+    sizes.push(AssumptionSize::new("turns at up to", turns, "rad/s"));
+    sizes.push(AssumptionSize::new("accelerates otherwise by up to", strays, "m/s^2"));
+    let says = if sizes[3].is_significant() || sizes[4].is_significant() {
         "becomes a point mass; it turns or moves otherwise than the point, so that the residuals are felt"
     } else {
         "becomes a point mass; it only translates, with the point, so that its centre and inertia change no force"

@@ -5,26 +5,26 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use modelmill_boundary::files::{Disk, Files};
-use modelmill_rig::{Failure, Log, Rig, parse, span};
-use modelmill_spec::{SourceFile, Sources, read_text};
+use modelmill_boundary::files::{DiskFiles, FileSource};
+use modelmill_rig::{LoadFailure, RigLog, Rig, parse, source_span};
+use modelmill_spec::{SourceFile, SourceFiles, read_text};
 use serde::Deserialize;
 use toml::Spanned;
 
 /// A name, with its place.
-pub(crate) type Name = Spanned<String>;
+pub(crate) type PlanName = Spanned<String>;
 
 /// A plan that was read.
 #[derive(Clone, Debug)]
-pub struct Plan {
+pub struct ReductionPlan {
     pub(crate) entry: PlanEntry,
     /// The file that it was read from.
-    pub sources: Sources,
+    pub sources: SourceFiles,
     /// The rig with points of the plan's own, where it has some.
     pub(crate) rig: Option<Box<Rig>>,
 }
 
-impl Plan {
+impl ReductionPlan {
     /// The rig that the plan is for: the one given, with the points that a made plan refers to.
     pub fn rig<'a>(&'a self, rig: &'a Rig) -> &'a Rig {
         self.rig.as_deref().unwrap_or(rig)
@@ -36,7 +36,7 @@ impl Plan {
 pub(crate) struct PlanEntry {
     pub(crate) schema: Spanned<i64>,
     /// Name of the model.
-    pub(crate) name: Name,
+    pub(crate) name: PlanName,
     pub(crate) title: Option<String>,
     #[serde(default)]
     pub(crate) plane: PlaneEntry,
@@ -45,21 +45,21 @@ pub(crate) struct PlanEntry {
     #[serde(default)]
     pub(crate) group: Vec<GroupEntry>,
     #[serde(default)]
-    pub(crate) part: Vec<PartEntry>,
+    pub(crate) part: Vec<PlanPartEntry>,
     #[serde(default)]
-    pub(crate) lumped_mass: Vec<LumpedMassEntry>,
+    pub(crate) lumped_mass: Vec<PlanLumpedMassEntry>,
     /// Names of rig points in the model, where they are to differ: model's name = rig's name.
     #[serde(default)]
-    pub(crate) points: BTreeMap<Name, Name>,
+    pub(crate) points: BTreeMap<PlanName, PlanName>,
     #[serde(default)]
-    pub(crate) constants: BTreeMap<Name, ConstantEntry>,
+    pub(crate) constants: BTreeMap<PlanName, PlanConstantEntry>,
     #[serde(default, rename = "loop")]
-    pub(crate) loops: Vec<LoopEntry>,
+    pub(crate) loops: Vec<PlanLoopEntry>,
     #[serde(default)]
-    pub(crate) drive: Vec<DriveEntry>,
+    pub(crate) drive: Vec<PlanDriveEntry>,
     /// Groups that the model shall not know.
     #[serde(default)]
-    pub(crate) leave_out: Vec<Name>,
+    pub(crate) leave_out: Vec<PlanName>,
 }
 
 /// The plane of motion, in the rig's base frame.
@@ -104,28 +104,28 @@ impl Default for SamplesEntry {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct GroupEntry {
-    pub(crate) name: Name,
-    pub(crate) bodies: Vec<Name>,
+    pub(crate) name: PlanName,
+    pub(crate) bodies: Vec<PlanName>,
 }
 
 /// A substitution part.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct PartEntry {
+pub(crate) struct PlanPartEntry {
     /// Name of the part and of its frame.
-    pub(crate) name: Name,
+    pub(crate) name: PlanName,
     /// What it stands for; the first body of the first group leads.
-    pub(crate) groups: Spanned<Vec<Name>>,
+    pub(crate) groups: Spanned<Vec<PlanName>>,
     /// The part that carries it, or `base`.
-    pub(crate) on: Name,
+    pub(crate) on: PlanName,
     /// Point of the carrier where its joint is.
-    pub(crate) at: Name,
+    pub(crate) at: PlanName,
     /// The same place on its leading body: origin of its frame.
-    pub(crate) from: Name,
+    pub(crate) from: PlanName,
     /// Point of its leading body on its longitudinal axis, which is x.
-    pub(crate) to: Name,
+    pub(crate) to: PlanName,
     /// Name of its joint's coordinate; passive unless the rig has one of this name.
-    pub(crate) coordinate: Name,
+    pub(crate) coordinate: PlanName,
     #[serde(default)]
     pub(crate) symbols: SymbolsEntry,
     /// `keep` or `drop`: what becomes of the centre's distance from the longitudinal axis.
@@ -146,11 +146,11 @@ pub(crate) struct SymbolsEntry {
 /// Groups whose mass is concentrated at points.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct LumpedMassEntry {
-    pub(crate) name: Name,
-    pub(crate) groups: Spanned<Vec<Name>>,
+pub(crate) struct PlanLumpedMassEntry {
+    pub(crate) name: PlanName,
+    pub(crate) groups: Spanned<Vec<PlanName>>,
     /// Points of the model, in equal shares.
-    pub(crate) at: Spanned<Vec<Name>>,
+    pub(crate) at: Spanned<Vec<PlanName>>,
     pub(crate) symbol: Option<String>,
     pub(crate) note: Option<String>,
 }
@@ -158,25 +158,25 @@ pub(crate) struct LumpedMassEntry {
 /// A known quantity of the model and what it stands for.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct ConstantEntry {
+pub(crate) struct PlanConstantEntry {
     /// Such as `R2m.x`: a component of a model's point in the frame of its part.
-    pub(crate) is: Vec<Name>,
+    pub(crate) is: Vec<PlanName>,
     pub(crate) note: Option<String>,
 }
 
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct LoopEntry {
-    pub(crate) name: Name,
+pub(crate) struct PlanLoopEntry {
+    pub(crate) name: PlanName,
     /// Points of the model.
-    pub(crate) joins: [Name; 2],
+    pub(crate) joins: [PlanName; 2],
 }
 
 /// How a drive of the rig is modelled.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct DriveEntry {
-    pub(crate) name: Name,
+pub(crate) struct PlanDriveEntry {
+    pub(crate) name: PlanName,
     /// Moves the contact points onto the longitudinal axes of their parts, at the same distance from the joint.
     #[serde(default)]
     pub(crate) contact_on_axis: bool,
@@ -185,23 +185,23 @@ pub(crate) struct DriveEntry {
 /// Reads a plan from its text; `path` is what messages call it.
 ///
 /// Fails with the place of what is wrong.
-pub fn plan(path: &str, text: &str) -> Result<Plan, Failure> {
-    let sources = Sources {
+pub fn plan(path: &str, text: &str) -> Result<ReductionPlan, LoadFailure> {
+    let sources = SourceFiles {
         files: vec![SourceFile {
             path: path.into(),
             text: text.to_owned(),
         }],
     };
-    let fail = |diagnostics| Failure {
+    let fail = |diagnostics| LoadFailure {
         diagnostics,
         sources: sources.clone(),
     };
     let entry: PlanEntry = parse(text, 0).map_err(|found| fail(vec![*found]))?;
-    let mut log = Log::default();
+    let mut log = RigLog::default();
     let one =
-        |log: &mut Log, is_bad: bool, range: std::ops::Range<usize>, says: &str, label: &str| {
+        |log: &mut RigLog, is_bad: bool, range: std::ops::Range<usize>, says: &str, label: &str| {
             if is_bad {
-                log.error(span(0, &range), says.to_owned(), label, "");
+                log.error(source_span(0, &range), says.to_owned(), label, "");
             }
         };
     one(
@@ -241,7 +241,7 @@ pub fn plan(path: &str, text: &str) -> Result<Plan, Failure> {
         "expected 4 to 100000 in a range above zero and up to 10",
     );
     if log.0.is_empty() {
-        Ok(Plan {
+        Ok(ReductionPlan {
             entry,
             sources,
             rig: None,
@@ -252,12 +252,12 @@ pub fn plan(path: &str, text: &str) -> Result<Plan, Failure> {
 }
 
 /// Reads a plan from disk.
-pub fn plan_file(path: &Path) -> Result<Plan, Failure> {
-    plan_file_with(path, &Disk::default())
+pub fn plan_file(path: &Path) -> Result<ReductionPlan, LoadFailure> {
+    plan_file_with(path, &DiskFiles::default())
 }
 
 /// Reads a plan from `files`.
-pub fn plan_file_with(path: &Path, files: &dyn Files) -> Result<Plan, Failure> {
+pub fn plan_file_with(path: &Path, files: &dyn FileSource) -> Result<ReductionPlan, LoadFailure> {
     let advice = "give the path of a plan, such as `model-spec/rigs/spidermill-plan.toml`";
     let text = read_text(files, path, advice)?;
     plan(&path.to_string_lossy(), &text)

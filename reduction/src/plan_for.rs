@@ -6,17 +6,17 @@
 
 use std::fmt::Write as _;
 
-use modelmill_rig::{Anchor, Point, Rig};
+use modelmill_rig::{BodyAnchor, RigPoint, Rig};
 use nalgebra::Vector3;
 
-use crate::plan::{Plan, plan};
+use crate::plan::{ReductionPlan, plan};
 
 /// Makes a plan in which every body is a part of its own.
 ///
 /// Fails when a body cannot be reached by revolute joints; such rigs need a plan by hand.
-pub fn plan_for(rig: &Rig) -> Result<Plan, String> {
+pub fn default_plan(rig: &Rig) -> Result<ReductionPlan, String> {
     let mut rig = rig.clone();
-    let hinges: Vec<(usize, [Anchor; 2])> = (0..rig.joints.len())
+    let hinges: Vec<(usize, [BodyAnchor; 2])> = (0..rig.joints.len())
         .filter_map(|j| rig.hinge(j).map(|anchors| (j, anchors)))
         .collect();
     if let Some(other) = (0..rig.joints.len()).find(|j| rig.hinge(*j).is_none()) {
@@ -55,7 +55,7 @@ pub fn plan_for(rig: &Rig) -> Result<Plan, String> {
         carried[body] = true;
         let end = far_end(&rig, &hinges, body, &from.at);
         let points =
-            [at, from, Anchor { at: end, ..from }].map(|anchor| add_point(&mut rig, &name, anchor));
+            [at, from, BodyAnchor { at: end, ..from }].map(|anchor| add_point(&mut rig, &name, anchor));
         let part = &rig.bodies[body].name;
         let on = at
             .body
@@ -86,7 +86,7 @@ pub fn plan_for(rig: &Rig) -> Result<Plan, String> {
 /// The end of a body's longitudinal axis: its farthest other joint, else its centre of mass, else along x.
 fn far_end(
     rig: &Rig,
-    hinges: &[(usize, [Anchor; 2])],
+    hinges: &[(usize, [BodyAnchor; 2])],
     body: usize,
     from: &Vector3<f64>,
 ) -> Vector3<f64> {
@@ -105,7 +105,7 @@ fn far_end(
 }
 
 /// The name of a point at a place: one that is there, or a new one.
-fn add_point(rig: &mut Rig, stem: &str, anchor: Anchor) -> String {
+fn add_point(rig: &mut Rig, stem: &str, anchor: BodyAnchor) -> String {
     if let Some(point) = rig.points.iter().find(|point| point.anchor == anchor) {
         return point.name.clone();
     }
@@ -115,7 +115,7 @@ fn add_point(rig: &mut Rig, stem: &str, anchor: Anchor) -> String {
         n += 1;
         name = format!("{stem}_{n}");
     }
-    rig.points.push(Point {
+    rig.points.push(RigPoint {
         name: name.clone(),
         anchor,
     });

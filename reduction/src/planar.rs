@@ -6,12 +6,12 @@
 use modelmill_rig::Rig;
 use nalgebra::{Matrix3, Vector2, Vector3};
 
-use crate::report::{Report, Size};
-use crate::samples::{Plane, Samples};
+use crate::report::{ReductionReport, AssumptionSize};
+use crate::samples::{MotionPlane, MotionSamples};
 
 /// A body with all masses that are fixed to it.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Solid {
+pub(crate) struct SpatialBody {
     pub(crate) mass: f64,
     /// Centre of mass in the body's frame.
     pub(crate) centre: Vector3<f64>,
@@ -20,9 +20,9 @@ pub(crate) struct Solid {
 }
 
 /// A body of the rig together with its lumped masses, by the theorem of Steiner.
-pub(crate) fn solid(rig: &Rig, body: usize) -> Solid {
+pub(crate) fn spatial_body(rig: &Rig, body: usize) -> SpatialBody {
     let own = &rig.bodies[body];
-    let mut parts = vec![Solid {
+    let mut parts = vec![SpatialBody {
         mass: own.mass,
         centre: own.centre,
         inertia: own.inertia,
@@ -32,16 +32,16 @@ pub(crate) fn solid(rig: &Rig, body: usize) -> Solid {
         .iter()
         .filter(|lumped| lumped.at.body == Some(body))
     {
-        parts.push(Solid {
+        parts.push(SpatialBody {
             mass: lumped.mass,
             centre: lumped.at.at,
             inertia: Matrix3::zeros(),
         });
     }
-    merge(&parts)
+    merge_spatial(&parts)
 }
 
-fn merge(parts: &[Solid]) -> Solid {
+fn merge_spatial(parts: &[SpatialBody]) -> SpatialBody {
     let mass: f64 = parts.iter().map(|part| part.mass).sum();
     let moment: Vector3<f64> = parts.iter().map(|part| part.mass * part.centre).sum();
     let centre = if mass > 0.0 {
@@ -49,11 +49,11 @@ fn merge(parts: &[Solid]) -> Solid {
     } else {
         parts[0].centre
     };
-    let about = |part: &Solid| {
+    let about = |part: &SpatialBody| {
         let d = part.centre - centre;
         part.inertia + part.mass * (Matrix3::identity() * d.norm_squared() - d * d.transpose())
     };
-    Solid {
+    SpatialBody {
         mass,
         centre,
         inertia: parts.iter().map(about).sum(),
@@ -62,7 +62,7 @@ fn merge(parts: &[Solid]) -> Solid {
 
 /// A body in the plane, nominal configuration.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Flat {
+pub(crate) struct PlanarBody {
     pub(crate) mass: f64,
     /// Centre of mass in the plane.
     pub(crate) centre: Vector2<f64>,
@@ -71,19 +71,19 @@ pub(crate) struct Flat {
 }
 
 /// One body as the plane sees it.
-pub(crate) fn flat(rig: &Rig, body: usize, plane: &Plane, samples: &Samples) -> Flat {
-    let solid = solid(rig, body);
+pub(crate) fn planar_body(rig: &Rig, body: usize, plane: &MotionPlane, samples: &MotionSamples) -> PlanarBody {
+    let solid = spatial_body(rig, body);
     let moves = &samples.nominal.motion.bodies[body];
     let n = moves.R_WB.transpose() * plane.normal;
-    Flat {
+    PlanarBody {
         mass: solid.mass,
-        centre: plane.place(&moves.place(&solid.centre)),
+        centre: plane.plane_position(&moves.point_position(&solid.centre)),
         inertia: n.dot(&(solid.inertia * n)),
     }
 }
 
 /// Checks that all bodies move in the plane; the largest rate out of it, with the rates of the samples up to 1.
-pub(crate) fn out_of_plane(plane: &Plane, samples: &Samples) -> f64 {
+pub(crate) fn out_of_plane_rate(plane: &MotionPlane, samples: &MotionSamples) -> f64 {
     samples.largest(|moment| {
         let bodies = moment.motion.bodies.iter();
         bodies.fold(0.0, |most: f64, body| {
@@ -99,23 +99,23 @@ pub(crate) fn check_group(
     rig: &Rig,
     name: &str,
     bodies: &[usize],
-    plane: &Plane,
-    samples: &Samples,
-    report: &mut Report,
+    plane: &MotionPlane,
+    samples: &MotionSamples,
+    report: &mut ReductionReport,
 ) {
-    let in_base: Vec<Solid> = bodies
+    let in_base: Vec<SpatialBody> = bodies
         .iter()
         .map(|body| {
-            let solid = solid(rig, *body);
+            let solid = spatial_body(rig, *body);
             let moves = &samples.nominal.motion.bodies[*body];
-            Solid {
+            SpatialBody {
                 mass: solid.mass,
-                centre: moves.place(&solid.centre),
+                centre: moves.point_position(&solid.centre),
                 inertia: moves.R_WB * solid.inertia * moves.R_WB.transpose(),
             }
         })
         .collect();
-    let whole = merge(&in_base);
+    let whole = merge_spatial(&in_base);
     let offset = plane.normal.dot(&(whole.centre - plane.at));
     let turned = whole.inertia * plane.normal;
     let moment = plane.normal.dot(&turned);
@@ -130,11 +130,11 @@ pub(crate) fn check_group(
         0.0
     };
     let sizes = vec![
-        Size::new("centre of mass out of the plane", offset, "m"),
-        Size::new("principal axis off the normal", tilt, "rad"),
-        Size::new("product of inertia", product, "kg m^2"),
+        AssumptionSize::new("centre of mass out of the plane", offset, "m"),
+        AssumptionSize::new("principal axis off the normal", tilt, "rad"),
+        AssumptionSize::new("product of inertia", product, "kg m^2"),
     ];
-    let says = if sizes.iter().any(Size::is_felt) {
+    let says = if sizes.iter().any(AssumptionSize::is_significant) {
         "is not halved by the plane; bearings feel it, planar motion and its drives do not"
     } else {
         "centre of mass in the plane, principal axis perpendicular"

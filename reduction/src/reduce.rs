@@ -1,23 +1,23 @@
 //! The four steps in a row: a rig and a plan go in, the text of a model file and the report come out.
 
-use crate::draft::Draft;
-use crate::names::Names;
-use crate::part::Part;
-use crate::plan::Plan;
-use crate::planar::{Flat, check_group, out_of_plane};
-use crate::report::{Report, Size};
-use crate::samples::{Plane, Samples};
-use crate::write::{digits, model_file};
-use modelmill_boundary::files::Memory;
-use modelmill_rig::{Failure, Log, Rig, fault};
+use crate::draft::PlanarDraft;
+use crate::names::PlanNames;
+use crate::part::SubstitutionPart;
+use crate::plan::ReductionPlan;
+use crate::planar::{PlanarBody, check_group, out_of_plane_rate};
+use crate::report::{ReductionReport, AssumptionSize};
+use crate::samples::{MotionPlane, MotionSamples};
+use crate::write::{significant_digits, model_file};
+use modelmill_boundary::files::MemoryFiles;
+use modelmill_rig::{LoadFailure, RigLog, Rig, plain_error};
 
 /// What a reduction gives.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Reduction {
+pub struct PlanarReduction {
     /// The text of the model file.
     pub model: String,
     /// What was assumed.
-    pub report: Report,
+    pub report: ReductionReport,
 }
 
 /// Rates out of the plane, gaps of joints and changes of shifts above this are no rounding.
@@ -29,20 +29,20 @@ pub(crate) const ZERO: f64 = 1e-12;
 ///
 /// Fails with every fault of the plan, each with its place: unknown names, bodies that are forgotten or used twice,
 /// bodies that leave the plane, joints that do not meet.
-pub fn reduce(rig: &Rig, plan: &Plan) -> Result<Reduction, Failure> {
-    let mut log = Log::default();
+pub fn reduce(rig: &Rig, plan: &ReductionPlan) -> Result<PlanarReduction, LoadFailure> {
+    let mut log = RigLog::default();
     let outcome = run(rig, plan, &mut log);
     match outcome {
         Some((draft, report)) if log.0.is_empty() => {
             let model = model_file(&draft);
             // What comes out is a sound model file, or the plan asks for something that is none.
             let path = format!("{}.toml (reduced)", draft.name);
-            modelmill_spec::load(&path, &model, &Memory::default())?;
-            Ok(Reduction { model, report })
+            modelmill_spec::load(&path, &model, &MemoryFiles::default())?;
+            Ok(PlanarReduction { model, report })
         }
         _ => {
             log.0.sort_by_key(|found| found.span.map(|span| span.start));
-            Err(Failure {
+            Err(LoadFailure {
                 diagnostics: log.0,
                 sources: plan.sources.clone(),
             })
@@ -50,40 +50,40 @@ pub fn reduce(rig: &Rig, plan: &Plan) -> Result<Reduction, Failure> {
     }
 }
 
-fn run(rig: &Rig, plan: &Plan, log: &mut Log) -> Option<(Draft, Report)> {
+fn run(rig: &Rig, plan: &ReductionPlan, log: &mut RigLog) -> Option<(PlanarDraft, ReductionReport)> {
     let entry = &plan.entry;
-    let names = Names::new(rig, entry, log);
-    let plane = Plane::new(entry.plane.at, entry.plane.normal, entry.plane.x);
-    let samples = match Samples::new(rig, entry.samples.number, entry.samples.range) {
+    let names = PlanNames::new(rig, entry, log);
+    let plane = MotionPlane::new(entry.plane.at, entry.plane.normal, entry.plane.x);
+    let samples = match MotionSamples::new(rig, entry.samples.number, entry.samples.range) {
         Ok(samples) if samples.moments.len() >= 4 => samples,
         Ok(samples) => {
             let says = format!(
                 "{} of {} sampled poses are out of the rig's reach; lower `range` in `[samples]`",
                 samples.n_out_of_reach, entry.samples.number
             );
-            log.0.push(fault(None, says));
+            log.0.push(plain_error(None, says));
             return None;
         }
         Err(error) => {
             log.0
-                .push(fault(None, format!("the rig does not stand: {error}")));
+                .push(plain_error(None, format!("the rig does not stand: {error}")));
             return None;
         }
     };
-    let mut work = Work {
+    let mut work = ReductionState {
         names,
         plane,
         samples,
         parts: Vec::new(),
-        draft: Draft {
+        draft: PlanarDraft {
             name: entry.name.get_ref().clone(),
             title: entry.title.clone().unwrap_or_default(),
             origin: format!("Reduced from the rig {} by modelmill reduce.", rig.name),
-            ..Draft::default()
+            ..PlanarDraft::default()
         },
-        report: Report::default(),
-        used: Vec::new(),
-        wholes: Vec::new(),
+        report: ReductionReport::default(),
+        used_groups: Vec::new(),
+        part_totals: Vec::new(),
     };
     work.planar_reduction(log);
     if !log.0.is_empty() {
@@ -98,7 +98,7 @@ fn run(rig: &Rig, plan: &Plan, log: &mut Log) -> Option<(Draft, Report)> {
     work.loops(log);
     work.drives(log);
     work.effects();
-    work.nothing_is_forgotten(log);
+    work.check_completeness(log);
     work.check_constants(log);
     let draft = work.draft;
     let mut report = work.report;
@@ -114,31 +114,31 @@ fn run(rig: &Rig, plan: &Plan, log: &mut Log) -> Option<(Draft, Report)> {
 }
 
 /// A reduction in the making.
-pub(crate) struct Work<'a> {
-    pub(crate) names: Names<'a>,
-    pub(crate) plane: Plane,
-    pub(crate) samples: Samples,
-    pub(crate) parts: Vec<Part>,
-    pub(crate) draft: Draft,
-    pub(crate) report: Report,
+pub(crate) struct ReductionState<'a> {
+    pub(crate) names: PlanNames<'a>,
+    pub(crate) plane: MotionPlane,
+    pub(crate) samples: MotionSamples,
+    pub(crate) parts: Vec<SubstitutionPart>,
+    pub(crate) draft: PlanarDraft,
+    pub(crate) report: ReductionReport,
     /// Groups that have a place in the model.
-    pub(crate) used: Vec<String>,
+    pub(crate) used_groups: Vec<String>,
     /// What each part of the draft stands for, in words and exactly.
-    pub(crate) wholes: Vec<(String, Flat)>,
+    pub(crate) part_totals: Vec<(String, PlanarBody)>,
 }
 
-impl Work<'_> {
+impl ReductionState<'_> {
     /// Step 1.
-    fn planar_reduction(&mut self, log: &mut Log) {
+    fn planar_reduction(&mut self, log: &mut RigLog) {
         let rig = self.names.rig;
-        let out = out_of_plane(&self.plane, &self.samples);
+        let out = out_of_plane_rate(&self.plane, &self.samples);
         if out.is_nan() || out > TOLERANCE {
-            log.0.push(fault(
+            log.0.push(plain_error(
                 None,
                 format!(
                     "bodies leave the plane at up to {} m/s or rad/s; give the plane of motion in `[plane]`, or model \
                      this rig in space",
-                    digits(out, 3)
+                    significant_digits(out, 3)
                 ),
             ));
         }
@@ -151,27 +151,27 @@ impl Work<'_> {
             1,
             "motion",
             format!("all bodies stay in the plane at {poses} sampled poses{reach}"),
-            vec![Size::new("largest rate out of it", out, "m/s or rad/s")],
+            vec![AssumptionSize::new("largest rate out of it", out, "m/s or rad/s")],
         );
         let across = self.plane.normal.dot(&rig.gravity);
-        let flat = self.plane.flat(&rig.gravity);
+        let flat = self.plane.components(&rig.gravity);
         self.report.add(
             1,
             "gravity",
             "acts in the plane",
-            vec![Size::new("across it", across, "m/s^2")],
+            vec![AssumptionSize::new("across it", across, "m/s^2")],
         );
         self.draft.gravity = match (flat.x.abs() > ZERO, flat.y.abs() > ZERO) {
             (false, false) => ["0", "0"].map(str::to_owned),
             (true, true) => [("gx", flat.x), ("gy", flat.y)]
                 .map(|(name, value)| self.gravity_constant(name, value)),
             (true, false) => [
-                signed(self.gravity_constant("g", flat.x.abs()), flat.x),
+                signed_name(self.gravity_constant("g", flat.x.abs()), flat.x),
                 "0".to_owned(),
             ],
             (false, true) => [
                 "0".to_owned(),
-                signed(self.gravity_constant("g", flat.y.abs()), flat.y),
+                signed_name(self.gravity_constant("g", flat.y.abs()), flat.y),
             ],
         };
         for (name, bodies) in &self.names.groups {
@@ -189,12 +189,12 @@ impl Work<'_> {
     fn gravity_constant(&mut self, name: &str, value: f64) -> String {
         self.draft
             .constants
-            .stand_for(name, "m/s^2", "acceleration of gravity", "gravity", value);
+            .add_value(name, "m/s^2", "acceleration of gravity", "gravity", value);
         name.to_owned()
     }
 }
 
-fn signed(name: String, value: f64) -> String {
+fn signed_name(name: String, value: f64) -> String {
     if value < 0.0 {
         format!("-{name}")
     } else {

@@ -1,16 +1,16 @@
 //! Loops, step 4 and what remains: drives and effects go over, and nothing is forgotten.
 
-use modelmill_rig::{Log, span};
+use modelmill_rig::{RigLog, source_span};
 
 use crate::draft::DraftEffect;
 use crate::drive::check_linear;
-use crate::plan::Name;
-use crate::reduce::{TOLERANCE, Work};
-use crate::report::Size;
-use crate::write::digits;
+use crate::plan::PlanName;
+use crate::reduce::{TOLERANCE, ReductionState};
+use crate::report::AssumptionSize;
+use crate::write::significant_digits;
 
-impl Work<'_> {
-    pub(crate) fn loops(&mut self, log: &mut Log) {
+impl ReductionState<'_> {
+    pub(crate) fn loops(&mut self, log: &mut RigLog) {
         let plan = self.names.plan;
         for entry in &plan.loops {
             let [one, two] = &entry.joins;
@@ -23,20 +23,20 @@ impl Work<'_> {
                     .parts
                     .iter()
                     .position(|part| part.bodies.first() == anchor.body.as_ref());
-                self.contact(&anchor, part)
+                self.contact_place(&anchor, part)
             });
             let gap = self.samples.largest(|moment| {
                 let [p, r] = places
-                    .map(|place| place.place(&self.parts, moment, &self.plane, &self.samples));
+                    .map(|place| place.plane_position(&self.parts, moment, &self.plane, &self.samples));
                 (p - r).norm()
             });
             if gap > TOLERANCE || gap.is_nan() {
                 log.error(
-                    span(0, &two.span()),
+                    source_span(0, &two.span()),
                     format!(
                         "the loop `{}` does not close: its points are up to {} m apart",
                         entry.name.get_ref(),
-                        digits(gap, 3)
+                        significant_digits(gap, 3)
                     ),
                     "expected a place that stays at the first point, once parts are shifted",
                     "",
@@ -46,7 +46,7 @@ impl Work<'_> {
                 2,
                 entry.name.get_ref(),
                 format!("closes where {first} meets {second}"),
-                vec![Size::new("gap", gap, "m")],
+                vec![AssumptionSize::new("gap", gap, "m")],
             );
             self.draft
                 .loops
@@ -55,7 +55,7 @@ impl Work<'_> {
     }
 
     /// Step 4.
-    pub(crate) fn drives(&mut self, log: &mut Log) {
+    pub(crate) fn drives(&mut self, log: &mut RigLog) {
         let (rig, plan) = (self.names.rig, self.names.plan);
         let known: Vec<&str> = rig.drives.iter().map(|drive| drive.name.as_str()).collect();
         for entry in plan
@@ -63,7 +63,7 @@ impl Work<'_> {
             .iter()
             .filter(|entry| !known.contains(&entry.name.get_ref().as_str()))
         {
-            log.unknown(0, &entry.name, "drive of the rig", &known);
+            log.unknown_name(0, &entry.name, "drive of the rig", &known);
         }
         for (d, drive) in rig.drives.iter().enumerate() {
             let entry = plan
@@ -88,7 +88,7 @@ impl Work<'_> {
                         self.draft.drives.push((drive.name.clone(), Ok(coordinate)));
                     }
                     None => log.error(
-                        span(0, &here.span()),
+                        source_span(0, &here.span()),
                         format!(
                             "the joint of the drive `{}` is the joint of no part",
                             drive.name
@@ -106,13 +106,13 @@ impl Work<'_> {
                 let Some(name) = self.names.point_name(&end) else {
                     continue;
                 };
-                let named = Name::new(here.span(), name.clone());
+                let named = PlanName::new(here.span(), name.clone());
                 let Ok(part) = self.names.owner(&self.parts, &end, &named, log) else {
                     continue;
                 };
-                let mut contact = self.contact(&end, part);
+                let mut contact = self.contact_place(&end, part);
                 if on_axis {
-                    contact = contact.on_axis();
+                    contact = contact.projected_on_axis();
                 }
                 self.declare(&name, contact);
                 contacts.push(contact);
@@ -140,9 +140,9 @@ impl Work<'_> {
     pub(crate) fn effects(&mut self) {
         let rig = self.names.rig;
         for effect in &rig.effects {
-            let (kind, values) = effect.law.described();
-            let drive = |place: &modelmill_rig::Place| match place {
-                modelmill_rig::Place::Drive(d) => {
+            let (kind, values) = effect.law.kind_and_values();
+            let drive = |place: &modelmill_rig::RigPlace| match place {
+                modelmill_rig::RigPlace::Drive(d) => {
                     rig.drives.get(*d).map(|drive| drive.name.clone())
                 }
                 _ => None,
@@ -162,7 +162,7 @@ impl Work<'_> {
             let is_parameter = |symbol: &str| known.parameters.iter().any(|p| p.symbol == symbol);
             // A model's parameters are linear: moments of the rod's mass about its pivot.
             let values = match effect.law {
-                modelmill_rig::Law::RodInertia { m, c, I } => {
+                modelmill_rig::RigLaw::RodInertia { m, c, I } => {
                     vec![("Jr", I + m * c * c), ("Sr", m * c), ("mr", m)]
                 }
                 _ => values,
@@ -187,18 +187,18 @@ impl Work<'_> {
     }
 
     /// Every group is in the model, or left out by name.
-    pub(crate) fn nothing_is_forgotten(&mut self, log: &mut Log) {
+    pub(crate) fn check_completeness(&mut self, log: &mut RigLog) {
         let (rig, plan) = (self.names.rig, self.names.plan);
-        let left = self.names.bodies(&plan.leave_out, &mut self.used, log);
+        let left = self.names.bodies(&plan.leave_out, &mut self.used_groups, log);
         for body in left {
-            let solid = crate::planar::solid(rig, body);
+            let solid = crate::planar::spatial_body(rig, body);
             self.report.add(
                 2,
                 &rig.bodies[body].name,
                 "is left out",
                 vec![
-                    Size::new("mass", solid.mass, "kg"),
-                    Size::new("inertia", solid.inertia.amax(), "kg m^2"),
+                    AssumptionSize::new("mass", solid.mass, "kg"),
+                    AssumptionSize::new("inertia", solid.inertia.amax(), "kg m^2"),
                 ],
             );
         }
@@ -207,11 +207,11 @@ impl Work<'_> {
             .groups
             .iter()
             .map(|(name, _)| name.as_str())
-            .filter(|name| self.used.iter().all(|used| used != name))
+            .filter(|name| self.used_groups.iter().all(|used| used != name))
             .collect();
         if !forgotten.is_empty() {
             log.error(
-                span(0, &plan.name.span()),
+                source_span(0, &plan.name.span()),
                 format!("the plan forgets {}", forgotten.join(", ")),
                 "",
                 "put each into a `[[part]]` or a `[[lumped_mass]]`, or name it in `leave_out`",
@@ -231,7 +231,7 @@ impl Work<'_> {
                 2,
                 about,
                 says,
-                vec![Size::new(
+                vec![AssumptionSize::new(
                     "moved by",
                     (lumped.at.at - lumped.moment_at).norm(),
                     "m",
@@ -241,7 +241,7 @@ impl Work<'_> {
     }
 
     /// Constants of the plan must stand for something.
-    pub(crate) fn check_constants(&self, log: &mut Log) {
+    pub(crate) fn check_constants(&self, log: &mut RigLog) {
         for is in self
             .names
             .plan
@@ -260,7 +260,7 @@ impl Work<'_> {
                     .iter()
                     .flat_map(|s| s.stands_for.iter().map(|(what, _)| what.as_str()))
                     .collect();
-                log.unknown(0, is, "quantity of the model", &known);
+                log.unknown_name(0, is, "quantity of the model", &known);
             }
         }
     }

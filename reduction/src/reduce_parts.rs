@@ -1,21 +1,21 @@
 //! Step 2 of the reduction: parts hung where they belong, with frame, coordinate, mass, centre and inertia; point
 //! masses where they ride.
 
-use modelmill_rig::{Anchor, Log, span};
+use modelmill_rig::{BodyAnchor, RigLog, source_span};
 use nalgebra::Vector2;
 
-use crate::draft::{DraftCoordinate, DraftPart, DraftPoint, Frame, rounded};
-use crate::drive::Contact;
-use crate::part::{Part, lump, residuals, substitute};
-use crate::plan::{Name, PartEntry};
-use crate::planar::Flat;
-use crate::reduce::{TOLERANCE, Work, ZERO};
-use crate::samples::Moment;
-use crate::write::digits;
+use crate::draft::{DraftCoordinate, DraftPart, DraftPoint, DraftFrame, round_to_12_digits};
+use crate::drive::ContactPlace;
+use crate::part::{SubstitutionPart, lump_mass, part_residuals, substitute};
+use crate::plan::{PlanName, PlanPartEntry};
+use crate::planar::PlanarBody;
+use crate::reduce::{TOLERANCE, ReductionState, ZERO};
+use crate::samples::MotionSample;
+use crate::write::significant_digits;
 
-impl Work<'_> {
+impl ReductionState<'_> {
     /// Step 2, parts.
-    pub(crate) fn parts(&mut self, log: &mut Log) {
+    pub(crate) fn parts(&mut self, log: &mut RigLog) {
         let plan = self.names.plan;
         for entry in &plan.part {
             if self
@@ -24,7 +24,7 @@ impl Work<'_> {
                 .any(|part| &part.name == entry.name.get_ref())
             {
                 log.error(
-                    span(0, &entry.name.span()),
+                    source_span(0, &entry.name.span()),
                     "there are two parts of this name".to_owned(),
                     "",
                     "rename one",
@@ -38,7 +38,7 @@ impl Work<'_> {
         }
         if plan.part.is_empty() {
             log.error(
-                span(0, &plan.name.span()),
+                source_span(0, &plan.name.span()),
                 "this plan has no part".to_owned(),
                 "",
                 "write a `[[part]]` for each body that the model is to have",
@@ -47,9 +47,9 @@ impl Work<'_> {
     }
 
     /// A part hung where it belongs.
-    pub(crate) fn part(&self, entry: &PartEntry, log: &mut Log) -> Option<Part> {
+    pub(crate) fn part(&self, entry: &PlanPartEntry, log: &mut RigLog) -> Option<SubstitutionPart> {
         let names = &self.names;
-        let mut used = self.used.clone();
+        let mut used = self.used_groups.clone();
         let bodies = names.bodies(entry.groups.get_ref(), &mut used, log);
         let parent = match entry.on.get_ref().as_str() {
             "base" => None,
@@ -62,7 +62,7 @@ impl Work<'_> {
                     .collect();
                 let found = self.parts.iter().position(|part| part.name == on);
                 if found.is_none() {
-                    log.unknown(0, &entry.on, "part above this one", &known);
+                    log.unknown_name(0, &entry.on, "part above this one", &known);
                     return None;
                 }
                 found
@@ -80,7 +80,7 @@ impl Work<'_> {
             if anchor.body != body {
                 let wanted = body.map_or("the base", |b| names.rig.bodies[b].name.as_str());
                 log.error(
-                    span(0, &name.span()),
+                    source_span(0, &name.span()),
                     format!("`{}` is not on {wanted}", name.get_ref()),
                     "expected a point of this body",
                     "`at` is on what carries the part, `from` and `to` are on the first body of its first group",
@@ -88,7 +88,7 @@ impl Work<'_> {
                 return None;
             }
         }
-        let mut part = Part {
+        let mut part = SubstitutionPart {
             name: entry.name.get_ref().clone(),
             bodies,
             parent,
@@ -99,7 +99,7 @@ impl Work<'_> {
         let length = (from.at - to.at).norm();
         if length < 1e-9 {
             log.error(
-                span(0, &entry.to.span()),
+                source_span(0, &entry.to.span()),
                 "this part has no length".to_owned(),
                 "expected another point than `from`",
                 "",
@@ -108,8 +108,8 @@ impl Work<'_> {
         }
         // What the model moves in the plane: the carrier's own shift, and the gap at the joint.
         let carried = parent.map_or_else(Vector2::zeros, |parent| self.parts[parent].shift);
-        let gap = |moment: &Moment| {
-            self.plane.place(&moment.place(&at)) - self.plane.place(&moment.place(&from)) + carried
+        let gap = |moment: &MotionSample| {
+            self.plane.plane_position(&moment.place(&at)) - self.plane.plane_position(&moment.place(&from)) + carried
         };
         part.shift = gap(&self.samples.nominal);
         let strays = self
@@ -117,12 +117,12 @@ impl Work<'_> {
             .largest(|moment| (gap(moment) - part.shift).norm());
         if strays > TOLERANCE || strays.is_nan() {
             log.error(
-                span(0, &entry.from.span()),
+                source_span(0, &entry.from.span()),
                 format!(
                     "`{}` does not hang at `{}`: their distance changes by {} m",
                     part.name,
                     entry.at.get_ref(),
-                    digits(strays, 3)
+                    significant_digits(strays, 3)
                 ),
                 "expected a place that keeps its distance to `at`",
                 "",
@@ -133,20 +133,20 @@ impl Work<'_> {
     }
 
     /// Frame and coordinate of the part that was added last.
-    pub(crate) fn frame(&mut self, entry: &PartEntry, log: &mut Log) {
+    pub(crate) fn frame(&mut self, entry: &PlanPartEntry, log: &mut RigLog) {
         let Some(part) = self.parts.last().cloned() else {
             return;
         };
         let carrier = part.parent.map(|parent| self.parts[parent].clone());
         let (plane, samples) = (self.plane, &self.samples);
-        let angle = |moment: &Moment| {
-            let of = |part: &Part| {
-                part.nominal_angle(&plane, samples) + part.turned(moment, &plane, samples)
+        let angle = |moment: &MotionSample| {
+            let of = |part: &SubstitutionPart| {
+                part.nominal_angle(&plane, samples) + part.rotation_angle(moment, &plane, samples)
             };
             of(&part) - carrier.as_ref().map_or(0.0, of)
         };
         let coordinate = entry.coordinate.get_ref();
-        let nominal = wrapped(angle(&samples.nominal));
+        let nominal = wrap_angle(angle(&samples.nominal));
         let active = self
             .names
             .rig
@@ -157,7 +157,7 @@ impl Work<'_> {
         if let Some(k) = active {
             let strays = |sign: f64| {
                 samples.largest(|moment| {
-                    wrapped(
+                    wrap_angle(
                         angle(moment)
                             - nominal
                             - sign * (moment.state.q[k] - samples.nominal.state.q[k]),
@@ -167,7 +167,7 @@ impl Work<'_> {
             let [ahead, back] = [1.0, -1.0].map(strays);
             if ahead.min(back) > TOLERANCE {
                 log.error(
-                    span(0, &entry.coordinate.span()),
+                    source_span(0, &entry.coordinate.span()),
                     format!(
                         "`{coordinate}` of the rig is not the angle of `{}`",
                         part.name
@@ -178,7 +178,7 @@ impl Work<'_> {
             }
             let sign = if ahead <= back { 1.0 } else { -1.0 };
             let value = samples.nominal.state.q[k];
-            let offset = wrapped(nominal - sign * value);
+            let offset = wrap_angle(nominal - sign * value);
             expression = format!(
                 "{}{coordinate}{}",
                 if sign < 0.0 { "-" } else { "" },
@@ -186,7 +186,7 @@ impl Work<'_> {
             );
             self.draft.coordinates.push(DraftCoordinate {
                 name: coordinate.clone(),
-                nominal: rounded(value),
+                nominal: round_to_12_digits(value),
                 passive: false,
             });
         } else {
@@ -200,24 +200,24 @@ impl Work<'_> {
         let (on, local) = match &carrier {
             None => (
                 "base".to_owned(),
-                plane.place(&self.samples.nominal.place(&part.joint[0])),
+                plane.plane_position(&self.samples.nominal.place(&part.joint[0])),
             ),
             Some(carrier) => (
                 carrier.name.clone(),
-                carrier.local(&part.joint[0], &plane, &self.samples),
+                carrier.local_position(&part.joint[0], &plane, &self.samples),
             ),
         };
         let at = self.components(entry.at.get_ref(), &local);
         if part.shift.norm() > ZERO {
             let says = format!(
                 "is shifted by ({}, {}) m to `{}`, which changes no force",
-                digits(part.shift.x, 6),
-                digits(part.shift.y, 6),
+                significant_digits(part.shift.x, 6),
+                significant_digits(part.shift.y, 6),
                 entry.at.get_ref()
             );
             self.report.add(2, &part.name, says, Vec::new());
         }
-        self.draft.frames.push(Frame {
+        self.draft.frames.push(DraftFrame {
             name: part.name.clone(),
             on,
             at,
@@ -237,7 +237,7 @@ impl Work<'_> {
             return format!(" {sign} {}*pi/12", twelfths.round().abs());
         }
         let name = format!("{coordinate}_offset");
-        self.draft.constants.stand_for(
+        self.draft.constants.add_value(
             &name,
             "rad",
             "from the rig's zero to the part's axis",
@@ -280,7 +280,7 @@ impl Work<'_> {
             {
                 self.draft
                     .constants
-                    .stand_for(&name, "m", &note, &what, value);
+                    .add_value(&name, "m", &note, &what, value);
             }
             *axis = name;
         }
@@ -288,11 +288,11 @@ impl Work<'_> {
     }
 
     /// Mass properties of the part that was added last.
-    pub(crate) fn body(&mut self, entry: &PartEntry, log: &mut Log) {
+    pub(crate) fn body(&mut self, entry: &PlanPartEntry, log: &mut RigLog) {
         let Some(part) = self.parts.last() else {
             return;
         };
-        self.used.extend(
+        self.used_groups.extend(
             entry
                 .groups
                 .get_ref()
@@ -313,7 +313,7 @@ impl Work<'_> {
             Some(_) => {
                 let range = entry.off_axis.as_ref().map_or(0..0, toml::Spanned::span);
                 log.error(
-                    span(0, &range),
+                    source_span(0, &range),
                     "this is no way to treat an offset".to_owned(),
                     "expected `keep` or `drop`",
                     "",
@@ -326,8 +326,8 @@ impl Work<'_> {
         let draft = &mut self.draft;
         draft
             .masses
-            .stand_for(&mass, "kg", &about("mass"), &name, whole.mass);
-        draft.inertias.stand_for(
+            .add_value(&mass, "kg", &about("mass"), &name, whole.mass);
+        draft.inertias.add_value(
             &inertia,
             "kg m^2",
             &about("inertia about the centre of mass"),
@@ -336,7 +336,7 @@ impl Work<'_> {
         );
         let mut components = ["0", "0"].map(str::to_owned);
         if whole.centre.x.abs() > ZERO {
-            draft.centres.stand_for(
+            draft.centres.add_value(
                 &centre,
                 "m",
                 &about("centre of mass along the axis"),
@@ -346,7 +346,7 @@ impl Work<'_> {
             components[0] = centre;
         }
         if whole.centre.y.abs() > ZERO && !drops {
-            draft.centres.stand_for(
+            draft.centres.add_value(
                 &across,
                 "m",
                 &about("centre of mass beside the axis"),
@@ -364,9 +364,9 @@ impl Work<'_> {
         let says = format!(
             "= {}: mass {} kg, centre ({}, {}) m, inertia {} kg m^2",
             groups.join(" + "),
-            digits(whole.mass, 8),
-            digits(whole.centre.x, 8),
-            digits(
+            significant_digits(whole.mass, 8),
+            significant_digits(whole.centre.x, 8),
+            significant_digits(
                 if whole.centre.y.abs() > ZERO {
                     whole.centre.y
                 } else {
@@ -374,9 +374,9 @@ impl Work<'_> {
                 },
                 8
             ),
-            digits(whole.inertia, 8)
+            significant_digits(whole.inertia, 8)
         );
-        self.wholes.push((says, whole));
+        self.part_totals.push((says, whole));
         draft.parts.push(DraftPart {
             name: format!("{name}_body"),
             on: name,
@@ -389,28 +389,28 @@ impl Work<'_> {
     /// Eq. (1) for every part, once all parts that share a symbol have given it their values.
     pub(crate) fn check_equation_1(&mut self) {
         let draft = &self.draft;
-        for (part, (says, whole)) in draft.parts.iter().zip(&self.wholes) {
+        for (part, (says, whole)) in draft.parts.iter().zip(&self.part_totals) {
             let value = |expression: &String| match expression.as_str() {
                 "0" => 0.0,
                 name => draft.centres.value(name),
             };
-            let said = Flat {
+            let said = PlanarBody {
                 mass: draft.masses.value(&part.mass),
                 centre: Vector2::new(value(&part.centre[0]), value(&part.centre[1])),
                 inertia: draft.inertias.value(&part.inertia),
             };
-            self.report.add(2, &part.on, says, residuals(whole, &said));
+            self.report.add(2, &part.on, says, part_residuals(whole, &said));
         }
     }
 
     /// Step 2, lumped masses.
-    pub(crate) fn lumped_masses(&mut self, log: &mut Log) {
+    pub(crate) fn lumped_masses(&mut self, log: &mut RigLog) {
         let plan = self.names.plan;
         for entry in &plan.lumped_mass {
             let bodies = self
                 .names
-                .bodies(entry.groups.get_ref(), &mut self.used, log);
-            let points: Vec<(String, Anchor)> = entry
+                .bodies(entry.groups.get_ref(), &mut self.used_groups, log);
+            let points: Vec<(String, BodyAnchor)> = entry
                 .at
                 .get_ref()
                 .iter()
@@ -421,7 +421,7 @@ impl Work<'_> {
             }
             if points.is_empty() {
                 log.error(
-                    span(0, &entry.at.span()),
+                    source_span(0, &entry.at.span()),
                     "this mass is nowhere".to_owned(),
                     "expected at least one point",
                     "",
@@ -429,9 +429,9 @@ impl Work<'_> {
                 continue;
             }
             let name = entry.name.get_ref();
-            let anchors: Vec<Anchor> = points.iter().map(|(_, anchor)| *anchor).collect();
+            let anchors: Vec<BodyAnchor> = points.iter().map(|(_, anchor)| *anchor).collect();
             let (plane, samples) = (&self.plane, &self.samples);
-            let mass = lump(
+            let mass = lump_mass(
                 self.names.rig,
                 name,
                 &bodies,
@@ -447,7 +447,7 @@ impl Work<'_> {
                 .unwrap_or_else(|| format!("mass of {name}"));
             self.draft
                 .masses
-                .stand_for(&symbol, "kg", &note, name, mass);
+                .add_value(&symbol, "kg", &note, name, mass);
             for (point, _) in &points {
                 let one = if points.len() == 1 {
                     name.clone()
@@ -462,23 +462,23 @@ impl Work<'_> {
     }
 
     /// A point of the model, declared when it is first used.
-    pub(crate) fn model_point(&mut self, name: &Name, log: &mut Log) -> Option<(String, Anchor)> {
+    pub(crate) fn model_point(&mut self, name: &PlanName, log: &mut RigLog) -> Option<(String, BodyAnchor)> {
         let anchor = self.names.point(name, log)?;
         let part = self.names.owner(&self.parts, &anchor, name, log).ok()?;
-        let contact = self.contact(&anchor, part);
+        let contact = self.contact_place(&anchor, part);
         self.declare(name.get_ref(), contact);
         Some((name.get_ref().clone(), anchor))
     }
 
-    pub(crate) fn contact(&self, anchor: &Anchor, part: Option<usize>) -> Contact {
+    pub(crate) fn contact_place(&self, anchor: &BodyAnchor, part: Option<usize>) -> ContactPlace {
         let at = match part {
-            None => self.plane.place(&self.samples.nominal.place(anchor)),
-            Some(part) => self.parts[part].local(anchor, &self.plane, &self.samples),
+            None => self.plane.plane_position(&self.samples.nominal.place(anchor)),
+            Some(part) => self.parts[part].local_position(anchor, &self.plane, &self.samples),
         };
-        Contact { part, at }
+        ContactPlace { part, at }
     }
 
-    pub(crate) fn declare(&mut self, name: &str, contact: Contact) {
+    pub(crate) fn declare(&mut self, name: &str, contact: ContactPlace) {
         if self.draft.points.iter().any(|point| point.name == name) {
             return;
         }
@@ -495,7 +495,7 @@ impl Work<'_> {
 }
 
 /// Names of a part's mass, centre along and beside its axis, and inertia.
-fn symbols_of(entry: &PartEntry) -> [String; 4] {
+fn symbols_of(entry: &PlanPartEntry) -> [String; 4] {
     let symbols = &entry.symbols;
     let all = [
         (&symbols.mass, "m"),
@@ -511,7 +511,7 @@ fn symbols_of(entry: &PartEntry) -> [String; 4] {
 }
 
 /// An angle within half a turn.
-fn wrapped(angle: f64) -> f64 {
+fn wrap_angle(angle: f64) -> f64 {
     let turn = 2.0 * std::f64::consts::PI;
     angle - turn * (angle / turn).round()
 }

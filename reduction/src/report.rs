@@ -4,14 +4,14 @@ use std::fmt::Write as _;
 
 /// Everything that a reduction assumed, in the order of the paper's four steps.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Report {
+pub struct ReductionReport {
     /// The findings.
-    pub findings: Vec<Finding>,
+    pub findings: Vec<ReductionFinding>,
 }
 
 /// One assumption with its size, or one remark.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Finding {
+pub struct ReductionFinding {
     /// Step of the strategy: 1 planar reduction, 2 substitution parts and lumped masses, 3 symmetry, 4 drives.
     pub step: u8,
     /// What it is about: a group, a part, a symbol, a drive.
@@ -19,14 +19,14 @@ pub struct Finding {
     /// What was assumed or found.
     pub says: String,
     /// Sizes of what was neglected, each with its name and unit; zero up to rounding where nothing was.
-    pub sizes: Vec<Size>,
+    pub sizes: Vec<AssumptionSize>,
 }
 
 /// How large something is.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Size {
+pub struct AssumptionSize {
     /// Of what.
-    pub of: &'static str,
+    pub quantity: &'static str,
     /// How much, not negative.
     pub value: f64,
     /// Unit.
@@ -36,24 +36,24 @@ pub struct Size {
 /// Below this a size is rounding.
 const ROUNDING: f64 = 1e-9;
 
-impl Size {
+impl AssumptionSize {
     pub(crate) fn new(of: &'static str, value: f64, unit: &'static str) -> Self {
         Self {
-            of,
+            quantity: of,
             value: value.abs(),
             unit,
         }
     }
 
     /// Whether it is more than rounding.
-    pub fn is_felt(&self) -> bool {
+    pub fn is_significant(&self) -> bool {
         self.value > ROUNDING
     }
 }
 
-impl Report {
-    pub(crate) fn add(&mut self, step: u8, about: &str, says: impl Into<String>, sizes: Vec<Size>) {
-        self.findings.push(Finding {
+impl ReductionReport {
+    pub(crate) fn add(&mut self, step: u8, about: &str, says: impl Into<String>, sizes: Vec<AssumptionSize>) {
+        self.findings.push(ReductionFinding {
             step,
             about: about.to_owned(),
             says: says.into(),
@@ -71,7 +71,7 @@ impl Report {
         ];
         let mut text = String::new();
         for (step, title) in (1..).zip(titles) {
-            let findings: Vec<&Finding> = self
+            let findings: Vec<&ReductionFinding> = self
                 .findings
                 .iter()
                 .filter(|finding| finding.step == step)
@@ -81,7 +81,7 @@ impl Report {
             }
             let _ = writeln!(text, "{title}");
             // What is exact for many groups in a row is said once.
-            for alike in findings.chunk_by(|a, b| a.is_exactly_like(b)) {
+            for alike in findings.chunk_by(|a, b| a.is_same_exact(b)) {
                 let one = alike[0];
                 if alike.len() > 1 {
                     let names: Vec<&str> = alike.iter().map(|f| f.about.as_str()).collect();
@@ -99,19 +99,19 @@ impl Report {
     }
 }
 
-impl Finding {
+impl ReductionFinding {
     /// Whether another finding says the same of something else, and both neglect nothing.
-    fn is_exactly_like(&self, other: &Self) -> bool {
-        let is_exact = |finding: &Self| !finding.sizes.iter().any(Size::is_felt);
+    fn is_same_exact(&self, other: &Self) -> bool {
+        let is_exact = |finding: &Self| !finding.sizes.iter().any(AssumptionSize::is_significant);
         self.says == other.says && is_exact(self) && is_exact(other)
     }
 }
 
-impl std::fmt::Display for Size {
+impl std::fmt::Display for AssumptionSize {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         // What is rounding shows as such by its exponent.
-        let n_digits = if self.is_felt() { 4 } else { 1 };
-        let value = crate::write::digits(self.value, n_digits);
-        write!(f, "{} {value} {}", self.of, self.unit)
+        let n_digits = if self.is_significant() { 4 } else { 1 };
+        let value = crate::write::significant_digits(self.value, n_digits);
+        write!(f, "{} {value} {}", self.quantity, self.unit)
     }
 }

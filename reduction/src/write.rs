@@ -2,24 +2,24 @@
 
 use std::fmt::Write as _;
 
-use crate::draft::{Draft, Symbol, Symbols};
+use crate::draft::{PlanarDraft, DraftSymbol, DraftSymbols};
 
 /// The text of a model file.
-pub(crate) fn model_file(draft: &Draft) -> String {
+pub(crate) fn model_file(draft: &PlanarDraft) -> String {
     let mut text = format!("# {}\n", draft.origin);
     let _ = writeln!(text, "schema = 1\nname = \"{}\"", draft.name);
     if !draft.title.is_empty() {
-        let _ = writeln!(text, "title = {}", quoted(&draft.title));
+        let _ = writeln!(text, "title = {}", toml_string(&draft.title));
     }
     if draft.gravity.iter().any(|g| g != "0") {
         let _ = writeln!(
             text,
             "gravity = [{}, {}, 0]",
-            value(&draft.gravity[0]),
-            value(&draft.gravity[1])
+            vector_value(&draft.gravity[0]),
+            vector_value(&draft.gravity[1])
         );
     }
-    table(
+    symbol_table(
         &mut text,
         "constants",
         "value",
@@ -27,9 +27,9 @@ pub(crate) fn model_file(draft: &Draft) -> String {
     );
     let mut parameters = Vec::new();
     for class in [&draft.masses, &draft.centres, &draft.inertias] {
-        parameters.extend(by_name(class));
+        parameters.extend(sorted_by_name(class));
     }
-    table(&mut text, "parameters", "nominal", &parameters);
+    symbol_table(&mut text, "parameters", "nominal", &parameters);
     text.push_str("\n[coordinates]\n");
     for coordinate in &draft.coordinates {
         let passive = if coordinate.passive {
@@ -41,7 +41,7 @@ pub(crate) fn model_file(draft: &Draft) -> String {
             text,
             "{} = {{ nominal = {}{passive} }}",
             coordinate.name,
-            float(coordinate.nominal)
+            toml_float(coordinate.nominal)
         );
     }
     frames_and_points(&mut text, draft);
@@ -50,7 +50,7 @@ pub(crate) fn model_file(draft: &Draft) -> String {
     text
 }
 
-fn frames_and_points(text: &mut String, draft: &Draft) {
+fn frames_and_points(text: &mut String, draft: &PlanarDraft) {
     for frame in &draft.frames {
         let _ = writeln!(
             text,
@@ -63,19 +63,19 @@ fn frames_and_points(text: &mut String, draft: &Draft) {
             (x, "0") => writeln!(
                 text,
                 "modified_dh = {{ a = {}, theta = \"{}\" }}",
-                value(x),
+                vector_value(x),
                 frame.angle
             ),
             (x, y) => writeln!(
                 text,
                 "transform = {{ xyz = [{}, {}, 0] }}\njoint = {{ revolute = \"{}\" }}",
-                value(x),
-                value(y),
+                vector_value(x),
+                vector_value(y),
                 frame.angle
             ),
         };
         if !frame.note.is_empty() {
-            let _ = writeln!(text, "note = {}", quoted(&frame.note));
+            let _ = writeln!(text, "note = {}", toml_string(&frame.note));
         }
     }
     for point in &draft.points {
@@ -84,13 +84,13 @@ fn frames_and_points(text: &mut String, draft: &Draft) {
             "\n[[point]]\nname = \"{}\"\non = \"{}\"\nat = [{}, {}]",
             point.name,
             point.on,
-            value(&point.at[0]),
-            value(&point.at[1])
+            vector_value(&point.at[0]),
+            vector_value(&point.at[1])
         );
     }
 }
 
-fn masses(text: &mut String, draft: &Draft) {
+fn masses(text: &mut String, draft: &PlanarDraft) {
     for part in &draft.parts {
         let _ = writeln!(
             text,
@@ -98,8 +98,8 @@ fn masses(text: &mut String, draft: &Draft) {
             part.name,
             part.on,
             part.mass,
-            value(&part.centre[0]),
-            value(&part.centre[1]),
+            vector_value(&part.centre[0]),
+            vector_value(&part.centre[1]),
             part.inertia
         );
     }
@@ -115,7 +115,7 @@ fn masses(text: &mut String, draft: &Draft) {
     }
 }
 
-fn loops_and_drives(text: &mut String, draft: &Draft) {
+fn loops_and_drives(text: &mut String, draft: &PlanarDraft) {
     for (name, [one, two]) in &draft.loops {
         let _ = writeln!(
             text,
@@ -140,7 +140,7 @@ fn loops_and_drives(text: &mut String, draft: &Draft) {
         let list = |values: &[(String, f64)], wrap: fn(&str) -> String| {
             let entries: Vec<String> = values
                 .iter()
-                .map(|(k, v)| format!("{k} = {}", wrap(&float(*v))))
+                .map(|(k, v)| format!("{k} = {}", wrap(&toml_float(*v))))
                 .collect();
             entries.join(", ")
         };
@@ -160,7 +160,7 @@ fn loops_and_drives(text: &mut String, draft: &Draft) {
     }
 }
 
-fn table(text: &mut String, name: &str, key: &str, symbols: &[&Symbol]) {
+fn symbol_table(text: &mut String, name: &str, key: &str, symbols: &[&DraftSymbol]) {
     if symbols.is_empty() {
         return;
     }
@@ -169,21 +169,21 @@ fn table(text: &mut String, name: &str, key: &str, symbols: &[&Symbol]) {
         let note = if symbol.note.is_empty() {
             String::new()
         } else {
-            format!(", note = {}", quoted(&symbol.note))
+            format!(", note = {}", toml_string(&symbol.note))
         };
         let _ = writeln!(
             text,
             "{} = {{ {key} = {}, unit = \"{}\"{note} }}",
             symbol.name,
-            float(symbol.value()),
+            toml_float(symbol.value()),
             symbol.unit
         );
     }
 }
 
 /// Symbols by their names, numbers in them by size: m2 before m10.
-fn by_name(symbols: &Symbols) -> Vec<&Symbol> {
-    let mut sorted: Vec<&Symbol> = symbols.0.iter().collect();
+fn sorted_by_name(symbols: &DraftSymbols) -> Vec<&DraftSymbol> {
+    let mut sorted: Vec<&DraftSymbol> = symbols.0.iter().collect();
     sorted.sort_by_cached_key(|symbol| {
         let mut key = String::new();
         let mut digits = String::new();
@@ -204,7 +204,7 @@ fn by_name(symbols: &Symbols) -> Vec<&Symbol> {
 }
 
 /// A value of a vector: a bare zero, or an expression.
-fn value(expression: &str) -> String {
+fn vector_value(expression: &str) -> String {
     if expression == "0" {
         "0".to_owned()
     } else {
@@ -213,12 +213,12 @@ fn value(expression: &str) -> String {
 }
 
 /// A number that TOML takes for a float.
-pub(crate) fn float(x: f64) -> String {
+pub(crate) fn toml_float(x: f64) -> String {
     format!("{x:?}")
 }
 
 /// A number with some significant digits.
-pub(crate) fn digits(x: f64, n: usize) -> String {
+pub(crate) fn significant_digits(x: f64, n: usize) -> String {
     if x == 0.0 || !x.is_finite() {
         return format!("{x}");
     }
@@ -231,6 +231,6 @@ pub(crate) fn digits(x: f64, n: usize) -> String {
 }
 
 /// Text as TOML has it.
-pub(crate) fn quoted(text: &str) -> String {
+pub(crate) fn toml_string(text: &str) -> String {
     toml::Value::from(text).to_string()
 }

@@ -4,31 +4,31 @@ use modelmill_spec::Diagnostic;
 use nalgebra::{Matrix3, Vector3};
 
 use crate::assemble_sensors::channels;
-use crate::effect::Effect;
+use crate::effect::RigEffect;
 use crate::effect_by_name::EffectPart;
 use crate::file::{
-    BodyEntry, CoordinateEntry, DriveEntry, EffectEntry, JointEntry, LengthEntry, LumpedMassEntry,
-    Name, RigEntry,
+    BodyEntry, RigCoordinateEntry, RigDriveEntry, RigEffectEntry, RigJointEntry, LengthEntry, RigLumpedMassEntry,
+    RigName, RigEntry,
 };
 use crate::joint;
-use crate::load::span;
-use crate::log::{Item, Log, above_zero, not_negative, vector};
-use crate::merge::Merged;
-use crate::pair::{Anchor, Pair, Shape};
-use crate::pose::Pose;
-use crate::rig::{Body, Coordinate, Drive, Joint, LumpedMass, Point, Rig};
-use crate::sensor::Sensors;
+use crate::load::source_span;
+use crate::log::{FileItem, RigLog, above_zero, not_negative, vector};
+use crate::merge::MergedRig;
+use crate::pair::{BodyAnchor, PairFunction, PairQuantity};
+use crate::pose::BodyPose;
+use crate::rig::{RigBody, RigCoordinate, RigDrive, RigJoint, RigLumpedMass, RigPoint, Rig};
+use crate::sensor::RigSensors;
 
 /// Makes the rig of a chain of files, the rig's own first, then what it extends.
 pub(crate) fn assemble(chain: Vec<(usize, RigEntry)>) -> Result<Rig, Vec<Diagnostic>> {
-    let mut log = Log::default();
+    let mut log = RigLog::default();
     let mut files = chain.into_iter().rev();
     let Some((file, first)) = files.next() else {
         return Err(Vec::new());
     };
-    let mut merged = Merged::new(file, first, &mut log);
+    let mut merged = MergedRig::new(file, first, &mut log);
     for (file, entry) in files {
-        merged.extend(Merged::new(file, entry, &mut log));
+        merged.extend(MergedRig::new(file, entry, &mut log));
     }
     let rig = build(&merged, &mut log);
     if log.0.is_empty() {
@@ -41,7 +41,7 @@ pub(crate) fn assemble(chain: Vec<(usize, RigEntry)>) -> Result<Rig, Vec<Diagnos
 }
 
 /// The rig of merged entries.
-fn build(merged: &Merged, log: &mut Log) -> Rig {
+fn build(merged: &MergedRig, log: &mut RigLog) -> Rig {
     let mut rig = Rig {
         name: merged.name.clone(),
         title: merged.title.clone(),
@@ -56,15 +56,15 @@ fn build(merged: &Merged, log: &mut Log) -> Rig {
         coordinates: Vec::new(),
         drives: Vec::new(),
         effects: Vec::new(),
-        sensors: Sensors::default(),
+        sensors: RigSensors::default(),
         seed: merged.seed.unwrap_or(0),
     };
     for point in &merged.points {
-        let on = body_named(&rig, point.file, &point.entry.on, log);
+        let on = find_body(&rig, point.file, &point.entry.on, log);
         let at = vector(point.file, Some(&point.entry.at), log);
-        rig.points.push(Point {
+        rig.points.push(RigPoint {
             name: point.entry.name.get_ref().clone(),
-            anchor: Anchor {
+            anchor: BodyAnchor {
                 body: on.unwrap_or(None),
                 at,
             },
@@ -87,7 +87,7 @@ fn build(merged: &Merged, log: &mut Log) -> Rig {
     for entry in &merged.effects {
         rig.effects.extend(effect(&rig, entry, log));
     }
-    rig.sensors = Sensors {
+    rig.sensors = RigSensors {
         rate: merged
             .rate
             .as_ref()
@@ -110,7 +110,7 @@ fn build(merged: &Merged, log: &mut Log) -> Rig {
 }
 
 /// A rig needs coordinates, as many drives, and columns that can be told apart.
-fn check_columns(merged: &Merged, log: &mut Log) {
+fn check_columns(merged: &MergedRig, log: &mut RigLog) {
     let (n_coordinates, n_drives) = (merged.coordinates.len(), merged.drives.len());
     if n_coordinates == 0 || n_drives != n_coordinates {
         let drives = merged.drives.last().map(|d| (d.file, d.entry.name.span()));
@@ -120,7 +120,7 @@ fn check_columns(merged: &Merged, log: &mut Log) {
             .map(|c| (c.file, c.entry.name.span())));
         let (file, range) = last.unwrap_or((0, 0..0));
         log.error(
-            span(file, &range),
+            source_span(file, &range),
             format!(
                 "coordinates ({n_coordinates}) and drives ({n_drives}) of this rig do not match"
             ),
@@ -144,7 +144,7 @@ fn check_columns(merged: &Merged, log: &mut Log) {
             let column = format!("{}{suffix}", name.get_ref());
             if columns.contains(&column) {
                 log.error(
-                    span(file, &name.span()),
+                    source_span(file, &name.span()),
                     format!("two columns of a recording would be called `{column}`"),
                     "",
                     "choose another name",
@@ -155,7 +155,7 @@ fn check_columns(merged: &Merged, log: &mut Log) {
     }
 }
 
-fn body(item: &Item<BodyEntry>, log: &mut Log) -> Body {
+fn body(item: &FileItem<BodyEntry>, log: &mut RigLog) -> RigBody {
     let (file, entry) = (item.file, &item.entry);
     let inertia = entry
         .inertia
@@ -171,7 +171,7 @@ fn body(item: &Item<BodyEntry>, log: &mut Log) -> Body {
             // A planar model gives zz alone, which no body has; it does no harm where only that one counts.
             if moments.min().is_nan() || moments.min() < -1e-9 * moments.amax() {
                 log.error(
-                    span(file, &spanned.span()),
+                    source_span(file, &spanned.span()),
                     format!(
                         "no body has this inertia: its principal moments are {:.4}, {:.4}, {:.4}",
                         moments[0], moments[1], moments[2]
@@ -182,9 +182,9 @@ fn body(item: &Item<BodyEntry>, log: &mut Log) -> Body {
             }
             matrix
         });
-    Body {
+    RigBody {
         name: entry.name.get_ref().clone(),
-        nominal: Pose::from_xyz_rpy(
+        nominal: BodyPose::from_xyz_rpy(
             vector(file, entry.at.as_ref(), log),
             vector(file, entry.rpy.as_ref(), log),
         ),
@@ -196,15 +196,15 @@ fn body(item: &Item<BodyEntry>, log: &mut Log) -> Body {
 
 /// Index of a body; `Some(None)` is the base.
 /// A name that leads nowhere, which was reported.
-struct Unknown;
+struct UnknownBody;
 
 /// A body, or the base, which is none.
-fn body_named(
+fn find_body(
     rig: &Rig,
     file: usize,
-    name: &Name,
-    log: &mut Log,
-) -> Result<Option<usize>, Unknown> {
+    name: &RigName,
+    log: &mut RigLog,
+) -> Result<Option<usize>, UnknownBody> {
     if name.get_ref() == "base" {
         return Ok(None);
     }
@@ -215,24 +215,24 @@ fn body_named(
     if found.is_none() {
         let mut known = vec!["base"];
         known.extend(rig.bodies.iter().map(|body| body.name.as_str()));
-        log.unknown(file, name, "body", &known);
+        log.unknown_name(file, name, "body", &known);
     }
-    found.map(Some).ok_or(Unknown)
+    found.map(Some).ok_or(UnknownBody)
 }
 
-fn point_named(rig: &Rig, file: usize, name: &Name, log: &mut Log) -> Option<Anchor> {
+fn find_point(rig: &Rig, file: usize, name: &RigName, log: &mut RigLog) -> Option<BodyAnchor> {
     let found = rig
         .points
         .iter()
         .find(|point| &point.name == name.get_ref());
     if found.is_none() {
         let known: Vec<&str> = rig.points.iter().map(|point| point.name.as_str()).collect();
-        log.unknown(file, name, "point", &known);
+        log.unknown_name(file, name, "point", &known);
     }
     found.map(|point| point.anchor)
 }
 
-fn joint_named(rig: &Rig, file: usize, name: &Name, log: &mut Log) -> Option<usize> {
+fn find_joint(rig: &Rig, file: usize, name: &RigName, log: &mut RigLog) -> Option<usize> {
     let found = rig
         .joints
         .iter()
@@ -240,12 +240,12 @@ fn joint_named(rig: &Rig, file: usize, name: &Name, log: &mut Log) -> Option<usi
     match found {
         None => {
             let known: Vec<&str> = rig.joints.iter().map(|joint| joint.name.as_str()).collect();
-            log.unknown(file, name, "joint", &known);
+            log.unknown_name(file, name, "joint", &known);
             None
         }
         Some(at) if rig.joints[at].motion.is_none() => {
             log.error(
-                span(file, &name.span()),
+                source_span(file, &name.span()),
                 format!("the joint `{}` has no single coordinate", name.get_ref()),
                 "expected a revolute or a prismatic joint",
                 "",
@@ -256,13 +256,13 @@ fn joint_named(rig: &Rig, file: usize, name: &Name, log: &mut Log) -> Option<usi
     }
 }
 
-fn lumped_mass(rig: &Rig, item: &Item<LumpedMassEntry>, log: &mut Log) -> Option<LumpedMass> {
+fn lumped_mass(rig: &Rig, item: &FileItem<RigLumpedMassEntry>, log: &mut RigLog) -> Option<RigLumpedMass> {
     let (file, entry) = (item.file, &item.entry);
     let mass = not_negative(file, Some(&entry.mass), "a mass", log);
-    let at = point_named(rig, file, &entry.at, log)?;
+    let at = find_point(rig, file, &entry.at, log)?;
     let moment_at = match &entry.moment_at {
         None => at,
-        Some(name) => point_named(rig, file, name, log)?,
+        Some(name) => find_point(rig, file, name, log)?,
     };
     if let Some(name) = entry
         .moment_at
@@ -270,7 +270,7 @@ fn lumped_mass(rig: &Rig, item: &Item<LumpedMassEntry>, log: &mut Log) -> Option
         .filter(|_| moment_at.body != at.body)
     {
         log.error(
-            span(file, &name.span()),
+            source_span(file, &name.span()),
             format!(
                 "`{}` is on another body than `{}`",
                 name.get_ref(),
@@ -280,28 +280,28 @@ fn lumped_mass(rig: &Rig, item: &Item<LumpedMassEntry>, log: &mut Log) -> Option
             "both balances are those of one body",
         );
     }
-    Some(LumpedMass {
+    Some(RigLumpedMass {
         mass,
         at,
         moment_at: moment_at.at,
     })
 }
 
-fn joint(rig: &Rig, item: &Item<JointEntry>, log: &mut Log) -> Joint {
+fn joint(rig: &Rig, item: &FileItem<RigJointEntry>, log: &mut RigLog) -> RigJoint {
     let (file, entry) = (item.file, &item.entry);
-    let mut joint = Joint {
+    let mut joint = RigJoint {
         name: entry.name.get_ref().clone(),
         equations: Vec::new(),
         motion: None,
     };
-    let Some(kind) = joint::Kind::named(entry.kind.get_ref()) else {
-        log.unknown(file, &entry.kind, "kind of joint", &joint::Kind::NAMES);
+    let Some(kind) = joint::RigJointKind::from_name(entry.kind.get_ref()) else {
+        log.unknown_name(file, &entry.kind, "kind of joint", &joint::RigJointKind::NAMES);
         return joint;
     };
     let [one, two] = entry.between.get_ref();
     let bodies = (
-        body_named(rig, file, one, log),
-        body_named(rig, file, two, log),
+        find_body(rig, file, one, log),
+        find_body(rig, file, two, log),
     );
     let axis = entry
         .axis
@@ -310,7 +310,7 @@ fn joint(rig: &Rig, item: &Item<JointEntry>, log: &mut Log) -> Joint {
     if !(axis.norm() > 0.0 && axis.norm().is_finite()) {
         let range = entry.axis.as_ref().map_or(0..0, toml::Spanned::span);
         log.error(
-            span(file, &range),
+            source_span(file, &range),
             "this axis has no direction".to_owned(),
             "expected a vector other than zero",
             "",
@@ -323,7 +323,7 @@ fn joint(rig: &Rig, item: &Item<JointEntry>, log: &mut Log) -> Joint {
     if first == second {
         let range = entry.between.span();
         log.error(
-            span(file, &range),
+            source_span(file, &range),
             "this joint joins a body to itself".to_owned(),
             "expected two bodies",
             "",
@@ -333,7 +333,7 @@ fn joint(rig: &Rig, item: &Item<JointEntry>, log: &mut Log) -> Joint {
     let Some([from, to]) = joint_anchors(rig, file, entry, [first, second], log) else {
         return joint;
     };
-    let nominal = |body: Option<usize>| body.map_or_else(Pose::identity, |b| rig.bodies[b].nominal);
+    let nominal = |body: Option<usize>| body.map_or_else(BodyPose::identity, |b| rig.bodies[b].nominal);
     let parts = joint::equations(
         kind,
         from,
@@ -350,19 +350,19 @@ fn joint(rig: &Rig, item: &Item<JointEntry>, log: &mut Log) -> Joint {
 fn joint_anchors(
     rig: &Rig,
     file: usize,
-    entry: &JointEntry,
+    entry: &RigJointEntry,
     bodies: [Option<usize>; 2],
-    log: &mut Log,
-) -> Option<[Anchor; 2]> {
-    let nominal = |body: Option<usize>| body.map_or_else(Pose::identity, |b| rig.bodies[b].nominal);
+    log: &mut RigLog,
+) -> Option<[BodyAnchor; 2]> {
+    let nominal = |body: Option<usize>| body.map_or_else(BodyPose::identity, |b| rig.bodies[b].nominal);
     let on = |body: Option<usize>, p_W: Vector3<f64>| {
         let pose = nominal(body);
-        Anchor {
+        BodyAnchor {
             body,
             at: pose.q_WB.inverse() * (p_W - pose.p_WB_W),
         }
     };
-    let whole = span(file, &entry.name.span());
+    let whole = source_span(file, &entry.name.span());
     match (&entry.at, &entry.points) {
         (Some(at), None) => {
             let at = vector(file, Some(at), log);
@@ -370,9 +370,9 @@ fn joint_anchors(
         }
         (None, Some(points)) => {
             let names = points.get_ref();
-            let anchors: Vec<Anchor> = names
+            let anchors: Vec<BodyAnchor> = names
                 .iter()
-                .filter_map(|name| point_named(rig, file, name, log))
+                .filter_map(|name| find_point(rig, file, name, log))
                 .collect();
             if anchors.len() < names.len() {
                 return None;
@@ -392,7 +392,7 @@ fn joint_anchors(
                 [one, two] if [one.body, two.body] == bodies => Some([*one, *two]),
                 _ => {
                     log.error(
-                        span(file, &points.span()),
+                        source_span(file, &points.span()),
                         "these points do not fit the joint's bodies".to_owned(),
                         "expected one point of either body, or one of each in the order of `between`",
                         "",
@@ -413,17 +413,17 @@ fn joint_anchors(
     }
 }
 
-fn length(rig: &Rig, file: usize, entry: &LengthEntry, log: &mut Log) -> Option<Pair> {
-    let from = point_named(rig, file, &entry.from, log);
-    let to = point_named(rig, file, &entry.to, log);
-    let pair = Pair {
+fn length(rig: &Rig, file: usize, entry: &LengthEntry, log: &mut RigLog) -> Option<PairFunction> {
+    let from = find_point(rig, file, &entry.from, log);
+    let to = find_point(rig, file, &entry.to, log);
+    let pair = PairFunction {
         from: from?,
         to: to?,
-        shape: Shape::Distance,
+        shape: PairQuantity::Distance,
     };
     if pair.from.body == pair.to.body {
         log.error(
-            span(file, &entry.to.span()),
+            source_span(file, &entry.to.span()),
             "the distance of two points of one body never changes".to_owned(),
             "expected a point of another body",
             "",
@@ -433,7 +433,7 @@ fn length(rig: &Rig, file: usize, entry: &LengthEntry, log: &mut Log) -> Option<
     Some(pair)
 }
 
-fn coordinate(rig: &mut Rig, item: &Item<CoordinateEntry>, log: &mut Log) {
+fn coordinate(rig: &mut Rig, item: &FileItem<RigCoordinateEntry>, log: &mut RigLog) {
     let (file, entry) = (item.file, &item.entry);
     let nominal = entry.nominal.as_ref().map(|n| *n.get_ref());
     if let Some(wrong) = entry
@@ -442,15 +442,15 @@ fn coordinate(rig: &mut Rig, item: &Item<CoordinateEntry>, log: &mut Log) {
         .filter(|n| !n.get_ref().is_finite() || entry.joint.is_none())
     {
         log.error(
-            span(file, &wrong.span()),
+            source_span(file, &wrong.span()),
             "this nominal value means nothing".to_owned(),
             "expected a finite value of a joint's coordinate; a length follows from its points",
             "",
         );
     }
     let measures = match (&entry.joint, &entry.length) {
-        (Some(name), None) => joint_named(rig, file, name, log).and_then(|joint| {
-            let poses: Vec<Pose> = rig.bodies.iter().map(|body| body.nominal).collect();
+        (Some(name), None) => find_joint(rig, file, name, log).and_then(|joint| {
+            let poses: Vec<BodyPose> = rig.bodies.iter().map(|body| body.nominal).collect();
             let motion = rig.joints[joint].motion.as_mut()?;
             if let Some(nominal) = nominal {
                 joint::set_nominal(motion, nominal, &poses);
@@ -459,44 +459,44 @@ fn coordinate(rig: &mut Rig, item: &Item<CoordinateEntry>, log: &mut Log) {
         }),
         (None, Some(points)) => length(rig, file, points, log),
         _ => {
-            one_of(file, &entry.name, "`joint` and `length`", log);
+            report_unclear_kind(file, &entry.name, "`joint` and `length`", log);
             None
         }
     };
-    rig.coordinates.extend(measures.map(|measures| Coordinate {
+    rig.coordinates.extend(measures.map(|measures| RigCoordinate {
         name: entry.name.get_ref().clone(),
         measures,
     }));
 }
 
-fn drive(rig: &mut Rig, item: &Item<DriveEntry>, log: &mut Log) {
+fn drive(rig: &mut Rig, item: &FileItem<RigDriveEntry>, log: &mut RigLog) {
     let (file, entry) = (item.file, &item.entry);
     let measures = match (&entry.joint, &entry.linear) {
         (Some(name), None) => {
-            joint_named(rig, file, name, log).and_then(|joint| rig.joints[joint].motion)
+            find_joint(rig, file, name, log).and_then(|joint| rig.joints[joint].motion)
         }
         (None, Some(points)) => length(rig, file, points, log),
         _ => {
-            one_of(file, &entry.name, "`joint` and `linear`", log);
+            report_unclear_kind(file, &entry.name, "`joint` and `linear`", log);
             None
         }
     };
-    rig.drives.extend(measures.map(|measures| Drive {
+    rig.drives.extend(measures.map(|measures| RigDrive {
         name: entry.name.get_ref().clone(),
         measures,
     }));
 }
 
-fn one_of(file: usize, name: &Name, keys: &str, log: &mut Log) {
+fn report_unclear_kind(file: usize, name: &RigName, keys: &str, log: &mut RigLog) {
     log.error(
-        span(file, &name.span()),
+        source_span(file, &name.span()),
         format!("it is not clear what `{}` is", name.get_ref()),
         &format!("expected one of {keys}"),
         "",
     );
 }
 
-fn effect(rig: &Rig, item: &Item<EffectEntry>, log: &mut Log) -> Option<Effect> {
+fn effect(rig: &Rig, item: &FileItem<RigEffectEntry>, log: &mut RigLog) -> Option<RigEffect> {
     let (file, entry) = (item.file, &item.entry);
     let at: Vec<&str> = entry
         .at
@@ -523,7 +523,7 @@ fn effect(rig: &Rig, item: &Item<EffectEntry>, log: &mut Log) -> Option<Effect> 
                 named.map_or(entry.kind.span(), toml::Spanned::span)
             }
         };
-        log.error(span(file, &range), found.says, &found.expected, &found.help);
+        log.error(source_span(file, &range), found.message, &found.expected, &found.help);
     }
     None
 }

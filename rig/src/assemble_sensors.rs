@@ -1,32 +1,32 @@
 //! From the entries of encoders and force sensors to the channels of a rig.
 
-use crate::file::{Name, SensorEntry};
-use crate::load::span;
-use crate::log::{Item, Log, above_zero, not_negative};
-use crate::sensor::Channel;
+use crate::file::{RigName, SensorEntry};
+use crate::load::source_span;
+use crate::log::{FileItem, RigLog, above_zero, not_negative};
+use crate::sensor::SensorChannel;
 
 /// One channel per name; ideal where no sensor is described. A later sensor replaces an earlier one.
 pub(crate) fn channels<'a>(
-    items: &[Item<SensorEntry>],
+    items: &[FileItem<SensorEntry>],
     what: &str,
-    names: impl Iterator<Item = &'a Name>,
-    log: &mut Log,
-) -> Vec<Channel> {
+    names: impl Iterator<Item = &'a RigName>,
+    log: &mut RigLog,
+) -> Vec<SensorChannel> {
     let names: Vec<&str> = names.map(|name| name.get_ref().as_str()).collect();
-    let mut channels = vec![Channel::default(); names.len()];
+    let mut channels = vec![SensorChannel::default(); names.len()];
     for item in items {
         let channel = channel(item, what, log);
         for name in item.entry.of.get_ref() {
             match names.iter().position(|known| known == name.get_ref()) {
                 Some(at) => channels[at] = channel,
-                None => log.unknown(item.file, name, what, &names),
+                None => log.unknown_name(item.file, name, what, &names),
             }
         }
     }
     channels
 }
 
-fn channel(item: &Item<SensorEntry>, what: &str, log: &mut Log) -> Channel {
+fn channel(item: &FileItem<SensorEntry>, what: &str, log: &mut RigLog) -> SensorChannel {
     let (file, entry) = (item.file, &item.entry);
     let mut resolution = not_negative(file, entry.resolution.as_ref(), "a resolution", log);
     let ways = usize::from(entry.resolution.is_some())
@@ -34,7 +34,7 @@ fn channel(item: &Item<SensorEntry>, what: &str, log: &mut Log) -> Channel {
         + usize::from(entry.current.is_some());
     if ways > 1 {
         log.error(
-            span(file, &entry.of.span()),
+            source_span(file, &entry.of.span()),
             "this sensor has two resolutions".to_owned(),
             "",
             "give one of `resolution`, `bits` (encoders) and `current` (force sensors)",
@@ -43,7 +43,7 @@ fn channel(item: &Item<SensorEntry>, what: &str, log: &mut Log) -> Channel {
     if let Some(bits) = &entry.bits {
         if what != "coordinate" || !(1..=52).contains(bits.get_ref()) {
             log.error(
-                span(file, &bits.span()),
+                source_span(file, &bits.span()),
                 "this number of bits means nothing here".to_owned(),
                 "expected 1 to 52, of an encoder",
                 "an encoder of `bits = 20` tells 2^20 angles of a turn apart",
@@ -55,7 +55,7 @@ fn channel(item: &Item<SensorEntry>, what: &str, log: &mut Log) -> Channel {
     if let Some(current) = &entry.current {
         if what == "coordinate" {
             log.error(
-                span(file, &entry.of.span()),
+                source_span(file, &entry.of.span()),
                 "an encoder reads no current".to_owned(),
                 "",
                 "`current` belongs to a `[[force_sensor]]`",
@@ -64,7 +64,7 @@ fn channel(item: &Item<SensorEntry>, what: &str, log: &mut Log) -> Channel {
         resolution = above_zero(file, &current.force_per_ampere, "a force per ampere", log)
             * above_zero(file, &current.resolution, "a resolution", log);
     }
-    Channel {
+    SensorChannel {
         noise: not_negative(file, entry.noise.as_ref(), "a noise's deviation", log),
         resolution,
         delay: not_negative(file, entry.delay.as_ref(), "a delay", log),

@@ -9,10 +9,10 @@
 use nalgebra::linalg::FullPivLU;
 use nalgebra::{DMatrix, DVector, Vector3};
 
-use crate::kinematics::{Motion, PoseError};
+use crate::kinematics::{RigMotion, RigPoseError};
 use crate::massive;
-use crate::pair::Pair;
-use crate::pose::{BodyMotion, Pose};
+use crate::pair::PairFunction;
+use crate::pose::{BodyMotion, BodyPose};
 use crate::rig::Rig;
 
 /// A pivot below this share of the largest says that a drive has no leverage.
@@ -20,7 +20,7 @@ const LEVERAGE_TOLERANCE: f64 = 1e-10;
 
 /// Value, rate and acceleration of a coordinate, a joint or a drive.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Measured {
+pub struct ScalarMotion {
     /// Length or angle, m or rad.
     pub value: f64,
     /// Its first derivative.
@@ -35,11 +35,11 @@ pub struct Measured {
 /// Fails where the drives cannot balance a load.
 pub(crate) fn drive_forces(
     rig: &Rig,
-    motion: &Motion,
-    loads: &[(&Pair, f64)],
-) -> Result<Vec<f64>, PoseError> {
+    motion: &RigMotion,
+    loads: &[(&PairFunction, f64)],
+) -> Result<Vec<f64>, RigPoseError> {
     let mut needed = body_forces(rig, motion);
-    let base = base();
+    let base = base_motion();
     for (pair, force) in loads {
         let derived = pair.derive(&motion.bodies, &base);
         derived.scatter(pair, |i, slope| needed[i] += force * slope);
@@ -63,17 +63,17 @@ pub(crate) fn drive_forces(
         .iter()
         .any(|p| p.abs() <= LEVERAGE_TOLERANCE * largest)
     {
-        return Err(PoseError::DrivesDeadlocked);
+        return Err(RigPoseError::DrivesDeadlocked);
     }
     let forces = decomposed
         .solve(&needed)
-        .ok_or(PoseError::DrivesDeadlocked)?;
+        .ok_or(RigPoseError::DrivesDeadlocked)?;
     Ok(forces.iter().copied().collect())
 }
 
 /// Value, rate and acceleration of a place.
-pub(crate) fn measure(pair: &Pair, motion: &Motion) -> Measured {
-    let derived = pair.derive(&motion.bodies, &base());
+pub(crate) fn scalar_motion(pair: &PairFunction, motion: &RigMotion) -> ScalarMotion {
+    let derived = pair.derive(&motion.bodies, &base_motion());
     let body = |at: Option<usize>| at.map(|b| &motion.bodies[b]);
     let mut rate = 0.0;
     let mut acceleration = derived.bias;
@@ -84,7 +84,7 @@ pub(crate) fn measure(pair: &Pair, motion: &Motion) -> Measured {
             acceleration += linear.dot(&body.a_WB_W) + angular.dot(&body.alpha_WB_W);
         }
     }
-    Measured {
+    ScalarMotion {
         value: derived.value,
         rate,
         acceleration,
@@ -93,28 +93,28 @@ pub(crate) fn measure(pair: &Pair, motion: &Motion) -> Measured {
 
 /// Kinetic plus potential energy of all masses, those of effects included, J; the potential is zero at the base
 /// frame's origin.
-pub fn energy(rig: &Rig, motion: &Motion) -> f64 {
+pub fn energy(rig: &Rig, motion: &RigMotion) -> f64 {
     let gravity = massive::gravity(rig);
     let mut sum = massive::energy(rig, motion, &gravity);
     for (body, moves) in rig.bodies.iter().zip(&motion.bodies) {
         let w = moves.R_WB.transpose() * moves.w_WB_W;
-        sum += 0.5 * body.mass * moves.velocity(&body.centre).norm_squared()
+        sum += 0.5 * body.mass * moves.point_velocity(&body.centre).norm_squared()
             + 0.5 * w.dot(&(body.inertia * w))
-            - body.mass * gravity.dot(&moves.place(&body.centre));
+            - body.mass * gravity.dot(&moves.point_position(&body.centre));
     }
-    let base = base();
+    let base = base_motion();
     for lumped in &rig.lumped_masses {
         let moves = lumped.at.body.map_or(&base, |b| &motion.bodies[b]);
         sum += lumped.mass
-            * (0.5 * moves.velocity(&lumped.at.at).norm_squared()
-                - gravity.dot(&moves.place(&lumped.at.at)));
+            * (0.5 * moves.point_velocity(&lumped.at.at).norm_squared()
+                - gravity.dot(&moves.point_position(&lumped.at.at)));
     }
     sum
 }
 
 /// Forces and moments that each body needs for its motion beside gravity, six per body: the force, and the
 /// moment about the origin of its frame; those for the masses of effects included.
-fn body_forces(rig: &Rig, motion: &Motion) -> DVector<f64> {
+fn body_forces(rig: &Rig, motion: &RigMotion) -> DVector<f64> {
     let gravity = massive::gravity(rig);
     let mut all = DVector::zeros(6 * rig.bodies.len());
     let mut add = |body: usize, force: Vector3<f64>, moment: Vector3<f64>| {
@@ -125,7 +125,7 @@ fn body_forces(rig: &Rig, motion: &Motion) -> DVector<f64> {
     };
     for (b, (body, moves)) in rig.bodies.iter().zip(&motion.bodies).enumerate() {
         let arm = moves.R_WB * body.centre;
-        let force = body.mass * (moves.acceleration(&body.centre) - gravity);
+        let force = body.mass * (moves.point_acceleration(&body.centre) - gravity);
         let inertia = moves.R_WB * body.inertia * moves.R_WB.transpose();
         let w = &moves.w_WB_W;
         let euler = inertia * moves.alpha_WB_W + w.cross(&(inertia * w));
@@ -134,7 +134,7 @@ fn body_forces(rig: &Rig, motion: &Motion) -> DVector<f64> {
     for lumped in &rig.lumped_masses {
         if let Some(b) = lumped.at.body {
             let moves = &motion.bodies[b];
-            let inertial = |at: &Vector3<f64>| lumped.mass * (moves.acceleration(at) - gravity);
+            let inertial = |at: &Vector3<f64>| lumped.mass * (moves.point_acceleration(at) - gravity);
             let arm = moves.R_WB * lumped.moment_at;
             add(
                 b,
@@ -144,12 +144,12 @@ fn body_forces(rig: &Rig, motion: &Motion) -> DVector<f64> {
         }
     }
     for effect in &rig.effects {
-        massive::supply(rig, effect, motion, &gravity, &mut add);
+        massive::inertial_forces(rig, effect, motion, &gravity, &mut add);
     }
     all
 }
 
 /// The base as a body that never moves.
-pub(crate) fn base() -> BodyMotion {
-    BodyMotion::at_rest(Pose::identity())
+pub(crate) fn base_motion() -> BodyMotion {
+    BodyMotion::at_standstill(BodyPose::identity())
 }

@@ -10,21 +10,21 @@
 
 use std::f64::consts::PI;
 
-use crate::dynamics::Measured;
+use crate::dynamics::ScalarMotion;
 use crate::rig::Rig;
 
 /// An effect in a rig. [`Rig::effect`] makes one from names; a program may also write it down itself.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Effect {
+pub struct RigEffect {
     /// What it does.
-    pub law: Law,
+    pub law: RigLaw,
     /// Where; indices of the rig that it belongs to.
-    pub places: Vec<Place>,
+    pub places: Vec<RigPlace>,
 }
 
 /// Where an effect acts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Place {
+pub enum RigPlace {
     /// A drive, by index.
     Drive(usize),
     /// A joint with one coordinate, by index.
@@ -40,7 +40,7 @@ pub enum Place {
 /// A law with its values, in SI units of the place: N and m, or N m and rad.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(non_snake_case, reason = "symbols as in model files")]
-pub enum Law {
+pub enum RigLaw {
     /// `Fv*rate`
     ViscousFriction {
         /// Coefficient.
@@ -174,7 +174,7 @@ pub enum ValueSign {
     Positive,
 }
 
-const fn any(symbol: &'static str) -> ValueOfKind {
+const fn any_value(symbol: &'static str) -> ValueOfKind {
     ValueOfKind {
         symbol,
         default: None,
@@ -182,7 +182,7 @@ const fn any(symbol: &'static str) -> ValueOfKind {
     }
 }
 
-const fn or_zero(symbol: &'static str) -> ValueOfKind {
+const fn zero_by_default(symbol: &'static str) -> ValueOfKind {
     ValueOfKind {
         symbol,
         default: Some(0.0),
@@ -190,7 +190,7 @@ const fn or_zero(symbol: &'static str) -> ValueOfKind {
     }
 }
 
-const fn not_negative(symbol: &'static str) -> ValueOfKind {
+const fn not_negative_value(symbol: &'static str) -> ValueOfKind {
     ValueOfKind {
         symbol,
         default: None,
@@ -198,7 +198,7 @@ const fn not_negative(symbol: &'static str) -> ValueOfKind {
     }
 }
 
-const fn positive(symbol: &'static str, default: Option<f64>) -> ValueOfKind {
+const fn positive_value(symbol: &'static str, default: Option<f64>) -> ValueOfKind {
     ValueOfKind {
         symbol,
         default,
@@ -206,7 +206,7 @@ const fn positive(symbol: &'static str, default: Option<f64>) -> ValueOfKind {
     }
 }
 
-impl Law {
+impl RigLaw {
     /// Names of all kinds.
     pub const KINDS: [&'static str; 17] = [
         "viscous_friction",
@@ -231,22 +231,22 @@ impl Law {
     /// The values that a kind takes; `None` for an unknown kind.
     pub fn values(kind: &str) -> Option<&'static [ValueOfKind]> {
         Some(match kind {
-            "viscous_friction" => const { &[any("Fv")] },
-            "coulomb_friction" => const { &[any("Fc")] },
-            "stribeck_friction" => const { &[any("Fs"), positive("vs", Some(0.02))] },
-            "quadratic_friction" => const { &[any("Fq")] },
-            "directional_viscous_friction" => const { &[any("Fvp"), any("Fvn")] },
-            "directional_coulomb_friction" => const { &[any("Fcp"), any("Fcn")] },
-            "load_friction" => const { &[any("mu")] },
-            "drive_inertia" => const { &[any("Ia")] },
-            "force_offset" => const { &[any("F0")] },
-            "spring" => const { &[any("k"), or_zero("rest")] },
-            "force_ripple" => const { &[or_zero("As"), or_zero("Ac"), positive("pitch", None)] },
-            "coupled_drive" => const { &[or_zero("Ia"), or_zero("Fv"), or_zero("Fs")] },
-            "rod_inertia" => const { &[not_negative("m"), any("c"), not_negative("I")] },
-            "point_mass" | "lumped_mass_placement" => const { &[any("m")] },
-            "gravity_tilt" => const { &[or_zero("tx"), or_zero("ty"), or_zero("tz")] },
-            "time_delay" => const { &[not_negative("T")] },
+            "viscous_friction" => const { &[any_value("Fv")] },
+            "coulomb_friction" => const { &[any_value("Fc")] },
+            "stribeck_friction" => const { &[any_value("Fs"), positive_value("vs", Some(0.02))] },
+            "quadratic_friction" => const { &[any_value("Fq")] },
+            "directional_viscous_friction" => const { &[any_value("Fvp"), any_value("Fvn")] },
+            "directional_coulomb_friction" => const { &[any_value("Fcp"), any_value("Fcn")] },
+            "load_friction" => const { &[any_value("mu")] },
+            "drive_inertia" => const { &[any_value("Ia")] },
+            "force_offset" => const { &[any_value("F0")] },
+            "spring" => const { &[any_value("k"), zero_by_default("rest")] },
+            "force_ripple" => const { &[zero_by_default("As"), zero_by_default("Ac"), positive_value("pitch", None)] },
+            "coupled_drive" => const { &[zero_by_default("Ia"), zero_by_default("Fv"), zero_by_default("Fs")] },
+            "rod_inertia" => const { &[not_negative_value("m"), any_value("c"), not_negative_value("I")] },
+            "point_mass" | "lumped_mass_placement" => const { &[any_value("m")] },
+            "gravity_tilt" => const { &[zero_by_default("tx"), zero_by_default("ty"), zero_by_default("tz")] },
+            "time_delay" => const { &[not_negative_value("T")] },
             _ => return None,
         })
     }
@@ -281,7 +281,7 @@ impl Law {
     }
 
     /// The name of its kind and its values by symbol.
-    pub fn described(&self) -> (&'static str, Vec<(&'static str, f64)>) {
+    pub fn kind_and_values(&self) -> (&'static str, Vec<(&'static str, f64)>) {
         let (kind, values): (&str, Vec<f64>) = match *self {
             Self::ViscousFriction { Fv } => ("viscous_friction", vec![Fv]),
             Self::CoulombFriction { Fc } => ("coulomb_friction", vec![Fc]),
@@ -314,7 +314,7 @@ impl Law {
 
     /// What must be supplied at a drive or in a joint beside the load; `other` is the other place of a coupled drive.
     /// Effects that act elsewhere supply nothing here.
-    pub(crate) fn force(&self, at: Measured, load: f64, other: Measured) -> f64 {
+    pub(crate) fn force(&self, at: ScalarMotion, load: f64, other: ScalarMotion) -> f64 {
         let way = sign(at.rate);
         match *self {
             Self::ViscousFriction { Fv } => Fv * at.rate,
@@ -351,16 +351,16 @@ impl Law {
     }
 }
 
-impl Effect {
+impl RigEffect {
     /// Forces that the effect adds at drives and in joints, each with its place; `measured` gives the motion of a
     /// place and `load` the force of a drive before friction and the like.
     pub(crate) fn forces(
         &self,
-        measured: impl Fn(Place) -> Measured,
+        measured: impl Fn(RigPlace) -> ScalarMotion,
         load: impl Fn(usize) -> f64,
-    ) -> Vec<(Place, f64)> {
+    ) -> Vec<(RigPlace, f64)> {
         let n = self.places.len();
-        let acts = |place: &Place| matches!(place, Place::Drive(_) | Place::Joint(_));
+        let acts = |place: &RigPlace| matches!(place, RigPlace::Drive(_) | RigPlace::Joint(_));
         let places = self
             .places
             .iter()
@@ -370,7 +370,7 @@ impl Effect {
             .map(|(i, place)| {
                 let other = measured(self.places[(i + 1) % n]);
                 let load = match place {
-                    Place::Drive(drive) => load(*drive),
+                    RigPlace::Drive(drive) => load(*drive),
                     _ => 0.0,
                 };
                 (*place, self.law.force(measured(*place), load, other))
@@ -379,9 +379,9 @@ impl Effect {
     }
 }
 
-impl Place {
+impl RigPlace {
     /// What is measured at the place, if it is a drive or a joint with one coordinate.
-    pub(crate) fn pair(self, rig: &Rig) -> Option<&crate::pair::Pair> {
+    pub(crate) fn pair(self, rig: &Rig) -> Option<&crate::pair::PairFunction> {
         match self {
             Self::Drive(drive) => Some(&rig.drives.get(drive)?.measures),
             Self::Joint(joint) => rig.joints.get(joint)?.motion.as_ref(),

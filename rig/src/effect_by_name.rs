@@ -1,8 +1,8 @@
 //! Effects from names: kind, places and values as rig files and programs write them go in, a checked [`Effect`]
 //! or every fault comes out, each with what was expected and what to do.
 
-use crate::effect::{Effect, Law, Place, ValueSign};
-use crate::pair::Pair;
+use crate::effect::{RigEffect, RigLaw, RigPlace, ValueSign};
+use crate::pair::PairFunction;
 use crate::rig::Rig;
 
 /// What is wrong with an effect.
@@ -11,7 +11,7 @@ pub struct EffectFault {
     /// Which part of it.
     pub part: EffectPart,
     /// What is wrong.
-    pub says: String,
+    pub message: String,
     /// What was expected; may be empty.
     pub expected: String,
     /// What to do; may be empty.
@@ -33,7 +33,7 @@ pub enum EffectPart {
 
 impl std::fmt::Display for EffectFault {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{}", self.says)?;
+        write!(f, "{}", self.message)?;
         for more in [&self.expected, &self.help] {
             if !more.is_empty() {
                 write!(f, "; {more}")?;
@@ -47,7 +47,7 @@ impl std::error::Error for EffectFault {}
 
 /// Where a kind may act.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum ActsAt {
+enum AllowedPlaces {
     DrivesAndJoints,
     Drives,
     TwoDrivesOrJoints,
@@ -58,7 +58,7 @@ enum ActsAt {
     Force,
 }
 
-impl ActsAt {
+impl AllowedPlaces {
     fn for_kind(kind: &str) -> Self {
         match kind {
             "load_friction" => Self::Drives,
@@ -72,7 +72,7 @@ impl ActsAt {
         }
     }
 
-    fn says(self) -> &'static str {
+    fn description(self) -> &'static str {
         match self {
             Self::DrivesAndJoints => "a drive, a coordinate or a joint with one coordinate",
             Self::Drives => "a drive, whose load is known",
@@ -120,13 +120,13 @@ impl Rig {
         kind: &str,
         at: &[&str],
         values: &[(&str, f64)],
-    ) -> Result<Effect, Vec<EffectFault>> {
-        let Some(known) = Law::values(kind) else {
+    ) -> Result<RigEffect, Vec<EffectFault>> {
+        let Some(known) = RigLaw::values(kind) else {
             return Err(vec![EffectFault {
                 part: EffectPart::Kind,
-                says: format!("there is no kind of effect `{kind}`"),
+                message: format!("there is no kind of effect `{kind}`"),
                 expected: "expected the name of a kind".to_owned(),
-                help: format!("known are {}", list(&Law::KINDS)),
+                help: format!("known are {}", name_list(&RigLaw::KINDS)),
             }]);
         };
         let mut faults = Vec::new();
@@ -138,7 +138,7 @@ impl Rig {
                 (None, _) => {
                     faults.push(EffectFault {
                         part: EffectPart::Kind,
-                        says: format!("`{kind}` lacks the value `{}`", value.symbol),
+                        message: format!("`{kind}` lacks the value `{}`", value.symbol),
                         expected: String::new(),
                         help: format!(
                             "write `values = {{ {} = ... }}`, in SI units of the place",
@@ -157,7 +157,7 @@ impl Rig {
             if let Some(says) = says {
                 faults.push(EffectFault {
                     part: EffectPart::Value(value.symbol.to_owned()),
-                    says: format!(
+                    message: format!(
                         "`{}` of `{kind}` cannot be {}",
                         value.symbol,
                         number.unwrap_or(f64::NAN)
@@ -175,28 +175,28 @@ impl Rig {
         {
             faults.push(EffectFault {
                 part: EffectPart::Value((*symbol).to_owned()),
-                says: format!("there is no value `{symbol}` of `{kind}`"),
+                message: format!("there is no value `{symbol}` of `{kind}`"),
                 expected: "expected a symbol of this kind".to_owned(),
-                help: format!("known are {}", list(&symbols)),
+                help: format!("known are {}", name_list(&symbols)),
             });
         }
         let places = self.places(kind, at, &mut faults);
-        match Law::new(kind, &numbers) {
-            Some(law) if faults.is_empty() => Ok(Effect { law, places }),
+        match RigLaw::new(kind, &numbers) {
+            Some(law) if faults.is_empty() => Ok(RigEffect { law, places }),
             _ => Err(faults),
         }
     }
 
-    fn places(&self, kind: &str, at: &[&str], faults: &mut Vec<EffectFault>) -> Vec<Place> {
-        let acts = ActsAt::for_kind(kind);
+    fn places(&self, kind: &str, at: &[&str], faults: &mut Vec<EffectFault>) -> Vec<RigPlace> {
+        let acts = AllowedPlaces::for_kind(kind);
         let mut places = Vec::new();
         for (i, name) in at.iter().enumerate() {
             let Some(place) = self.place(acts, name) else {
                 faults.push(EffectFault {
                     part: EffectPart::Place(i),
-                    says: format!("`{kind}` cannot act at `{name}`"),
-                    expected: format!("expected {}", acts.says()),
-                    help: format!("known are {}", list(&self.place_names(acts))),
+                    message: format!("`{kind}` cannot act at `{name}`"),
+                    expected: format!("expected {}", acts.description()),
+                    help: format!("known are {}", name_list(&self.place_names(acts))),
                 });
                 continue;
             };
@@ -204,35 +204,35 @@ impl Rig {
         }
         let wanted = acts.n_places().unwrap_or(at.len().max(1));
         let mut wrong = at.len() != wanted;
-        if let [Place::Point(a), Place::Point(b)] = places[..]
-            && acts == ActsAt::TwoPointsOfABody
+        if let [RigPlace::Point(a), RigPlace::Point(b)] = places[..]
+            && acts == AllowedPlaces::TwoPointsOfABody
         {
             wrong |= self.points[a].anchor.body != self.points[b].anchor.body;
         }
         if wrong {
             faults.push(EffectFault {
                 part: EffectPart::Places,
-                says: format!("`{kind}` does not act at these places together"),
-                expected: format!("expected {}", acts.says()),
+                message: format!("`{kind}` does not act at these places together"),
+                expected: format!("expected {}", acts.description()),
                 help: String::new(),
             });
         }
         places
     }
 
-    fn place(&self, acts: ActsAt, name: &str) -> Option<Place> {
-        let joint = |pair: &Pair| {
+    fn place(&self, acts: AllowedPlaces, name: &str) -> Option<RigPlace> {
+        let joint = |pair: &PairFunction| {
             self.joints
                 .iter()
                 .position(|j| j.motion.as_ref() == Some(pair))
         };
         let drive = || self.drives.iter().position(|drive| drive.name == name);
         match acts {
-            ActsAt::Drives => drive().map(Place::Drive),
-            ActsAt::LinearDrives => drive()
+            AllowedPlaces::Drives => drive().map(RigPlace::Drive),
+            AllowedPlaces::LinearDrives => drive()
                 .filter(|d| self.drives[*d].measures.is_distance())
-                .map(Place::Drive),
-            ActsAt::DrivesAndJoints | ActsAt::TwoDrivesOrJoints => {
+                .map(RigPlace::Drive),
+            AllowedPlaces::DrivesAndJoints | AllowedPlaces::TwoDrivesOrJoints => {
                 let coordinate = || self.coordinates.iter().find(|c| c.name == name);
                 let named = || {
                     self.joints
@@ -240,33 +240,33 @@ impl Rig {
                         .position(|j| j.name == name && j.motion.is_some())
                 };
                 drive()
-                    .map(Place::Drive)
+                    .map(RigPlace::Drive)
                     .or_else(|| {
                         coordinate()
                             .and_then(|c| joint(&c.measures))
-                            .map(Place::Joint)
+                            .map(RigPlace::Joint)
                     })
-                    .or_else(|| named().map(Place::Joint))
+                    .or_else(|| named().map(RigPlace::Joint))
             }
-            ActsAt::Points | ActsAt::TwoPointsOfABody => {
+            AllowedPlaces::Points | AllowedPlaces::TwoPointsOfABody => {
                 let point = self.points.iter().position(|point| point.name == name)?;
-                self.points[point].anchor.body.map(|_| Place::Point(point))
+                self.points[point].anchor.body.map(|_| RigPlace::Point(point))
             }
-            ActsAt::Base => (name == "base").then_some(Place::Base),
-            ActsAt::Force => (name == "force").then_some(Place::Force),
+            AllowedPlaces::Base => (name == "base").then_some(RigPlace::Base),
+            AllowedPlaces::Force => (name == "force").then_some(RigPlace::Force),
         }
     }
 
-    fn place_names(&self, acts: ActsAt) -> Vec<&str> {
+    fn place_names(&self, acts: AllowedPlaces) -> Vec<&str> {
         let drives = self.drives.iter().map(|drive| drive.name.as_str());
         let coordinates = self.coordinates.iter().map(|c| c.name.as_str());
         let joints = self.joints.iter().map(|joint| joint.name.as_str());
         let points = self.points.iter().map(|point| point.name.as_str());
         let all: Vec<&str> = match acts {
-            ActsAt::Base => vec!["base"],
-            ActsAt::Force => vec!["force"],
-            ActsAt::Points | ActsAt::TwoPointsOfABody => points.collect(),
-            ActsAt::Drives | ActsAt::LinearDrives => drives.collect(),
+            AllowedPlaces::Base => vec!["base"],
+            AllowedPlaces::Force => vec!["force"],
+            AllowedPlaces::Points | AllowedPlaces::TwoPointsOfABody => points.collect(),
+            AllowedPlaces::Drives | AllowedPlaces::LinearDrives => drives.collect(),
             _ => drives.chain(coordinates).chain(joints).collect(),
         };
         all.into_iter()
@@ -276,7 +276,7 @@ impl Rig {
 }
 
 /// A list of names for a message, cut where nobody reads on.
-pub(crate) fn list(names: &[&str]) -> String {
+pub(crate) fn name_list(names: &[&str]) -> String {
     let mut list: Vec<String> = names
         .iter()
         .take(24)

@@ -8,36 +8,36 @@ use serde::Deserialize;
 use toml::Spanned;
 
 /// Three numbers.
-pub(crate) type Triple = Spanned<[f64; 3]>;
+pub(crate) type SpannedTriple = Spanned<[f64; 3]>;
 /// A name, with its place.
-pub(crate) type Name = Spanned<String>;
+pub(crate) type RigName = Spanned<String>;
 
 /// A rig file.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct RigEntry {
     pub(crate) schema: Spanned<i64>,
-    pub(crate) name: Name,
+    pub(crate) name: RigName,
     pub(crate) title: Option<String>,
     /// Another rig file, relative to this one: entries here replace those of the same name or join them.
-    pub(crate) extends: Option<Name>,
-    pub(crate) gravity: Option<Triple>,
+    pub(crate) extends: Option<RigName>,
+    pub(crate) gravity: Option<SpannedTriple>,
     pub(crate) seed: Option<u64>,
     pub(crate) sampling: Option<SamplingEntry>,
     #[serde(default)]
     pub(crate) body: Vec<BodyEntry>,
     #[serde(default)]
-    pub(crate) point: Vec<PointEntry>,
+    pub(crate) point: Vec<RigPointEntry>,
     #[serde(default)]
-    pub(crate) lumped_mass: Vec<LumpedMassEntry>,
+    pub(crate) lumped_mass: Vec<RigLumpedMassEntry>,
     #[serde(default)]
-    pub(crate) joint: Vec<JointEntry>,
+    pub(crate) joint: Vec<RigJointEntry>,
     #[serde(default)]
-    pub(crate) coordinate: Vec<CoordinateEntry>,
+    pub(crate) coordinate: Vec<RigCoordinateEntry>,
     #[serde(default)]
-    pub(crate) drive: Vec<DriveEntry>,
+    pub(crate) drive: Vec<RigDriveEntry>,
     #[serde(default)]
-    pub(crate) effect: Vec<EffectEntry>,
+    pub(crate) effect: Vec<RigEffectEntry>,
     #[serde(default)]
     pub(crate) encoder: Vec<SensorEntry>,
     #[serde(default)]
@@ -48,15 +48,15 @@ pub(crate) struct RigEntry {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct BodyEntry {
-    pub(crate) name: Name,
+    pub(crate) name: RigName,
     /// Origin of its frame in the base frame, nominal configuration.
-    pub(crate) at: Option<Triple>,
+    pub(crate) at: Option<SpannedTriple>,
     /// Roll, pitch, yaw of its frame there.
-    pub(crate) rpy: Option<Triple>,
+    pub(crate) rpy: Option<SpannedTriple>,
     pub(crate) mass: Option<Spanned<f64>>,
     /// Centre of mass in its frame.
-    pub(crate) centre: Option<Triple>,
-    pub(crate) inertia: Option<Spanned<InertiaEntry>>,
+    pub(crate) centre: Option<SpannedTriple>,
+    pub(crate) inertia: Option<Spanned<RigInertiaEntry>>,
     #[serde(rename = "note")]
     _note: Option<String>,
 }
@@ -64,7 +64,7 @@ pub(crate) struct BodyEntry {
 /// Inertia about the centre of mass along the body's axes; off the diagonal the negative products.
 #[derive(Clone, Copy, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub(crate) struct InertiaEntry {
+pub(crate) struct RigInertiaEntry {
     pub(crate) xx: f64,
     pub(crate) yy: f64,
     pub(crate) zz: f64,
@@ -76,11 +76,11 @@ pub(crate) struct InertiaEntry {
 /// A named place on a body or on the base.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct PointEntry {
-    pub(crate) name: Name,
-    pub(crate) on: Name,
+pub(crate) struct RigPointEntry {
+    pub(crate) name: RigName,
+    pub(crate) on: RigName,
     /// In the body's frame.
-    pub(crate) at: Triple,
+    pub(crate) at: SpannedTriple,
     #[serde(rename = "note")]
     _note: Option<String>,
 }
@@ -88,12 +88,12 @@ pub(crate) struct PointEntry {
 /// A mass at a point.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct LumpedMassEntry {
-    pub(crate) name: Option<Name>,
-    pub(crate) at: Name,
+pub(crate) struct RigLumpedMassEntry {
+    pub(crate) name: Option<RigName>,
+    pub(crate) at: RigName,
     pub(crate) mass: Spanned<f64>,
     /// Point at which the balance of moments sees it.
-    pub(crate) moment_at: Option<Name>,
+    pub(crate) moment_at: Option<RigName>,
     #[serde(rename = "note")]
     _note: Option<String>,
 }
@@ -101,16 +101,16 @@ pub(crate) struct LumpedMassEntry {
 /// A joint.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct JointEntry {
-    pub(crate) name: Name,
-    pub(crate) kind: Name,
-    pub(crate) between: Spanned<[Name; 2]>,
+pub(crate) struct RigJointEntry {
+    pub(crate) name: RigName,
+    pub(crate) kind: RigName,
+    pub(crate) between: Spanned<[RigName; 2]>,
     /// Place in the base frame, nominal configuration.
-    pub(crate) at: Option<Triple>,
+    pub(crate) at: Option<SpannedTriple>,
     /// Instead, one point, or one on each body in the order of `between`.
-    pub(crate) points: Option<Spanned<Vec<Name>>>,
+    pub(crate) points: Option<Spanned<Vec<RigName>>>,
     /// Direction in the base frame, nominal configuration.
-    pub(crate) axis: Option<Triple>,
+    pub(crate) axis: Option<SpannedTriple>,
     #[serde(rename = "note")]
     _note: Option<String>,
 }
@@ -118,9 +118,9 @@ pub(crate) struct JointEntry {
 /// A coordinate that trajectories prescribe.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct CoordinateEntry {
-    pub(crate) name: Name,
-    pub(crate) joint: Option<Name>,
+pub(crate) struct RigCoordinateEntry {
+    pub(crate) name: RigName,
+    pub(crate) joint: Option<RigName>,
     pub(crate) length: Option<LengthEntry>,
     /// Its value in the nominal configuration.
     pub(crate) nominal: Option<Spanned<f64>>,
@@ -132,16 +132,16 @@ pub(crate) struct CoordinateEntry {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct LengthEntry {
-    pub(crate) from: Name,
-    pub(crate) to: Name,
+    pub(crate) from: RigName,
+    pub(crate) to: RigName,
 }
 
 /// A drive.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct DriveEntry {
-    pub(crate) name: Name,
-    pub(crate) joint: Option<Name>,
+pub(crate) struct RigDriveEntry {
+    pub(crate) name: RigName,
+    pub(crate) joint: Option<RigName>,
     pub(crate) linear: Option<LengthEntry>,
     #[serde(rename = "note")]
     _note: Option<String>,
@@ -150,12 +150,12 @@ pub(crate) struct DriveEntry {
 /// Friction and the like.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct EffectEntry {
-    pub(crate) name: Option<Name>,
-    pub(crate) kind: Name,
-    pub(crate) at: Spanned<Vec<Name>>,
+pub(crate) struct RigEffectEntry {
+    pub(crate) name: Option<RigName>,
+    pub(crate) kind: RigName,
+    pub(crate) at: Spanned<Vec<RigName>>,
     #[serde(default)]
-    pub(crate) values: BTreeMap<Name, Spanned<f64>>,
+    pub(crate) values: BTreeMap<RigName, Spanned<f64>>,
     #[serde(rename = "note")]
     _note: Option<String>,
 }
@@ -174,7 +174,7 @@ pub(crate) struct SamplingEntry {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct SensorEntry {
-    pub(crate) of: Spanned<Vec<Name>>,
+    pub(crate) of: Spanned<Vec<RigName>>,
     pub(crate) noise: Option<Spanned<f64>>,
     pub(crate) resolution: Option<Spanned<f64>>,
     /// Steps per turn of an encoder, as a power of two.

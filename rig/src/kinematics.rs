@@ -12,8 +12,8 @@ use std::fmt;
 use nalgebra::linalg::ColPivQR;
 use nalgebra::{DMatrix, DVector, Dyn, Vector3};
 
-use crate::pair::{Derived, Pair};
-use crate::pose::{BodyMotion, Pose};
+use crate::pair::{PairDerivatives, PairFunction};
+use crate::pose::{BodyMotion, BodyPose};
 use crate::rig::Rig;
 
 /// Steps of Gauss-Newton before a pose is given up.
@@ -33,7 +33,7 @@ const CONTINUATION_STEP: f64 = 0.04;
 
 /// Values of the coordinates with their derivatives at one time; one entry per coordinate of the rig.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct State {
+pub struct RigState {
     /// Values, rad or m.
     pub q: Vec<f64>,
     /// First derivatives.
@@ -44,7 +44,7 @@ pub struct State {
 
 /// Why there is no motion for a state.
 #[derive(Clone, Debug, PartialEq)]
-pub enum PoseError {
+pub enum RigPoseError {
     /// The joints cannot be closed with these values of the coordinates.
     OutOfReach {
         /// The joint, or the coordinate, that gapes most.
@@ -68,7 +68,7 @@ pub enum PoseError {
     DrivesDeadlocked,
 }
 
-impl fmt::Display for PoseError {
+impl fmt::Display for RigPoseError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::OutOfReach { at, gap } => write!(
@@ -97,11 +97,11 @@ impl fmt::Display for PoseError {
     }
 }
 
-impl std::error::Error for PoseError {}
+impl std::error::Error for RigPoseError {}
 
 /// Motion of all bodies at one time.
 #[derive(Clone, Debug)]
-pub struct Motion {
+pub struct RigMotion {
     /// One per body of the rig.
     pub bodies: Vec<BodyMotion>,
     /// Rates of all bodies per unit rate of each coordinate: column `k` is the least-squares solution of the
@@ -111,32 +111,32 @@ pub struct Motion {
 
 /// Follows a rig from pose to pose.
 #[derive(Clone, Debug)]
-pub struct Tracker<'r> {
+pub struct RigTracker<'r> {
     rig: &'r Rig,
     base: BodyMotion,
     /// The joints' equations with the names of their joints, then the coordinates.
-    equations: Vec<(Pair, f64)>,
+    equations: Vec<(PairFunction, f64)>,
     names: Vec<&'r str>,
     /// Where the bodies were last, and the coordinates there.
-    poses: Vec<Pose>,
+    poses: Vec<BodyPose>,
     last: Vec<f64>,
     /// Rates per unit rate of each coordinate where bodies were last, from which the next pose is guessed.
     slopes: Option<DMatrix<f64>>,
     /// Inverse of the gradient at some pose nearby.
-    inverse: Option<Inverse>,
+    inverse: Option<GradientInverse>,
 }
 
-impl<'r> Tracker<'r> {
+impl<'r> RigTracker<'r> {
     /// Starts at the nominal configuration, closed exactly.
     ///
     /// Fails when the joints do not close there, leave too few freedoms for the coordinates, or with them do not
     /// determine the pose.
-    pub fn new(rig: &'r Rig) -> Result<Self, PoseError> {
-        let base = BodyMotion::at_rest(Pose::identity());
-        let poses: Vec<Pose> = rig.bodies.iter().map(|body| body.nominal).collect();
-        let at_rest: Vec<BodyMotion> = poses.iter().map(|p| BodyMotion::at_rest(*p)).collect();
+    pub fn new(rig: &'r Rig) -> Result<Self, RigPoseError> {
+        let base = BodyMotion::at_standstill(BodyPose::identity());
+        let poses: Vec<BodyPose> = rig.bodies.iter().map(|body| body.nominal).collect();
+        let at_rest: Vec<BodyMotion> = poses.iter().map(|p| BodyMotion::at_standstill(*p)).collect();
         let joints = rig.joints.iter();
-        let mut equations: Vec<(Pair, f64)> =
+        let mut equations: Vec<(PairFunction, f64)> =
             joints.clone().flat_map(|j| j.equations.clone()).collect();
         let mut names: Vec<&str> = joints
             .flat_map(|j| j.equations.iter().map(|_| j.name.as_str()))
@@ -159,18 +159,18 @@ impl<'r> Tracker<'r> {
             inverse: None,
         };
         let q = tracker.last.clone();
-        tracker.close(&q)?;
+        tracker.close_joints(&q)?;
         tracker.check_freedoms()?;
         Ok(tracker)
     }
 
     /// More coordinates than freedoms would contradict each other as soon as the rig moves. The rank of the joints'
     /// equations can only be lower at a special pose, so that this never refuses a sound rig.
-    fn check_freedoms(&self) -> Result<(), PoseError> {
+    fn check_freedoms(&self) -> Result<(), RigPoseError> {
         let n = 6 * self.rig.bodies.len();
         let coordinates = self.last.len();
         let n_joint = self.equations.len() - coordinates;
-        let bodies: Vec<BodyMotion> = self.poses.iter().map(|p| BodyMotion::at_rest(*p)).collect();
+        let bodies: Vec<BodyMotion> = self.poses.iter().map(|p| BodyMotion::at_standstill(*p)).collect();
         let mut jacobian: DMatrix<f64> = DMatrix::zeros(n_joint.max(n), n);
         for (i, (pair, _)) in self.equations[..n_joint].iter().enumerate() {
             let derived = pair.derive(&bodies, &self.base);
@@ -180,7 +180,7 @@ impl<'r> Tracker<'r> {
         let held = (0..n).filter(|i| r[(*i, *i)].abs() > RANK_TOLERANCE * r[(0, 0)].abs());
         let freedoms = n - held.count();
         if coordinates > freedoms {
-            return Err(PoseError::TooManyCoordinates {
+            return Err(RigPoseError::TooManyCoordinates {
                 freedoms,
                 coordinates,
             });
@@ -197,13 +197,13 @@ impl<'r> Tracker<'r> {
     /// along a straight line in the coordinates.
     ///
     /// Fails when the joints cannot be closed there or do not determine the motion.
-    pub fn follow(&mut self, state: &State) -> Result<Motion, PoseError> {
+    pub fn follow(&mut self, state: &RigState) -> Result<RigMotion, RigPoseError> {
         let far = state
             .q
             .iter()
             .zip(&self.last)
             .enumerate()
-            .map(|(k, (to, from))| self.rig.coordinates[k].measures.difference(*to, *from))
+            .map(|(k, (to, from))| self.rig.coordinates[k].measures.wrapped_difference(*to, *from))
             .fold(0.0, |most: f64, step| most.max(step.abs()));
         // Small steps keep to the assembly in which the rig is drawn.
         let n_steps = (far / CONTINUATION_STEP).min(1e4).ceil();
@@ -215,14 +215,14 @@ impl<'r> Tracker<'r> {
                 .zip(&state.q)
                 .enumerate()
                 .map(|(k, (from, to))| {
-                    let whole = self.rig.coordinates[k].measures.difference(*to, *from);
+                    let whole = self.rig.coordinates[k].measures.wrapped_difference(*to, *from);
                     from + whole * step / n_steps
                 })
                 .collect();
-            self.close(&q)?;
+            self.close_joints(&q)?;
             step += 1.0;
         }
-        self.close(&state.q)?;
+        self.close_joints(&state.q)?;
         let motion = self.differentiate(state)?;
         self.slopes = Some(motion.rates_per_coordinate.clone());
         Ok(motion)
@@ -232,21 +232,21 @@ impl<'r> Tracker<'r> {
     ///
     /// One inverse of the gradient serves as long as steps shrink fast with it: along a trajectory that saves
     /// nearly all decompositions, and the residual, not the inverse, says when the pose is met.
-    fn close(&mut self, q: &[f64]) -> Result<(), PoseError> {
+    fn close_joints(&mut self, q: &[f64]) -> Result<(), RigPoseError> {
         let n_joint = self.equations.len() - q.len();
         for (equation, value) in self.equations[n_joint..].iter_mut().zip(q) {
             equation.1 = *value;
         }
-        let mut poses = self.guess(q);
+        let mut poses = self.predict_poses(q);
         let mut outcome = ("", f64::INFINITY);
         let mut last_length = f64::INFINITY;
         let mut is_fresh = false;
         for _ in 0..MOST_STEPS {
-            let bodies: Vec<BodyMotion> = poses.iter().map(|p| BodyMotion::at_rest(*p)).collect();
+            let bodies: Vec<BodyMotion> = poses.iter().map(|p| BodyMotion::at_standstill(*p)).collect();
             let derived = self.derive(&bodies);
             let mut residual = DMatrix::zeros(self.equations.len(), 1);
             for (i, ((pair, target), derived)) in self.equations.iter().zip(&derived).enumerate() {
-                residual[i] = pair.difference(derived.value, *target);
+                residual[i] = pair.wrapped_difference(derived.value, *target);
             }
             let gap = residual.iamax_full().0;
             outcome = (self.names[gap], residual[gap].abs());
@@ -295,14 +295,14 @@ impl<'r> Tracker<'r> {
         }
         // Whatever comes next starts afresh.
         self.inverse = None;
-        Err(PoseError::OutOfReach {
+        Err(RigPoseError::OutOfReach {
             at: outcome.0.to_owned(),
             gap: outcome.1,
         })
     }
 
     /// Where the bodies will be about when the coordinates are `q`.
-    fn guess(&self, q: &[f64]) -> Vec<Pose> {
+    fn predict_poses(&self, q: &[f64]) -> Vec<BodyPose> {
         let mut poses = self.poses.clone();
         if let Some(slopes) = &self.slopes {
             let measures = self.rig.coordinates.iter().map(|c| &c.measures);
@@ -311,7 +311,7 @@ impl<'r> Tracker<'r> {
             let back = DMatrix::from_iterator(
                 q.len(),
                 1,
-                steps.map(|((m, to), from)| -m.difference(*to, *from)),
+                steps.map(|((m, to), from)| -m.wrapped_difference(*to, *from)),
             );
             displace(&mut poses, &(slopes * back));
         }
@@ -319,14 +319,14 @@ impl<'r> Tracker<'r> {
     }
 
     /// Rates and accelerations at the closed pose.
-    fn differentiate(&mut self, state: &State) -> Result<Motion, PoseError> {
+    fn differentiate(&mut self, state: &RigState) -> Result<RigMotion, RigPoseError> {
         let n_equations = self.equations.len();
         let n_dof = state.q.len();
         let n_joint = n_equations - n_dof;
         let mut bodies: Vec<BodyMotion> = self
             .poses
             .iter()
-            .map(|pose| BodyMotion::at_rest(*pose))
+            .map(|pose| BodyMotion::at_standstill(*pose))
             .collect();
         let derived = self.derive(&bodies);
         let mut unit = DMatrix::zeros(n_equations, n_dof);
@@ -354,7 +354,7 @@ impl<'r> Tracker<'r> {
             body.a_WB_W = part(accelerations.as_slice(), 6 * b);
             body.alpha_WB_W = part(accelerations.as_slice(), 6 * b + 3);
         }
-        Ok(Motion {
+        Ok(RigMotion {
             bodies,
             rates_per_coordinate,
         })
@@ -363,9 +363,9 @@ impl<'r> Tracker<'r> {
     /// Solves `gradient x = right` by iterative refinement with the inverse at hand; a fresh one if that is slow.
     fn solve(
         &mut self,
-        derived: &[Derived],
+        derived: &[PairDerivatives],
         right: &DMatrix<f64>,
-    ) -> Result<DMatrix<f64>, PoseError> {
+    ) -> Result<DMatrix<f64>, RigPoseError> {
         let scale = right.amax().max(f64::MIN_POSITIVE);
         if let Some(inverse) = &self.inverse {
             let mut x = inverse.solve(right);
@@ -391,7 +391,7 @@ impl<'r> Tracker<'r> {
     }
 
     /// Gradient of all equations times columns of rates.
-    fn product(&self, derived: &[Derived], x: &DMatrix<f64>) -> DMatrix<f64> {
+    fn product(&self, derived: &[PairDerivatives], x: &DMatrix<f64>) -> DMatrix<f64> {
         let mut product = DMatrix::zeros(self.equations.len(), x.ncols());
         for (i, ((pair, _), derived)) in self.equations.iter().zip(derived).enumerate() {
             for k in 0..x.ncols() {
@@ -403,14 +403,14 @@ impl<'r> Tracker<'r> {
         product
     }
 
-    fn derive(&self, bodies: &[BodyMotion]) -> Vec<Derived> {
+    fn derive(&self, bodies: &[BodyMotion]) -> Vec<PairDerivatives> {
         self.equations
             .iter()
             .map(|(pair, _)| pair.derive(bodies, &self.base))
             .collect()
     }
 
-    fn invert(&self, derived: &[Derived]) -> Result<Inverse, PoseError> {
+    fn invert(&self, derived: &[PairDerivatives]) -> Result<GradientInverse, RigPoseError> {
         let n = 6 * self.rig.bodies.len();
         // Rows of zeros complete a matrix with too few equations; its rank then tells.
         let mut jacobian: DMatrix<f64> = DMatrix::zeros(self.equations.len().max(n), n);
@@ -428,10 +428,10 @@ impl<'r> Tracker<'r> {
                 let solvable = r.solve_upper_triangular_mut(&mut inverse);
                 debug_assert!(solvable, "the rank was checked");
                 qr.p().inv_permute_rows(&mut inverse);
-                return Ok(Inverse(inverse));
+                return Ok(GradientInverse(inverse));
             }
         }
-        Err(PoseError::Undetermined {
+        Err(RigPoseError::Undetermined {
             body: self.rig.bodies[freest_body(jacobian)].name.clone(),
         })
     }
@@ -454,18 +454,18 @@ fn freest_body(jacobian: DMatrix<f64>) -> usize {
 }
 
 /// Moves all bodies by minus a step, six rows per body.
-fn displace(poses: &mut [Pose], step: &DMatrix<f64>) {
+fn displace(poses: &mut [BodyPose], step: &DMatrix<f64>) {
     for (b, pose) in poses.iter_mut().enumerate() {
         let part = |at: usize| -Vector3::new(step[at], step[at + 1], step[at + 2]);
-        *pose = pose.displaced(&part(6 * b), &part(6 * b + 3));
+        *pose = pose.displaced_by(&part(6 * b), &part(6 * b + 3));
     }
 }
 
 /// The least-squares inverse of the gradient of all equations at one pose.
 #[derive(Clone, Debug)]
-struct Inverse(DMatrix<f64>);
+struct GradientInverse(DMatrix<f64>);
 
-impl Inverse {
+impl GradientInverse {
     /// Least-squares solutions, one per column of the right-hand side.
     fn solve(&self, right: &DMatrix<f64>) -> DMatrix<f64> {
         &self.0 * right

@@ -37,20 +37,20 @@ mod sensor;
 mod simulate;
 mod trajectory;
 
-pub use dynamics::{Measured, energy};
-pub use effect::{Effect, Law, Place, ValueOfKind, ValueSign};
+pub use dynamics::{ScalarMotion, energy};
+pub use effect::{RigEffect, RigLaw, RigPlace, ValueOfKind, ValueSign};
 pub use effect_by_name::{EffectFault, EffectPart};
-pub use kinematics::{Motion, PoseError, State, Tracker};
-pub use load::{Loaded, fault, load, load_file, load_file_with, parse, span};
-pub use log::Log;
-pub use modelmill_spec::Failure;
-pub use noise::Noise;
-pub use pair::{Anchor, Pair};
-pub use plant::{Plant, PlantError};
-pub use pose::{BodyMotion, Pose};
-pub use rig::{Body, Coordinate, Drive, Joint, LumpedMass, Point, Rig};
-pub use sensor::{Channel, Sensors};
+pub use kinematics::{RigMotion, RigPoseError, RigState, RigTracker};
+pub use load::{LoadedRig, plain_error, load, load_file, load_file_with, parse, source_span};
+pub use log::RigLog;
+pub use modelmill_spec::LoadFailure;
+pub use noise::GaussianNoise;
+pub use pair::{BodyAnchor, PairFunction};
+pub use plant::{RigPlant, PlantError};
+pub use pose::{BodyMotion, BodyPose};
+pub use rig::{RigBody, RigCoordinate, RigDrive, RigJoint, RigLumpedMass, RigPoint, Rig};
+pub use sensor::{SensorChannel, RigSensors};
 pub use simulate::{
-    Instant, Run, SimulationError, forces, forces_along, measured, n_instants, simulate,
+    SimulatedInstant, RigRecording, SimulationError, forces, forces_along, place_motion, n_instants, simulate,
 };
-pub use trajectory::{Samples, Trajectory, TrajectoryError};
+pub use trajectory::{CoordinateSamples, Trajectory, TrajectoryError};

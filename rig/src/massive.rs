@@ -6,10 +6,10 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::dynamics::base;
-use crate::effect::{Effect, Law, Place};
-use crate::kinematics::Motion;
-use crate::pair::Anchor;
+use crate::dynamics::base_motion;
+use crate::effect::{RigEffect, RigLaw, RigPlace};
+use crate::kinematics::RigMotion;
+use crate::pair::BodyAnchor;
 use crate::pose::BodyMotion;
 use crate::rig::Rig;
 
@@ -17,15 +17,15 @@ use crate::rig::Rig;
 pub(crate) fn gravity(rig: &Rig) -> Vector3<f64> {
     let mut gravity = rig.gravity;
     for effect in &rig.effects {
-        if let Law::GravityTilt { tx, ty, tz } = effect.law {
-            gravity = turn(Vector3::new(tx, ty, tz)).transpose() * gravity;
+        if let RigLaw::GravityTilt { tx, ty, tz } = effect.law {
+            gravity = rotation_from_vector(Vector3::new(tx, ty, tz)).transpose() * gravity;
         }
     }
     gravity
 }
 
 /// The rotation of a rotation vector (O. Rodrigues 1840).
-fn turn(by: Vector3<f64>) -> Matrix3<f64> {
+fn rotation_from_vector(by: Vector3<f64>) -> Matrix3<f64> {
     let angle = by.norm();
     if angle == 0.0 {
         return Matrix3::identity();
@@ -36,14 +36,14 @@ fn turn(by: Vector3<f64>) -> Matrix3<f64> {
 
 /// Calls `add` with each body, a force on it and its moment about the body's origin, which an effect needs for the
 /// motion of its masses.
-pub(crate) fn supply(
+pub(crate) fn inertial_forces(
     rig: &Rig,
-    effect: &Effect,
-    motion: &Motion,
+    effect: &RigEffect,
+    motion: &RigMotion,
     gravity: &Vector3<f64>,
     add: &mut impl FnMut(usize, Vector3<f64>, Vector3<f64>),
 ) {
-    let mut push = |anchor: &Anchor, force: Vector3<f64>| {
+    let mut push = |anchor: &BodyAnchor, force: Vector3<f64>| {
         if let Some(body) = anchor.body {
             add(
                 body,
@@ -53,24 +53,24 @@ pub(crate) fn supply(
         }
     };
     match effect.law {
-        Law::PointMass { m } => {
+        RigLaw::PointMass { m } => {
             for place in &effect.places {
-                if let Some(anchor) = point(rig, *place) {
-                    let a = moves(motion, &anchor).acceleration(&anchor.at);
+                if let Some(anchor) = point_anchor(rig, *place) {
+                    let a = anchor_motion(motion, &anchor).point_acceleration(&anchor.at);
                     push(&anchor, m * (a - gravity));
                 }
             }
         }
-        Law::LumpedMassPlacement { m } => {
+        RigLaw::LumpedMassPlacement { m } => {
             let [true_place, seen] = effect.places[..] else {
                 return;
             };
-            if let (Some(from), Some(to)) = (point(rig, true_place), point(rig, seen))
+            if let (Some(from), Some(to)) = (point_anchor(rig, true_place), point_anchor(rig, seen))
                 && let Some(body) = from.body
             {
                 let moves = &motion.bodies[body];
                 let moment = |at: &Vector3<f64>| {
-                    (moves.R_WB * at).cross(&(moves.acceleration(at) - gravity))
+                    (moves.R_WB * at).cross(&(moves.point_acceleration(at) - gravity))
                 };
                 add(
                     body,
@@ -79,10 +79,10 @@ pub(crate) fn supply(
                 );
             }
         }
-        Law::RodInertia { m, c, I } => {
+        RigLaw::RodInertia { m, c, I } => {
             for place in &effect.places {
                 if let Some(pair) = place.pair(rig) {
-                    let [pivot, slide] = rod(motion, [&pair.from, &pair.to], m, c, I, gravity);
+                    let [pivot, slide] = rod_forces(motion, [&pair.from, &pair.to], m, c, I, gravity);
                     push(&pair.from, pivot);
                     push(&pair.to, slide);
                 }
@@ -93,20 +93,20 @@ pub(crate) fn supply(
 }
 
 /// Forces that a rod needs at its pivot and, across itself, at its slide.
-fn rod(
-    motion: &Motion,
-    ends: [&Anchor; 2],
+fn rod_forces(
+    motion: &RigMotion,
+    ends: [&BodyAnchor; 2],
     m: f64,
     c: f64,
     inertia: f64,
     gravity: &Vector3<f64>,
 ) -> [Vector3<f64>; 2] {
     let [one, two] = ends.map(|anchor| {
-        let moves = moves(motion, anchor);
+        let moves = anchor_motion(motion, anchor);
         [
-            moves.place(&anchor.at),
-            moves.velocity(&anchor.at),
-            moves.acceleration(&anchor.at),
+            moves.point_position(&anchor.at),
+            moves.point_velocity(&anchor.at),
+            moves.point_acceleration(&anchor.at),
         ]
     });
     let [d, dd, ddd] = [0, 1, 2].map(|k| two[k] - one[k]);
@@ -128,36 +128,36 @@ fn rod(
     [force - slide, slide]
 }
 
-fn moves(motion: &Motion, anchor: &Anchor) -> BodyMotion {
-    anchor.body.map_or_else(base, |body| motion.bodies[body])
+fn anchor_motion(motion: &RigMotion, anchor: &BodyAnchor) -> BodyMotion {
+    anchor.body.map_or_else(base_motion, |body| motion.bodies[body])
 }
 
-fn point(rig: &Rig, place: Place) -> Option<Anchor> {
+fn point_anchor(rig: &Rig, place: RigPlace) -> Option<BodyAnchor> {
     match place {
-        Place::Point(at) => Some(rig.points.get(at)?.anchor),
+        RigPlace::Point(at) => Some(rig.points.get(at)?.anchor),
         _ => None,
     }
 }
 
 /// Energy of all masses that effects add, J, beside the potential zero at the base frame's origin.
-pub(crate) fn energy(rig: &Rig, motion: &Motion, gravity: &Vector3<f64>) -> f64 {
+pub(crate) fn energy(rig: &Rig, motion: &RigMotion, gravity: &Vector3<f64>) -> f64 {
     let mut sum = 0.0;
     for effect in &rig.effects {
         for place in &effect.places {
             match effect.law {
-                Law::PointMass { m } => {
-                    if let Some(anchor) = point(rig, *place) {
-                        let moves = moves(motion, &anchor);
+                RigLaw::PointMass { m } => {
+                    if let Some(anchor) = point_anchor(rig, *place) {
+                        let moves = anchor_motion(motion, &anchor);
                         sum += m
-                            * (0.5 * moves.velocity(&anchor.at).norm_squared()
-                                - gravity.dot(&moves.place(&anchor.at)));
+                            * (0.5 * moves.point_velocity(&anchor.at).norm_squared()
+                                - gravity.dot(&moves.point_position(&anchor.at)));
                     }
                 }
-                Law::RodInertia { m, c, I } => {
+                RigLaw::RodInertia { m, c, I } => {
                     if let Some(pair) = place.pair(rig) {
                         let [one, two] = [&pair.from, &pair.to].map(|anchor| {
-                            let moves = moves(motion, anchor);
-                            [moves.place(&anchor.at), moves.velocity(&anchor.at)]
+                            let moves = anchor_motion(motion, anchor);
+                            [moves.point_position(&anchor.at), moves.point_velocity(&anchor.at)]
                         });
                         let d = two[0] - one[0];
                         let u = d / d.norm();

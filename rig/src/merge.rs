@@ -1,36 +1,36 @@
 //! A rig file and those that it extends, as one: entries of a variant replace those of the same name or join them.
 
 use crate::file::{
-    BodyEntry, CoordinateEntry, DriveEntry, EffectEntry, JointEntry, LumpedMassEntry, Name,
-    PointEntry, RigEntry, SensorEntry, Triple,
+    BodyEntry, RigCoordinateEntry, RigDriveEntry, RigEffectEntry, RigJointEntry, RigLumpedMassEntry, RigName,
+    RigPointEntry, RigEntry, SensorEntry, SpannedTriple,
 };
-use crate::load::span;
-use crate::log::{Item, Log};
+use crate::load::source_span;
+use crate::log::{FileItem, RigLog};
 
 /// Entries of all files of a chain.
-pub(crate) struct Merged {
+pub(crate) struct MergedRig {
     pub(crate) name: String,
     pub(crate) title: String,
-    pub(crate) gravity: Option<Item<Triple>>,
+    pub(crate) gravity: Option<FileItem<SpannedTriple>>,
     pub(crate) seed: Option<u64>,
-    pub(crate) rate: Option<Item<toml::Spanned<f64>>>,
+    pub(crate) rate: Option<FileItem<toml::Spanned<f64>>>,
     pub(crate) derivatives: Option<bool>,
-    pub(crate) bodies: Vec<Item<BodyEntry>>,
-    pub(crate) points: Vec<Item<PointEntry>>,
-    pub(crate) lumped_masses: Vec<Item<LumpedMassEntry>>,
-    pub(crate) joints: Vec<Item<JointEntry>>,
-    pub(crate) coordinates: Vec<Item<CoordinateEntry>>,
-    pub(crate) drives: Vec<Item<DriveEntry>>,
-    pub(crate) effects: Vec<Item<EffectEntry>>,
-    pub(crate) encoders: Vec<Item<SensorEntry>>,
-    pub(crate) force_sensors: Vec<Item<SensorEntry>>,
+    pub(crate) bodies: Vec<FileItem<BodyEntry>>,
+    pub(crate) points: Vec<FileItem<RigPointEntry>>,
+    pub(crate) lumped_masses: Vec<FileItem<RigLumpedMassEntry>>,
+    pub(crate) joints: Vec<FileItem<RigJointEntry>>,
+    pub(crate) coordinates: Vec<FileItem<RigCoordinateEntry>>,
+    pub(crate) drives: Vec<FileItem<RigDriveEntry>>,
+    pub(crate) effects: Vec<FileItem<RigEffectEntry>>,
+    pub(crate) encoders: Vec<FileItem<SensorEntry>>,
+    pub(crate) force_sensors: Vec<FileItem<SensorEntry>>,
 }
 
-impl Merged {
-    pub(crate) fn new(file: usize, entry: RigEntry, log: &mut Log) -> Self {
+impl MergedRig {
+    pub(crate) fn new(file: usize, entry: RigEntry, log: &mut RigLog) -> Self {
         if *entry.schema.get_ref() != 1 {
             log.error(
-                span(file, &entry.schema.span()),
+                source_span(file, &entry.schema.span()),
                 format!(
                     "schema {} of rig files is not known",
                     entry.schema.get_ref()
@@ -43,25 +43,25 @@ impl Merged {
         Self {
             name: entry.name.into_inner(),
             title: entry.title.unwrap_or_default(),
-            gravity: entry.gravity.map(|entry| Item { file, entry }),
+            gravity: entry.gravity.map(|entry| FileItem { file, entry }),
             seed: entry.seed,
-            rate: sampling.rate.map(|entry| Item { file, entry }),
+            rate: sampling.rate.map(|entry| FileItem { file, entry }),
             derivatives: sampling.derivatives,
-            bodies: named(file, entry.body, "body", |e| Some(&e.name), log),
-            points: named(file, entry.point, "point", |e| Some(&e.name), log),
-            lumped_masses: named(
+            bodies: collect_items(file, entry.body, "body", |e| Some(&e.name), log),
+            points: collect_items(file, entry.point, "point", |e| Some(&e.name), log),
+            lumped_masses: collect_items(
                 file,
                 entry.lumped_mass,
                 "lumped mass",
                 |e| e.name.as_ref(),
                 log,
             ),
-            joints: named(file, entry.joint, "joint", |e| Some(&e.name), log),
-            coordinates: named(file, entry.coordinate, "coordinate", |e| Some(&e.name), log),
-            drives: named(file, entry.drive, "drive", |e| Some(&e.name), log),
-            effects: named(file, entry.effect, "effect", |e| e.name.as_ref(), log),
-            encoders: named(file, entry.encoder, "encoder", |_| None, log),
-            force_sensors: named(file, entry.force_sensor, "force sensor", |_| None, log),
+            joints: collect_items(file, entry.joint, "joint", |e| Some(&e.name), log),
+            coordinates: collect_items(file, entry.coordinate, "coordinate", |e| Some(&e.name), log),
+            drives: collect_items(file, entry.drive, "drive", |e| Some(&e.name), log),
+            effects: collect_items(file, entry.effect, "effect", |e| e.name.as_ref(), log),
+            encoders: collect_items(file, entry.encoder, "encoder", |_| None, log),
+            force_sensors: collect_items(file, entry.force_sensor, "force sensor", |_| None, log),
         }
     }
 
@@ -75,30 +75,30 @@ impl Merged {
         self.seed = variant.seed.or(self.seed);
         self.rate = variant.rate.or(self.rate.take());
         self.derivatives = variant.derivatives.or(self.derivatives);
-        replace(&mut self.bodies, variant.bodies, |e| Some(&e.name));
-        replace(&mut self.points, variant.points, |e| Some(&e.name));
-        replace(&mut self.lumped_masses, variant.lumped_masses, |e| {
+        merge_items(&mut self.bodies, variant.bodies, |e| Some(&e.name));
+        merge_items(&mut self.points, variant.points, |e| Some(&e.name));
+        merge_items(&mut self.lumped_masses, variant.lumped_masses, |e| {
             e.name.as_ref()
         });
-        replace(&mut self.joints, variant.joints, |e| Some(&e.name));
-        replace(&mut self.coordinates, variant.coordinates, |e| {
+        merge_items(&mut self.joints, variant.joints, |e| Some(&e.name));
+        merge_items(&mut self.coordinates, variant.coordinates, |e| {
             Some(&e.name)
         });
-        replace(&mut self.drives, variant.drives, |e| Some(&e.name));
-        replace(&mut self.effects, variant.effects, |e| e.name.as_ref());
+        merge_items(&mut self.drives, variant.drives, |e| Some(&e.name));
+        merge_items(&mut self.effects, variant.effects, |e| e.name.as_ref());
         self.encoders.extend(variant.encoders);
         self.force_sensors.extend(variant.force_sensors);
     }
 }
 
 /// Wraps the entries of one file; names must be words and differ.
-fn named<T>(
+fn collect_items<T>(
     file: usize,
     entries: Vec<T>,
     what: &str,
-    name: impl Fn(&T) -> Option<&Name>,
-    log: &mut Log,
-) -> Vec<Item<T>> {
+    name: impl Fn(&T) -> Option<&RigName>,
+    log: &mut RigLog,
+) -> Vec<FileItem<T>> {
     let mut seen: Vec<&str> = Vec::new();
     for found in entries.iter().filter_map(&name) {
         let text = found.get_ref().as_str();
@@ -106,7 +106,7 @@ fn named<T>(
             && text.chars().next().is_some_and(|c| !c.is_ascii_digit());
         if !is_word || text == "base" {
             log.error(
-                span(file, &found.span()),
+                source_span(file, &found.span()),
                 format!(
                     "`{}` cannot be a name",
                     text.chars().take(60).collect::<String>()
@@ -117,7 +117,7 @@ fn named<T>(
         }
         if seen.contains(&text) {
             log.error(
-                span(file, &found.span()),
+                source_span(file, &found.span()),
                 format!("there are two entries for the {what} `{text}`"),
                 "this is the second one",
                 "rename or delete one of the two",
@@ -127,12 +127,12 @@ fn named<T>(
     }
     entries
         .into_iter()
-        .map(|entry| Item { file, entry })
+        .map(|entry| FileItem { file, entry })
         .collect()
 }
 
 /// Entries of a variant replace those of the same name where they stand, or join them.
-fn replace<T>(base: &mut Vec<Item<T>>, variant: Vec<Item<T>>, name: impl Fn(&T) -> Option<&Name>) {
+fn merge_items<T>(base: &mut Vec<FileItem<T>>, variant: Vec<FileItem<T>>, name: impl Fn(&T) -> Option<&RigName>) {
     for item in variant {
         let twin = base.iter().position(|other| {
             name(&item.entry).is_some_and(|mine| {

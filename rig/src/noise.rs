@@ -2,9 +2,9 @@
 
 /// A stream of random numbers.
 #[derive(Clone, Debug)]
-pub struct Noise(u64);
+pub struct GaussianNoise(u64);
 
-impl Noise {
+impl GaussianNoise {
     /// The stream `channel` of a seed; channels of one seed are independent of each other.
     pub fn new(seed: u64, channel: u64) -> Self {
         let mut mixed = Self(seed ^ 0x6D6F_6465_6C6D_696C);
@@ -37,22 +37,22 @@ impl Noise {
 
 #[cfg(test)]
 mod tests {
-    use super::Noise;
+    use super::GaussianNoise;
 
     /// These bits are part of the interface: a recording made with a seed can be made again.
     #[test]
     fn the_same_seed_gives_the_same_bits() {
-        let mut noise = Noise::new(7, 2);
+        let mut noise = GaussianNoise::new(7, 2);
         let first: Vec<u64> = (0..3).map(|_| noise.bits()).collect();
-        let mut again = Noise::new(7, 2);
+        let mut again = GaussianNoise::new(7, 2);
         assert_eq!(first, (0..3).map(|_| again.bits()).collect::<Vec<_>>());
-        assert_ne!(first[0], Noise::new(7, 3).bits());
-        assert_ne!(first[0], Noise::new(8, 2).bits());
+        assert_ne!(first[0], GaussianNoise::new(7, 3).bits());
+        assert_ne!(first[0], GaussianNoise::new(8, 2).bits());
     }
 
     #[test]
     fn mean_and_deviation_are_zero_and_one() {
-        let mut noise = Noise::new(1, 0);
+        let mut noise = GaussianNoise::new(1, 0);
         let n = 40_000;
         let draws: Vec<f64> = (0..n).map(|_| noise.normal()).collect();
         let mean = draws.iter().sum::<f64>() / f64::from(n);

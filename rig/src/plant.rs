@@ -9,7 +9,7 @@ use std::fmt;
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::kinematics::{Motion, PoseError, State, Tracker};
+use crate::kinematics::{RigMotion, RigPoseError, RigState, RigTracker};
 use crate::rig::Rig;
 use crate::simulate::forces;
 
@@ -20,9 +20,9 @@ const TOLERANCE: f64 = 1e-10;
 
 /// A rig in motion.
 #[derive(Debug)]
-pub struct Plant<'r> {
+pub struct RigPlant<'r> {
     rig: &'r Rig,
-    tracker: Tracker<'r>,
+    tracker: RigTracker<'r>,
     q: Vec<f64>,
     qd: Vec<f64>,
 }
@@ -38,7 +38,7 @@ pub enum PlantError {
         expected: usize,
     },
     /// It cannot be where it moved.
-    Pose(PoseError),
+    Pose(RigPoseError),
     /// No accelerations go with the forces: a freedom without mass, or friction that jams.
     NoAcceleration,
 }
@@ -61,7 +61,7 @@ impl fmt::Display for PlantError {
 
 impl std::error::Error for PlantError {}
 
-impl<'r> Plant<'r> {
+impl<'r> RigPlant<'r> {
     /// A rig with given coordinates and rates.
     ///
     /// Fails where it cannot be.
@@ -74,7 +74,7 @@ impl<'r> Plant<'r> {
         }
         let mut plant = Self {
             rig,
-            tracker: Tracker::new(rig).map_err(PlantError::Pose)?,
+            tracker: RigTracker::new(rig).map_err(PlantError::Pose)?,
             q: q.to_vec(),
             qd: qd.to_vec(),
         };
@@ -95,7 +95,7 @@ impl<'r> Plant<'r> {
     /// Motion of all bodies, with given accelerations of the coordinates.
     ///
     /// Fails where the rig cannot be.
-    pub fn motion(&mut self, qdd: &[f64]) -> Result<Motion, PlantError> {
+    pub fn motion(&mut self, qdd: &[f64]) -> Result<RigMotion, PlantError> {
         let (q, qd) = (self.q.clone(), self.qd.clone());
         self.motion_at(&q, &qd, qdd)
     }
@@ -135,9 +135,9 @@ impl<'r> Plant<'r> {
         Ok(())
     }
 
-    fn motion_at(&mut self, q: &[f64], qd: &[f64], qdd: &[f64]) -> Result<Motion, PlantError> {
+    fn motion_at(&mut self, q: &[f64], qd: &[f64], qdd: &[f64]) -> Result<RigMotion, PlantError> {
         let [q, qd, qdd] = [q, qd, qdd].map(<[f64]>::to_vec);
-        let state = State { q, qd, qdd };
+        let state = RigState { q, qd, qdd };
         self.tracker.follow(&state).map_err(PlantError::Pose)
     }
 

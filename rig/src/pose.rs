@@ -8,14 +8,14 @@ use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
 /// Position of a body's frame in the base frame W: origin, m, and orientation.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pose {
+pub struct BodyPose {
     /// The frame's origin.
     pub p_WB_W: Vector3<f64>,
     /// Turns vectors of the body into the base frame.
     pub q_WB: UnitQuaternion<f64>,
 }
 
-impl Pose {
+impl BodyPose {
     /// The base frame itself.
     pub fn identity() -> Self {
         Self {
@@ -38,7 +38,7 @@ impl Pose {
     }
 
     /// The pose after a small displacement of the origin and a small rotation, both in the base frame.
-    pub(crate) fn displaced(&self, by: &Vector3<f64>, turn: &Vector3<f64>) -> Self {
+    pub(crate) fn displaced_by(&self, by: &Vector3<f64>, turn: &Vector3<f64>) -> Self {
         let half = Quaternion::from_parts(0.0, turn * 0.5);
         let q = self.q_WB.into_inner();
         Self {
@@ -52,7 +52,7 @@ impl Pose {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BodyMotion {
     /// Where it is.
-    pub pose: Pose,
+    pub pose: BodyPose,
     /// Orientation as a matrix.
     pub R_WB: Matrix3<f64>,
     /// Velocity of the frame's origin, m/s.
@@ -67,7 +67,7 @@ pub struct BodyMotion {
 
 impl BodyMotion {
     /// A body at rest.
-    pub(crate) fn at_rest(pose: Pose) -> Self {
+    pub(crate) fn at_standstill(pose: BodyPose) -> Self {
         Self {
             pose,
             R_WB: pose.q_WB.to_rotation_matrix().into_inner(),
@@ -79,17 +79,17 @@ impl BodyMotion {
     }
 
     /// Place of a point that the body's frame has at `p`.
-    pub fn place(&self, p: &Vector3<f64>) -> Vector3<f64> {
+    pub fn point_position(&self, p: &Vector3<f64>) -> Vector3<f64> {
         self.pose.p_WB_W + self.R_WB * p
     }
 
     /// Velocity of a point that the body's frame has at `p`.
-    pub fn velocity(&self, p: &Vector3<f64>) -> Vector3<f64> {
+    pub fn point_velocity(&self, p: &Vector3<f64>) -> Vector3<f64> {
         self.v_WB_W + self.w_WB_W.cross(&(self.R_WB * p))
     }
 
     /// Acceleration of a point that the body's frame has at `p`.
-    pub fn acceleration(&self, p: &Vector3<f64>) -> Vector3<f64> {
+    pub fn point_acceleration(&self, p: &Vector3<f64>) -> Vector3<f64> {
         let arm = self.R_WB * p;
         self.a_WB_W + self.alpha_WB_W.cross(&arm) + self.centripetal(&arm)
     }

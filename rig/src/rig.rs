@@ -2,10 +2,10 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::effect::Effect;
-use crate::pair::{Anchor, Pair};
-use crate::pose::Pose;
-use crate::sensor::Sensors;
+use crate::effect::RigEffect;
+use crate::pair::{BodyAnchor, PairFunction};
+use crate::pose::BodyPose;
+use crate::sensor::RigSensors;
 
 /// A full-body description of a machine. Made by [`crate::load`].
 #[derive(Clone, Debug, PartialEq)]
@@ -17,34 +17,34 @@ pub struct Rig {
     /// Acceleration of gravity in the base frame, m/s^2.
     pub gravity: Vector3<f64>,
     /// Bodies.
-    pub bodies: Vec<Body>,
+    pub bodies: Vec<RigBody>,
     /// Named places on bodies and on the base.
-    pub points: Vec<Point>,
+    pub points: Vec<RigPoint>,
     /// Masses concentrated at points.
-    pub lumped_masses: Vec<LumpedMass>,
+    pub lumped_masses: Vec<RigLumpedMass>,
     /// Joints.
-    pub joints: Vec<Joint>,
+    pub joints: Vec<RigJoint>,
     /// Coordinates that the trajectory prescribes, one per degree of freedom.
-    pub coordinates: Vec<Coordinate>,
+    pub coordinates: Vec<RigCoordinate>,
     /// Drives, one per degree of freedom.
-    pub drives: Vec<Drive>,
+    pub drives: Vec<RigDrive>,
     /// Friction and the like.
-    pub effects: Vec<Effect>,
+    pub effects: Vec<RigEffect>,
     /// What is measured, and how well.
-    pub sensors: Sensors,
+    pub sensors: RigSensors,
     /// Seed of the noise where the user gives none.
     pub seed: u64,
 }
 
 impl Rig {
     /// The two points that a linear drive pushes apart; `None` for a drive in a joint.
-    pub fn ends_of_drive(&self, drive: usize) -> Option<[Anchor; 2]> {
+    pub fn ends_of_drive(&self, drive: usize) -> Option<[BodyAnchor; 2]> {
         let pair = &self.drives.get(drive)?.measures;
         pair.is_distance().then_some([pair.from, pair.to])
     }
 
     /// Where a revolute joint is on its two bodies; `None` for a joint of another kind.
-    pub fn hinge(&self, joint: usize) -> Option<[Anchor; 2]> {
+    pub fn hinge(&self, joint: usize) -> Option<[BodyAnchor; 2]> {
         let pair = self.joints.get(joint)?.motion.as_ref()?;
         pair.is_angle().then_some([pair.from, pair.to])
     }
@@ -64,11 +64,11 @@ impl Rig {
 
 /// A rigid body.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Body {
+pub struct RigBody {
     /// Name.
     pub name: String,
     /// Where its frame is in the nominal configuration.
-    pub nominal: Pose,
+    pub nominal: BodyPose,
     /// Mass, kg.
     pub mass: f64,
     /// Centre of mass in the body's frame, m.
@@ -79,20 +79,20 @@ pub struct Body {
 
 /// A named place.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Point {
+pub struct RigPoint {
     /// Name.
     pub name: String,
     /// Where it is.
-    pub anchor: Anchor,
+    pub anchor: BodyAnchor,
 }
 
 /// A mass at a point of a body.
 #[derive(Clone, Debug, PartialEq)]
-pub struct LumpedMass {
+pub struct RigLumpedMass {
     /// Mass, kg.
     pub mass: f64,
     /// Where the balance of forces sees it.
-    pub at: Anchor,
+    pub at: BodyAnchor,
     /// Where the balance of moments about the body's frame sees it, in the body's frame; a real mass is seen
     /// at one place by both. Some reduced models split the two, and a rig can copy them.
     pub moment_at: Vector3<f64>,
@@ -100,29 +100,29 @@ pub struct LumpedMass {
 
 /// A joint as the equations that it holds.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Joint {
+pub struct RigJoint {
     /// Name.
     pub name: String,
     /// Functions of the poses, each with the value that it keeps.
-    pub(crate) equations: Vec<(Pair, f64)>,
+    pub(crate) equations: Vec<(PairFunction, f64)>,
     /// Its coordinate, where it has exactly one: an angle or a displacement.
-    pub(crate) motion: Option<Pair>,
+    pub(crate) motion: Option<PairFunction>,
 }
 
 /// A coordinate that the trajectory prescribes.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Coordinate {
+pub struct RigCoordinate {
     /// Name, which is that of its column.
     pub name: String,
     /// What it measures.
-    pub(crate) measures: Pair,
+    pub(crate) measures: PairFunction,
 }
 
 /// A drive.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Drive {
+pub struct RigDrive {
     /// Name, which is that of its column.
     pub name: String,
     /// Its own length or angle; a positive force or torque increases it.
-    pub(crate) measures: Pair,
+    pub(crate) measures: PairFunction,
 }

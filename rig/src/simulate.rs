@@ -2,11 +2,11 @@
 
 use std::fmt;
 
-use crate::dynamics::{Measured, drive_forces, measure};
-use crate::effect::{Law, Place};
-use crate::kinematics::{Motion, PoseError, State, Tracker};
-use crate::noise::Noise;
-use crate::pair::Pair;
+use crate::dynamics::{ScalarMotion, drive_forces, scalar_motion};
+use crate::effect::{RigLaw, RigPlace};
+use crate::kinematics::{RigMotion, RigPoseError, RigState, RigTracker};
+use crate::noise::GaussianNoise;
+use crate::pair::PairFunction;
 use crate::rig::Rig;
 use crate::trajectory::Trajectory;
 
@@ -15,16 +15,16 @@ const MOST_SAMPLES: f64 = 1e7;
 
 /// Exact forces and motion at one time.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Instant {
+pub struct SimulatedInstant {
     /// Coordinates with derivatives, as prescribed.
-    pub state: State,
+    pub state: RigState,
     /// Force or torque of each drive, N or N m, effects included.
     pub forces: Vec<f64>,
 }
 
 /// A recording of the rig.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Run {
+pub struct RigRecording {
     /// Names and numbers of the columns: `t`, coordinates, their derivatives, drives; all of the same length.
     pub columns: Vec<(String, Vec<f64>)>,
     /// What the user should know.
@@ -42,13 +42,13 @@ pub enum SimulationError {
         trajectory: usize,
     },
     /// The rig does not stand in its nominal configuration.
-    Nominal(PoseError),
+    Nominal(RigPoseError),
     /// It cannot be where the trajectory wants it.
     Pose {
         /// When, s.
         time: f64,
         /// Why.
-        reason: PoseError,
+        reason: RigPoseError,
     },
     /// A force or a reading is infinite or no number.
     NotFinite {
@@ -115,22 +115,22 @@ pub fn forces_along(
     trajectory: &Trajectory,
     times: &[f64],
     mut progress: impl FnMut(),
-) -> Result<Vec<Instant>, SimulationError> {
+) -> Result<Vec<SimulatedInstant>, SimulationError> {
     if trajectory.n_coordinates() != rig.coordinates.len() {
         return Err(SimulationError::Coordinates {
             rig: rig.coordinates.len(),
             trajectory: trajectory.n_coordinates(),
         });
     }
-    let mut tracker = Tracker::new(rig).map_err(SimulationError::Nominal)?;
+    let mut tracker = RigTracker::new(rig).map_err(SimulationError::Nominal)?;
     let mut instants = Vec::with_capacity(times.len());
     for &time in times {
-        let state = trajectory.at(time);
+        let state = trajectory.state_at(time);
         let forces = tracker
             .follow(&state)
             .and_then(|motion| forces(rig, &motion))
             .map_err(|reason| SimulationError::Pose { time, reason })?;
-        instants.push(Instant { state, forces });
+        instants.push(SimulatedInstant { state, forces });
         progress();
     }
     Ok(instants)
@@ -141,24 +141,24 @@ pub fn forces_along(
 /// Effects at drives add to their forces; effects in joints are loads that the drives balance, and effects with
 /// mass are loads like those of bodies. A `time_delay` belongs to the sensors and does nothing here.
 /// Fails where the drives cannot balance a load.
-pub fn forces(rig: &Rig, motion: &Motion) -> Result<Vec<f64>, PoseError> {
+pub fn forces(rig: &Rig, motion: &RigMotion) -> Result<Vec<f64>, RigPoseError> {
     let mechanical = drive_forces(rig, motion, &[])?;
     if rig.effects.is_empty() {
         return Ok(mechanical);
     }
-    let measured = |place: Place| {
+    let measured = |place: RigPlace| {
         place
             .pair(rig)
-            .map_or_else(Measured::default, |pair| measure(pair, motion))
+            .map_or_else(ScalarMotion::default, |pair| scalar_motion(pair, motion))
     };
     // Programs may write places down themselves: an index that leads nowhere does nothing.
     let load = |drive: usize| mechanical.get(drive).copied().unwrap_or(0.0);
     let mut at_drives = vec![0.0; rig.drives.len()];
-    let mut in_joints: Vec<(&Pair, f64)> = Vec::new();
+    let mut in_joints: Vec<(&PairFunction, f64)> = Vec::new();
     for effect in &rig.effects {
         for (place, force) in effect.forces(measured, load) {
             match place {
-                Place::Drive(drive) => {
+                RigPlace::Drive(drive) => {
                     if let Some(sum) = at_drives.get_mut(drive) {
                         *sum += force;
                     }
@@ -179,8 +179,8 @@ pub fn forces(rig: &Rig, motion: &Motion) -> Result<Vec<f64>, PoseError> {
 }
 
 /// Value, rate and acceleration of a drive or of a joint with one coordinate; `None` elsewhere.
-pub fn measured(rig: &Rig, place: Place, motion: &Motion) -> Option<Measured> {
-    Some(measure(place.pair(rig)?, motion))
+pub fn place_motion(rig: &Rig, place: RigPlace, motion: &RigMotion) -> Option<ScalarMotion> {
+    Some(scalar_motion(place.pair(rig)?, motion))
 }
 
 /// How many times the mechanics is solved in a run, for progress.
@@ -197,10 +197,10 @@ pub fn simulate(
     trajectory: &Trajectory,
     seed: Option<u64>,
     mut progress: impl FnMut(),
-) -> Result<Run, SimulationError> {
+) -> Result<RigRecording, SimulationError> {
     let (times, mut notes) = sample_times(rig, trajectory)?;
     let present = forces_along(rig, trajectory, &times, &mut progress)?;
-    let mut past: Vec<(f64, Vec<Instant>)> = Vec::new();
+    let mut past: Vec<(f64, Vec<SimulatedInstant>)> = Vec::new();
     for delay in delays(rig) {
         let earlier: Vec<f64> = times.iter().map(|t| t - delay).collect();
         past.push((
@@ -217,7 +217,7 @@ pub fn simulate(
     let mut channel = 0;
     let mut noise = || {
         channel += 1;
-        Noise::new(seed, channel)
+        GaussianNoise::new(seed, channel)
     };
     let names = rig.coordinates.iter().map(|c| c.name.as_str());
     let mut columns = vec![("t".to_owned(), times)];
@@ -229,8 +229,8 @@ pub fn simulate(
     }
     if rig.sensors.derivatives {
         for (suffix, of) in [
-            ("_d", (|s: &State| &s.qd) as fn(&State) -> &Vec<f64>),
-            ("_dd", |s: &State| &s.qdd),
+            ("_d", (|s: &RigState| &s.qd) as fn(&RigState) -> &Vec<f64>),
+            ("_dd", |s: &RigState| &s.qdd),
         ] {
             for (k, (name, encoder)) in names.clone().zip(&rig.sensors.encoders).enumerate() {
                 let values = at(encoder.delay)
@@ -254,7 +254,7 @@ pub fn simulate(
         columns.push((drive.name.clone(), read.collect()));
     }
     check_finite(rig, &columns)?;
-    Ok(Run { columns, notes })
+    Ok(RigRecording { columns, notes })
 }
 
 /// That a recording holds numbers only.
@@ -346,8 +346,8 @@ fn delays(rig: &Rig) -> Vec<f64> {
 
 /// How much later all forces are read, by effects, s.
 fn force_delay(rig: &Rig) -> f64 {
-    let lag = |law: &Law| match law {
-        Law::TimeDelay { T } => *T,
+    let lag = |law: &RigLaw| match law {
+        RigLaw::TimeDelay { T } => *T,
         _ => 0.0,
     };
     rig.effects.iter().map(|effect| lag(&effect.law)).sum()

@@ -7,7 +7,7 @@
 
 use std::fmt;
 
-use crate::kinematics::State;
+use crate::kinematics::RigState;
 
 /// Samples that a finite difference needs.
 const STENCIL: usize = 5;
@@ -16,12 +16,12 @@ const STENCIL: usize = 5;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Trajectory {
     time: Vec<f64>,
-    coordinates: Vec<Samples>,
+    coordinates: Vec<CoordinateSamples>,
 }
 
 /// One coordinate along the trajectory, as long as the times.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Samples {
+pub struct CoordinateSamples {
     /// Values, rad or m.
     pub q: Vec<f64>,
     /// Rates; differences of the values if there are none.
@@ -78,7 +78,7 @@ impl Trajectory {
     /// From times, s, and one entry per coordinate.
     ///
     /// Fails when times do not grow, lengths differ, or derivatives cannot be found.
-    pub fn new(time: Vec<f64>, coordinates: Vec<Samples>) -> Result<Self, TrajectoryError> {
+    pub fn new(time: Vec<f64>, coordinates: Vec<CoordinateSamples>) -> Result<Self, TrajectoryError> {
         if time.is_empty() {
             return Err(TrajectoryError::Empty);
         }
@@ -102,7 +102,7 @@ impl Trajectory {
                 None => differences(&time, &given.q, 2),
             });
             let qd = given.qd.unwrap_or_else(|| differences(&time, &given.q, 1));
-            complete.push(Samples {
+            complete.push(CoordinateSamples {
                 q: given.q,
                 qd: Some(qd),
                 qdd: Some(qdd),
@@ -119,17 +119,17 @@ impl Trajectory {
     /// Fails when times do not grow or a state is not finite.
     pub fn from_function(
         time: Vec<f64>,
-        state: impl Fn(f64) -> State,
+        state: impl Fn(f64) -> RigState,
     ) -> Result<Self, TrajectoryError> {
-        let states: Vec<State> = time.iter().map(|t| state(*t)).collect();
+        let states: Vec<RigState> = time.iter().map(|t| state(*t)).collect();
         let n = states.first().map_or(0, |state| state.q.len());
-        let column = |of: fn(&State) -> &Vec<f64>, k: usize| -> Vec<f64> {
+        let column = |of: fn(&RigState) -> &Vec<f64>, k: usize| -> Vec<f64> {
             states
                 .iter()
                 .filter_map(|state| of(state).get(k).copied())
                 .collect()
         };
-        let samples = (0..n).map(|k| Samples {
+        let samples = (0..n).map(|k| CoordinateSamples {
             q: column(|state| &state.q, k),
             qd: Some(column(|state| &state.qd, k)),
             qdd: Some(column(|state| &state.qdd, k)),
@@ -149,7 +149,7 @@ impl Trajectory {
     }
 
     /// The state at a time; before the first and after the last sample the outermost polynomial goes on.
-    pub fn at(&self, t: f64) -> State {
+    pub fn state_at(&self, t: f64) -> RigState {
         let n = self.time.len();
         let after = self.time.partition_point(|sample| *sample <= t);
         // At a sample its own numbers are the answer, bit for bit.
@@ -162,10 +162,10 @@ impl Trajectory {
         let i = after.clamp(1, n - 1) - 1;
         let (left, right) = (self.sample(i), self.sample(i + 1));
         let h = self.time[i + 1] - self.time[i];
-        let mut state = State::default();
+        let mut state = RigState::default();
         for k in 0..self.coordinates.len() {
-            let ends = |s: &State| [s.q[k], h * s.qd[k], h * h * s.qdd[k]];
-            let [q, qd, qdd] = quintic(ends(&left), ends(&right), (t - self.time[i]) / h);
+            let ends = |s: &RigState| [s.q[k], h * s.qd[k], h * h * s.qdd[k]];
+            let [q, qd, qdd] = quintic_hermite(ends(&left), ends(&right), (t - self.time[i]) / h);
             state.q.push(q);
             state.qd.push(qd / h);
             state.qdd.push(qdd / (h * h));
@@ -173,9 +173,9 @@ impl Trajectory {
         state
     }
 
-    fn sample(&self, i: usize) -> State {
+    fn sample(&self, i: usize) -> RigState {
         let of = |column: &Option<Vec<f64>>| column.as_ref().map_or(0.0, |column| column[i]);
-        State {
+        RigState {
             q: self.coordinates.iter().map(|c| c.q[i]).collect(),
             qd: self.coordinates.iter().map(|c| of(&c.qd)).collect(),
             qdd: self.coordinates.iter().map(|c| of(&c.qdd)).collect(),
@@ -184,7 +184,7 @@ impl Trajectory {
 }
 
 /// Value and two derivatives, at `s` between 0 and 1, of the polynomial with given ones at both ends.
-fn quintic(left: [f64; 3], right: [f64; 3], s: f64) -> [f64; 3] {
+fn quintic_hermite(left: [f64; 3], right: [f64; 3], s: f64) -> [f64; 3] {
     // Around the left end: c0..c2 are its own, c3..c5 meet the right end.
     let [c0, c1, c2] = [left[0], left[1], 0.5 * left[2]];
     let value = right[0] - c0 - c1 - c2;
@@ -205,7 +205,7 @@ fn differences(time: &[f64], values: &[f64], order: usize) -> Vec<f64> {
     (0..time.len())
         .map(|i| {
             let first = i.saturating_sub(STENCIL / 2).min(time.len() - STENCIL);
-            let weights = fornberg(time[i], &time[first..first + STENCIL], order);
+            let weights = fornberg_weights(time[i], &time[first..first + STENCIL], order);
             // Differences to the middle value: constants drop out exactly.
             weights
                 .iter()
@@ -217,7 +217,7 @@ fn differences(time: &[f64], values: &[f64], order: usize) -> Vec<f64> {
 }
 
 /// Fornberg's weights of a derivative at `z` from samples at `x`.
-fn fornberg(z: f64, x: &[f64], order: usize) -> Vec<f64> {
+fn fornberg_weights(z: f64, x: &[f64], order: usize) -> Vec<f64> {
     let mut c = vec![vec![0.0; order + 1]; x.len()];
     c[0][0] = 1.0;
     let mut c1 = 1.0;
@@ -248,7 +248,7 @@ fn fornberg(z: f64, x: &[f64], order: usize) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Samples, Trajectory, TrajectoryError};
+    use super::{CoordinateSamples, Trajectory, TrajectoryError};
 
     const TIME: [f64; 7] = [0.0, 0.1, 0.25, 0.3, 0.45, 0.6, 0.7];
 
@@ -259,14 +259,14 @@ mod tests {
     #[test]
     fn polynomials_of_degree_four_are_differentiated_exactly() {
         let q = along(|t| 1.0 - t + 2.0 * t * t - t.powi(4));
-        let only = Samples {
+        let only = CoordinateSamples {
             q,
             qd: None,
             qdd: None,
         };
         let trajectory = Trajectory::new(TIME.to_vec(), vec![only]).expect("enough samples");
         for t in TIME {
-            let state = trajectory.at(t);
+            let state = trajectory.state_at(t);
             assert!((state.qd[0] - (-1.0 + 4.0 * t - 4.0 * t.powi(3))).abs() < 1e-11);
             assert!((state.qdd[0] - (4.0 - 12.0 * t * t)).abs() < 1e-10);
         }
@@ -274,14 +274,14 @@ mod tests {
 
     #[test]
     fn polynomials_of_degree_five_are_met_between_samples() {
-        let samples = Samples {
+        let samples = CoordinateSamples {
             q: along(|t| t.powi(5)),
             qd: Some(along(|t| 5.0 * t.powi(4))),
             qdd: Some(along(|t| 20.0 * t.powi(3))),
         };
         let trajectory = Trajectory::new(TIME.to_vec(), vec![samples]).expect("sound");
         for t in [0.05_f64, 0.27, 0.69, 0.75] {
-            let state = trajectory.at(t);
+            let state = trajectory.state_at(t);
             assert!((state.q[0] - t.powi(5)).abs() < 1e-14);
             assert!((state.qd[0] - 5.0 * t.powi(4)).abs() < 1e-12);
             assert!((state.qdd[0] - 20.0 * t.powi(3)).abs() < 1e-11);
@@ -291,7 +291,7 @@ mod tests {
     #[test]
     fn faults_are_named() {
         let one = |q: &[f64]| {
-            vec![Samples {
+            vec![CoordinateSamples {
                 q: q.to_vec(),
                 qd: None,
                 qdd: None,

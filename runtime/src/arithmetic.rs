@@ -8,7 +8,7 @@ use core::ops::{Add, Div, Mul, Neg, Sub};
 use crate::Real;
 
 /// What a variable holds: one number, or as many as a vector of the machine.
-pub trait Value:
+pub trait ProgramValue:
     Copy
     + Add<Output = Self>
     + Sub<Output = Self>
@@ -18,7 +18,7 @@ pub trait Value:
 {
     /// A number as a value like `self`.
     #[must_use]
-    fn like(self, x: f64) -> Self;
+    fn number_like(self, x: f64) -> Self;
     /// Square root.
     #[must_use]
     fn sqrt(self) -> Self;
@@ -62,9 +62,9 @@ pub trait Value:
 }
 
 #[allow(clippy::inline_always, reason = "each is an instruction or a call")]
-impl<T: Real> Value for T {
+impl<T: Real> ProgramValue for T {
     #[inline(always)]
-    fn like(self, x: f64) -> Self {
+    fn number_like(self, x: f64) -> Self {
         T::from_f64(x)
     }
     #[inline(always)]
@@ -99,7 +99,7 @@ pub struct Var<V>(pub V);
 
 /// A product of two variables that waits for what is done with it.
 #[derive(Clone, Copy, Debug)]
-pub struct Product<V>(V, V);
+pub struct DeferredProduct<V>(V, V);
 
 /// A variable, or what has been made of some.
 pub trait Term<V>: Copy {
@@ -122,7 +122,7 @@ impl<V: Copy> Term<V> for Var<V> {
 }
 
 #[allow(clippy::inline_always, reason = "one instruction")]
-impl<V: Value> Term<V> for Product<V> {
+impl<V: ProgramValue> Term<V> for DeferredProduct<V> {
     #[inline(always)]
     fn get(self) -> V {
         self.0 * self.1
@@ -177,7 +177,7 @@ macro_rules! terms {
         }
     )*};
 }
-terms! { Var Product }
+terms! { Var DeferredProduct }
 
 /// `left operator right` for terms, where `a` and `b` are both.
 macro_rules! operators {
@@ -195,21 +195,21 @@ macro_rules! operators {
 }
 operators! {
     Var Add::add Var = Var, |a, b| Var(a.0 + b.0);
-    Var Add::add Product = Var, |a, b| Var(a.0.plus_product(b.0, b.1));
-    Product Add::add Var = Var, |a, b| Var(b.0.plus_product(a.0, a.1));
-    Product Add::add Product = Var, |a, b| Var(a.get().plus_product(b.0, b.1));
+    Var Add::add DeferredProduct = Var, |a, b| Var(a.0.plus_product(b.0, b.1));
+    DeferredProduct Add::add Var = Var, |a, b| Var(b.0.plus_product(a.0, a.1));
+    DeferredProduct Add::add DeferredProduct = Var, |a, b| Var(a.get().plus_product(b.0, b.1));
     Var Sub::sub Var = Var, |a, b| Var(a.0 - b.0);
-    Var Sub::sub Product = Var, |a, b| Var(a.0.less_product(b.0, b.1));
-    Product Sub::sub Var = Var, |a, b| Var(b.0.product_less(a.0, a.1));
-    Product Sub::sub Product = Var, |a, b| Var(a.get().less_product(b.0, b.1));
-    Var Mul::mul Var = Product, |a, b| Product(a.0, b.0);
-    Var Mul::mul Product = Product, |a, b| Product(a.0, b.get());
-    Product Mul::mul Var = Product, |a, b| Product(a.get(), b.0);
-    Product Mul::mul Product = Product, |a, b| Product(a.get(), b.get());
+    Var Sub::sub DeferredProduct = Var, |a, b| Var(a.0.less_product(b.0, b.1));
+    DeferredProduct Sub::sub Var = Var, |a, b| Var(b.0.product_less(a.0, a.1));
+    DeferredProduct Sub::sub DeferredProduct = Var, |a, b| Var(a.get().less_product(b.0, b.1));
+    Var Mul::mul Var = DeferredProduct, |a, b| DeferredProduct(a.0, b.0);
+    Var Mul::mul DeferredProduct = DeferredProduct, |a, b| DeferredProduct(a.0, b.get());
+    DeferredProduct Mul::mul Var = DeferredProduct, |a, b| DeferredProduct(a.get(), b.0);
+    DeferredProduct Mul::mul DeferredProduct = DeferredProduct, |a, b| DeferredProduct(a.get(), b.get());
     Var Div::div Var = Var, |a, b| Var(a.0 / b.0);
-    Var Div::div Product = Var, |a, b| Var(a.0 / b.get());
-    Product Div::div Var = Var, |a, b| Var(a.get() / b.0);
-    Product Div::div Product = Var, |a, b| Var(a.get() / b.get());
+    Var Div::div DeferredProduct = Var, |a, b| Var(a.0 / b.get());
+    DeferredProduct Div::div Var = Var, |a, b| Var(a.get() / b.0);
+    DeferredProduct Div::div DeferredProduct = Var, |a, b| Var(a.get() / b.get());
 }
 
 /// The same where one side is a number that stands in the program.
@@ -242,7 +242,7 @@ macro_rules! with_numbers {
         }
     };
 }
-with_numbers! { Var Product }
+with_numbers! { Var DeferredProduct }
 
 #[cfg(test)]
 mod tests {

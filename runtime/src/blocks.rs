@@ -7,10 +7,10 @@
 
 use core::fmt;
 
-use crate::{One, Outputs, PoseError, Real, Var, check_finite};
+use crate::{ScalarNumbers, OutputSink, PoseError, Real, Var, check_finite};
 
 /// A straight-line program of a model, for states given as `INPUTS` numbers each.
-pub trait Program<T: Real, const INPUTS: usize, const OUTPUTS: usize> {
+pub trait StateProgram<T: Real, const INPUTS: usize, const OUTPUTS: usize> {
     /// Names of the inputs.
     const NAMES: [&'static str; INPUTS];
 
@@ -22,7 +22,7 @@ pub trait Program<T: Real, const INPUTS: usize, const OUTPUTS: usize> {
         &self,
         numbers: &N,
         inputs: [Var<N::Value>; INPUTS],
-        outputs: &mut impl Outputs<N::Value>,
+        outputs: &mut impl OutputSink<N::Value>,
     ) -> Result<(), PoseError>;
 
     /// Finds inputs that follow from the others, for one state after the other; `last` holds those of the state before.
@@ -42,11 +42,11 @@ pub trait Program<T: Real, const INPUTS: usize, const OUTPUTS: usize> {
 }
 
 /// A line of numbers as long as a cache line.
-pub trait Line<T>: Copy + AsRef<[T]> + AsMut<[T]> {
+pub trait CacheLine<T>: Copy + AsRef<[T]> + AsMut<[T]> {
     /// How many numbers.
     const LENGTH: usize;
     /// The same number throughout.
-    fn filled(x: T) -> Self;
+    fn splat(x: T) -> Self;
 }
 
 macro_rules! line {
@@ -83,30 +83,30 @@ line!(Line64, f64, 8);
 line!(Line32, f32, 16);
 
 /// Numbers that programs can take many of at once; `f32` and `f64` are.
-pub trait Blocks: Real {
+pub trait BlockScalar: Real {
     /// A cache line of them.
-    type Line: Line<Self>;
+    type Line: CacheLine<Self>;
 
     /// Runs a job in the widest vectors of the machine.
     ///
     /// # Errors
     /// What the job finds wrong.
-    fn run<J: Job<Self>>(job: J) -> Result<(), BlockError>;
+    fn run_job<J: VectorJob<Self>>(job: J) -> Result<(), BlockError>;
 }
 
 /// What runs inside vectors of one width.
-pub trait Job<T: Blocks> {
+pub trait VectorJob<T: BlockScalar> {
     /// Does it all; `vectors` runs a program over a line.
     ///
     /// # Errors
     /// What is found wrong.
-    fn with<V: Vectors<T>>(self, vectors: V) -> Result<(), BlockError>;
+    fn run_vectors<V: VectorWidth<T>>(self, vectors: V) -> Result<(), BlockError>;
 }
 
 /// Vectors of one width, and the instructions for them.
-pub trait Vectors<T: Blocks>: Copy {
+pub trait VectorWidth<T: BlockScalar>: Copy {
     /// Runs a program over the line of states that starts `at` a place of the inputs; whether every lane was regular.
-    fn line<P: Program<T, INPUTS, OUTPUTS>, const INPUTS: usize, const OUTPUTS: usize>(
+    fn run_line<P: StateProgram<T, INPUTS, OUTPUTS>, const INPUTS: usize, const OUTPUTS: usize>(
         self,
         program: &P,
         inputs: &[&[T]; INPUTS],
@@ -117,11 +117,11 @@ pub trait Vectors<T: Blocks>: Copy {
 
 /// One state after the other.
 #[derive(Clone, Copy, Debug)]
-pub struct Singly;
+pub struct ScalarWidth;
 
-impl<T: Blocks> Vectors<T> for Singly {
+impl<T: BlockScalar> VectorWidth<T> for ScalarWidth {
     #[inline]
-    fn line<P: Program<T, INPUTS, OUTPUTS>, const INPUTS: usize, const OUTPUTS: usize>(
+    fn run_line<P: StateProgram<T, INPUTS, OUTPUTS>, const INPUTS: usize, const OUTPUTS: usize>(
         self,
         _program: &P,
         _inputs: &[&[T]; INPUTS],
@@ -137,17 +137,17 @@ impl<T: Blocks> Vectors<T> for Singly {
 mod singly {
     use super::{BlockError, Blocks, Job, Line32, Line64, Singly};
 
-    impl Blocks for f64 {
+    impl BlockScalar for f64 {
         type Line = Line64;
-        fn run<J: Job<Self>>(job: J) -> Result<(), BlockError> {
-            job.with(Singly)
+        fn run<J: VectorJob<Self>>(job: J) -> Result<(), BlockError> {
+            job.with(ScalarWidth)
         }
     }
 
-    impl Blocks for f32 {
+    impl BlockScalar for f32 {
         type Line = Line32;
-        fn run<J: Job<Self>>(job: J) -> Result<(), BlockError> {
-            job.with(Singly)
+        fn run<J: VectorJob<Self>>(job: J) -> Result<(), BlockError> {
+            job.with(ScalarWidth)
         }
     }
 }
@@ -193,7 +193,7 @@ impl core::error::Error for BlockError {}
 
 /// The states of one line, and what a program says of them.
 #[derive(Clone, Copy, Debug)]
-pub struct Block<'a, L, const OUTPUTS: usize> {
+pub struct StateBlock<'a, L, const OUTPUTS: usize> {
     /// Number of the first state.
     pub first: usize,
     /// How many states; what stands behind them in each line means nothing.
@@ -203,30 +203,30 @@ pub struct Block<'a, L, const OUTPUTS: usize> {
 }
 
 /// What is done with the results of a line.
-trait Visit<L, const OUTPUTS: usize> {
-    fn visit(&mut self, block: Block<'_, L, OUTPUTS>);
+trait BlockVisitor<L, const OUTPUTS: usize> {
+    fn visit(&mut self, block: StateBlock<'_, L, OUTPUTS>);
 }
 
 /// A function that looks at them.
-struct Shown<F>(F);
+struct FunctionVisitor<F>(F);
 
-impl<L, F: FnMut(Block<'_, L, OUTPUTS>), const OUTPUTS: usize> Visit<L, OUTPUTS> for Shown<F> {
+impl<L, F: FnMut(StateBlock<'_, L, OUTPUTS>), const OUTPUTS: usize> BlockVisitor<L, OUTPUTS> for FunctionVisitor<F> {
     #[inline]
-    fn visit(&mut self, block: Block<'_, L, OUTPUTS>) {
+    fn visit(&mut self, block: StateBlock<'_, L, OUTPUTS>) {
         (self.0)(block);
     }
 }
 
 /// Columns that they are written to.
-struct Columns<'a, 'b, T, const OUTPUTS: usize>(&'a mut [&'b mut [T]; OUTPUTS]);
+struct ColumnVisitor<'a, 'b, T, const OUTPUTS: usize>(&'a mut [&'b mut [T]; OUTPUTS]);
 
-impl<T: Copy, L: Line<T>, const OUTPUTS: usize> Visit<L, OUTPUTS> for Columns<'_, '_, T, OUTPUTS> {
+impl<T: Copy, L: CacheLine<T>, const OUTPUTS: usize> BlockVisitor<L, OUTPUTS> for ColumnVisitor<'_, '_, T, OUTPUTS> {
     #[allow(
         clippy::inline_always,
         reason = "a function of its own would copy with the narrowest vectors"
     )]
     #[inline(always)]
-    fn visit(&mut self, block: Block<'_, L, OUTPUTS>) {
+    fn visit(&mut self, block: StateBlock<'_, L, OUTPUTS>) {
         for (column, line) in self.0.iter_mut().zip(block.outputs) {
             let to = column.get_mut(block.first..block.first + block.len);
             let (Some(to), line) = (to, line.as_ref()) else {
@@ -248,20 +248,20 @@ impl<T: Copy, L: Line<T>, const OUTPUTS: usize> Visit<L, OUTPUTS> for Columns<'_
 /// # Errors
 /// Slices of different lengths, before anything runs; else the first state without an answer, after all before it have
 /// been shown.
-pub fn visit_blocks<T: Blocks, P, const INPUTS: usize, const OUTPUTS: usize>(
+pub fn visit_blocks<T: BlockScalar, P, const INPUTS: usize, const OUTPUTS: usize>(
     program: &P,
     inputs: &[&[T]; INPUTS],
-    visit: impl FnMut(Block<'_, T::Line, OUTPUTS>),
+    visit: impl FnMut(StateBlock<'_, T::Line, OUTPUTS>),
 ) -> Result<(), BlockError>
 where
-    P: Program<T, INPUTS, OUTPUTS>,
+    P: StateProgram<T, INPUTS, OUTPUTS>,
 {
     let n = n_states(program, inputs)?;
-    T::run(Lines::<T, P, _, INPUTS, OUTPUTS> {
+    T::run_job(LineJob::<T, P, _, INPUTS, OUTPUTS> {
         program,
         inputs,
         n,
-        visit: Shown(visit),
+        visit: FunctionVisitor(visit),
     })
 }
 
@@ -270,21 +270,21 @@ where
 /// # Errors
 /// Slices of different lengths, before anything runs; else the first state without an answer, with the results of all
 /// before it in place.
-pub fn fill_columns<T: Blocks, P, const INPUTS: usize, const OUTPUTS: usize>(
+pub fn fill_columns<T: BlockScalar, P, const INPUTS: usize, const OUTPUTS: usize>(
     program: &P,
     inputs: &[&[T]; INPUTS],
     outputs: &mut [&mut [T]; OUTPUTS],
 ) -> Result<(), BlockError>
 where
-    P: Program<T, INPUTS, OUTPUTS>,
+    P: StateProgram<T, INPUTS, OUTPUTS>,
 {
     let n = n_states(program, inputs)?;
     same_length("output", outputs.iter().map(|o| o.len()), n)?;
-    T::run(Lines::<T, P, _, INPUTS, OUTPUTS> {
+    T::run_job(LineJob::<T, P, _, INPUTS, OUTPUTS> {
         program,
         inputs,
         n,
-        visit: Columns(outputs),
+        visit: ColumnVisitor(outputs),
     })
 }
 
@@ -298,14 +298,14 @@ pub fn fill_columns_in_parallel<T, P, const INPUTS: usize, const OUTPUTS: usize>
     outputs: &mut [&mut [T]; OUTPUTS],
 ) -> Result<(), BlockError>
 where
-    T: Blocks + Send + Sync,
-    P: Program<T, INPUTS, OUTPUTS> + Sync,
+    T: BlockScalar + Send + Sync,
+    P: StateProgram<T, INPUTS, OUTPUTS> + Sync,
 {
     #[cfg(feature = "rayon")]
     {
         let n = n_states(program, inputs)?;
         same_length("output", outputs.iter().map(|o| o.len()), n)?;
-        crate::parallel::fill(program, inputs, outputs, n)
+        crate::parallel::fill_in_parallel(program, inputs, outputs, n)
     }
     #[cfg(not(feature = "rayon"))]
     fill_columns(program, inputs, outputs)
@@ -335,12 +335,12 @@ pub fn columns_of<T, const OUTPUTS: usize>(
 ///
 /// # Errors
 /// Slices of different lengths: the first that is shorter than another.
-pub fn n_states<T: Blocks, P, const INPUTS: usize, const OUTPUTS: usize>(
+pub fn n_states<T: BlockScalar, P, const INPUTS: usize, const OUTPUTS: usize>(
     _program: &P,
     inputs: &[&[T]; INPUTS],
 ) -> Result<usize, BlockError>
 where
-    P: Program<T, INPUTS, OUTPUTS>,
+    P: StateProgram<T, INPUTS, OUTPUTS>,
 {
     let n = inputs.iter().map(|i| i.len()).max().unwrap_or(0);
     let given = INPUTS.saturating_sub(P::COMPLETED);
@@ -366,26 +366,26 @@ fn same_length(
 }
 
 /// All states, line by line.
-struct Lines<'a, T, P, F, const INPUTS: usize, const OUTPUTS: usize> {
+struct LineJob<'a, T, P, F, const INPUTS: usize, const OUTPUTS: usize> {
     program: &'a P,
     inputs: &'a [&'a [T]; INPUTS],
     n: usize,
     visit: F,
 }
 
-impl<'a, T: Blocks, P, F, const INPUTS: usize, const OUTPUTS: usize> Job<T>
-    for Lines<'a, T, P, F, INPUTS, OUTPUTS>
+impl<'a, T: BlockScalar, P, F, const INPUTS: usize, const OUTPUTS: usize> VectorJob<T>
+    for LineJob<'a, T, P, F, INPUTS, OUTPUTS>
 where
-    P: Program<T, INPUTS, OUTPUTS>,
-    F: Visit<T::Line, OUTPUTS>,
+    P: StateProgram<T, INPUTS, OUTPUTS>,
+    F: BlockVisitor<T::Line, OUTPUTS>,
 {
     #[allow(
         clippy::inline_always,
         reason = "a function of its own would be compiled for the narrowest vectors"
     )]
     #[inline(always)]
-    fn with<V: Vectors<T>>(mut self, vectors: V) -> Result<(), BlockError> {
-        let zero = T::Line::filled(T::from_f64(0.0));
+    fn run_vectors<V: VectorWidth<T>>(mut self, vectors: V) -> Result<(), BlockError> {
+        let zero = T::Line::splat(T::from_f64(0.0));
         let (mut lines, mut outputs) = ([zero; INPUTS], [zero; OUTPUTS]);
         let mut last = None;
         let mut first = 0;
@@ -401,10 +401,10 @@ where
                 } else {
                     let mut len = T::Line::LENGTH.min(left);
                     for (line, array) in lines.iter_mut().zip(self.inputs) {
-                        load(line, array, first, len);
+                        load_line(line, array, first, len);
                     }
                     if P::COMPLETED > 0
-                        && let Err((k, reason)) = complete(self.program, &mut lines, len, &mut last)
+                        && let Err((k, reason)) = complete_line(self.program, &mut lines, len, &mut last)
                     {
                         (len, fault) = (k, Some(reason));
                     }
@@ -414,14 +414,14 @@ where
             while at < len || fault.is_some() {
                 let mut done = T::Line::LENGTH.min(len - at);
                 let regular =
-                    fault.is_none() && vectors.line(self.program, &inputs, at, &mut outputs);
+                    fault.is_none() && vectors.run_line(self.program, &inputs, at, &mut outputs);
                 if !regular
                     && let Err((k, reason)) =
-                        one_by_one(self.program, &inputs, at, done, &mut outputs)
+                        run_each_state(self.program, &inputs, at, done, &mut outputs)
                 {
                     (done, fault) = (k, Some(reason));
                 }
-                self.visit.visit(Block {
+                self.visit.visit(StateBlock {
                     first: first + at,
                     len: done,
                     outputs: &outputs,
@@ -441,7 +441,7 @@ where
 /// Fills a line with `len` numbers of an array; the last one is repeated up to the line's end.
 #[allow(clippy::inline_always, reason = "as above")]
 #[inline(always)]
-fn load<T: Blocks>(line: &mut T::Line, array: &[T], first: usize, len: usize) {
+fn load_line<T: BlockScalar>(line: &mut T::Line, array: &[T], first: usize, len: usize) {
     let line = line.as_mut();
     let Some(from) = array.get(first..first + len) else {
         return;
@@ -456,23 +456,23 @@ fn load<T: Blocks>(line: &mut T::Line, array: &[T], first: usize, len: usize) {
 }
 
 /// State `k` of some.
-fn state<T: Blocks, const INPUTS: usize>(inputs: &[&[T]; INPUTS], k: usize) -> [T; INPUTS] {
+fn state_at<T: BlockScalar, const INPUTS: usize>(inputs: &[&[T]; INPUTS], k: usize) -> [T; INPUTS] {
     inputs.map(|input| input.get(k).copied().unwrap_or(T::from_f64(0.0)))
 }
 
 /// Completes the inputs of a line; which state has none, and why.
 #[inline(never)]
-fn complete<T: Blocks, P, const INPUTS: usize, const OUTPUTS: usize>(
+fn complete_line<T: BlockScalar, P, const INPUTS: usize, const OUTPUTS: usize>(
     program: &P,
     inputs: &mut [T::Line; INPUTS],
     len: usize,
     last: &mut Option<[T; INPUTS]>,
 ) -> Result<(), (usize, PoseError)>
 where
-    P: Program<T, INPUTS, OUTPUTS>,
+    P: StateProgram<T, INPUTS, OUTPUTS>,
 {
     for k in 0..len {
-        let mut state = state(&inputs.each_ref().map(AsRef::as_ref), k);
+        let mut state = state_at(&inputs.each_ref().map(AsRef::as_ref), k);
         if let Err(reason) = program.complete(&mut state, last.as_ref()) {
             return Err((k, reason));
         }
@@ -491,7 +491,7 @@ where
 /// `len` states of a line that starts `at` a place, one after the other: which one of them has no answer, and why.
 #[cold]
 #[inline(never)]
-fn one_by_one<T: Blocks, P, const INPUTS: usize, const OUTPUTS: usize>(
+fn run_each_state<T: BlockScalar, P, const INPUTS: usize, const OUTPUTS: usize>(
     program: &P,
     inputs: &[&[T]; INPUTS],
     at: usize,
@@ -499,13 +499,13 @@ fn one_by_one<T: Blocks, P, const INPUTS: usize, const OUTPUTS: usize>(
     outputs: &mut [T::Line; OUTPUTS],
 ) -> Result<(), (usize, PoseError)>
 where
-    P: Program<T, INPUTS, OUTPUTS>,
+    P: StateProgram<T, INPUTS, OUTPUTS>,
 {
     for k in 0..len {
-        let state = state(inputs, at + k);
+        let state = state_at(inputs, at + k);
         let mut found = [T::from_f64(0.0); OUTPUTS];
         check_finite(&state, &P::NAMES)
-            .and_then(|()| program.run(&One::new(), state.map(Var), &mut found))
+            .and_then(|()| program.run(&ScalarNumbers::new(), state.map(Var), &mut found))
             .map_err(|reason| (k, reason))?;
         for (line, value) in outputs.iter_mut().zip(&found) {
             if let Some(to) = line.as_mut().get_mut(k) {

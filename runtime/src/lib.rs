@@ -25,15 +25,15 @@ mod wide;
 use core::cmp::Ordering;
 use core::fmt;
 
-pub use arithmetic::{Product, Term, Value, Var};
+pub use arithmetic::{DeferredProduct, Term, ProgramValue, Var};
 pub use geometry::{SpecialGeometry, divisor};
 pub use lanes::{LARGEST_ANGLE, sin_cos_lanes};
-pub use loops::{Loops, Scales, correct, follow, settle};
+pub use loops::{Loops, Scales, correct, follow, solve_passive};
 pub use model::{
-    Assembly, Drives, Followed, Linearised, LoadedState, Passive, Run, Running, State,
-    accelerations, at, check_base, plainly, ready,
+    Assembly, Drives, ContinuationProgram, Linearisation, LoadedState, Passive, Run, ProgramRun, State,
+    accelerations, run_checked, check_base, run_unchecked, check_block_input,
 };
-pub use numbers::{Angles, Numbers, One, Outputs, Results};
+pub use numbers::{AngleBatch, Numbers, ScalarNumbers, OutputSink, ZeroedOutputs};
 pub use reactions::{ClosedLoop, Joint, Wrench};
 pub use real::Real;
 pub use self_test::{Random, SelfTestError, ShowRows, self_test};
@@ -42,9 +42,9 @@ pub use solve::solve;
 /// What emitted modules bring into scope.
 pub mod emitted {
     pub use crate::{
-        Assembly, BaseParameter, Linearised, Loops, Numbers, One, PoseError, Quantity, Real, Run,
-        Scales, SpecialGeometry, Term, Var, accelerations, at, check_base, check_finite, divisor,
-        plainly, read, settle, values, variables,
+        Assembly, BaseParameter, Linearisation, Loops, Numbers, ScalarNumbers, PoseError, Quantity, Real, Run,
+        Scales, SpecialGeometry, Term, Var, accelerations, run_checked, check_base, check_finite, divisor,
+        run_unchecked, read, solve_passive, values, variables,
     };
 }
 

@@ -12,7 +12,7 @@ const ROUNDING: f64 = 64.0;
 /// Longest stride of an active coordinate and longest step of a passive one, as a share of its scale (1 for an angle).
 const LONGEST: f64 = 0.5;
 /// After a first contraction better than this, strides grow.
-const EASY: f64 = 0.0625;
+const FAST_CONTRACTION: f64 = 0.0625;
 /// Strides for a motion: some ten thousand turns of a crank.
 const STRIDES: u32 = 200_000;
 
@@ -58,12 +58,12 @@ pub struct Scales<A, P> {
 /// # Errors
 /// [`PoseError::OutOfReach`] if the loops do not close to rounding, [`PoseError::Singular`] if the passive coordinates
 /// are not determined.
-pub fn settle<L: Loops>(
+pub fn solve_passive<L: Loops>(
     loops: &L,
     active: &L::Active,
     guess: &L::Passive,
 ) -> Result<L::Passive, PoseError> {
-    newton(loops, active, guess, &FIRST).map(|found| found.passive)
+    newton(loops, active, guess, &FIRST_POSE).map(|found| found.passive)
 }
 
 /// Passive coordinates that close the loops, from those of a pose near by.
@@ -75,7 +75,7 @@ pub fn correct<L: Loops>(
     active: &L::Active,
     guess: &L::Passive,
 ) -> Result<L::Passive, PoseError> {
-    newton(loops, active, guess, &FOLLOWED).map(|found| found.passive)
+    newton(loops, active, guess, &NEARBY_POSE).map(|found| found.passive)
 }
 
 /// Passive coordinates that close the loops at `to`, followed in a straight line from those at `from`.
@@ -121,14 +121,14 @@ pub fn follow<L: Loops>(
         if let Some((at, earlier)) = &before {
             extrapolate::<L>(&mut guess, earlier, way / (done - *at));
         }
-        let rule = if last { FOLLOWED } else { ON_THE_WAY };
+        let rule = if last { NEARBY_POSE } else { INTERMEDIATE_POSE };
         match newton(loops, &active, &guess, &rule) {
             Ok(found) if last => return Ok(found.passive),
             Ok(found) => {
                 before = Some((done, passive));
                 (passive, done) = (found.passive, next);
                 let twice = stride + stride;
-                if found.contraction < number(EASY) {
+                if found.contraction < number(FAST_CONTRACTION) {
                     stride = if twice < longest { twice } else { longest };
                 }
             }
@@ -165,7 +165,7 @@ fn distance<L: Loops>(from: &L::Active, to: &L::Active, scales: &L::Active) -> L
 }
 
 /// How Newton's method is to proceed.
-struct Rule {
+struct NewtonRule {
     /// Most steps.
     steps: u32,
     /// By what each step must shrink; otherwise steps are only cut to the longest.
@@ -175,25 +175,25 @@ struct Rule {
 }
 
 /// Towards the first pose.
-const FIRST: Rule = Rule {
+const FIRST_POSE: NewtonRule = NewtonRule {
     steps: 50,
     contraction: None,
     enough: 0.0,
 };
 /// From a pose near by; at contraction, half of the steps suffice.
-const FOLLOWED: Rule = Rule {
+const NEARBY_POSE: NewtonRule = NewtonRule {
     steps: 12,
     contraction: Some(0.25),
     enough: 0.0,
 };
 /// Between two poses, where only the assembly mode matters.
-const ON_THE_WAY: Rule = Rule {
+const INTERMEDIATE_POSE: NewtonRule = NewtonRule {
     enough: 1e-3,
-    ..FOLLOWED
+    ..NEARBY_POSE
 };
 
 /// What Newton's method found.
-struct Found<P, T> {
+struct NewtonResult<P, T> {
     passive: P,
     /// The second step as a share of the first; 0 if there was none.
     contraction: T,
@@ -203,8 +203,8 @@ fn newton<L: Loops>(
     loops: &L,
     active: &L::Active,
     guess: &L::Passive,
-    rule: &Rule,
-) -> Result<Found<L::Passive, L::Number>, PoseError> {
+    rule: &NewtonRule,
+) -> Result<NewtonResult<L::Passive, L::Number>, PoseError> {
     let number = L::Number::from_f64;
     let (zero, one) = (number(0.0), number(1.0));
     let tiny = L::Number::epsilon().sqrt();
@@ -246,7 +246,7 @@ fn newton<L: Loops>(
             *x = *x - cut * *dx;
         }
         if closed && size <= tiny || size < number(rule.enough) {
-            return Ok(Found {
+            return Ok(NewtonResult {
                 passive,
                 contraction,
             });
@@ -319,7 +319,7 @@ mod tests {
 
     fn first(slider: &Slider) -> [f64; 2] {
         let guess = [0.2, slider.rod];
-        settle(slider, &[0.0], &guess).unwrap()
+        solve_passive(slider, &[0.0], &guess).unwrap()
     }
 
     #[test]
@@ -354,7 +354,7 @@ mod tests {
         for q in [farthest + 1e-9, farthest + 1e-3, 1.5, 3.0] {
             assert!(to(q).is_err(), "{q}");
         }
-        assert!(settle(&slider, &[1.5], &start).is_err());
+        assert!(solve_passive(&slider, &[1.5], &start).is_err());
         assert!(correct(&slider, &[1.5], &start).is_err());
     }
 

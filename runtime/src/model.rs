@@ -1,8 +1,8 @@
 //! What emitted models are made of whatever they model: states, motion, and how a program is called.
 
-use crate::blocks::{BlockError, Program};
+use crate::blocks::{BlockError, StateProgram};
 use crate::{
-    Loops, Outputs, PoseError, Real, Results, Scales, Term, Var, check_finite, correct, follow,
+    Loops, OutputSink, PoseError, Real, ZeroedOutputs, Scales, Term, Var, check_finite, correct, follow,
     solve,
 };
 
@@ -56,7 +56,7 @@ pub struct Passive<T, const PASSIVE: usize> {
 
 /// Some values with a Jacobian: generalised forces with that of the drives, or the gaps of loops with their own.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Linearised<T, const VALUES: usize, const ROWS: usize> {
+pub struct Linearisation<T, const VALUES: usize, const ROWS: usize> {
     /// The values.
     pub values: [T; VALUES],
     /// The Jacobian.
@@ -64,7 +64,7 @@ pub struct Linearised<T, const VALUES: usize, const ROWS: usize> {
 }
 
 #[allow(clippy::inline_always, reason = "one store")]
-impl<T, const ACTIVE: usize, const DRIVES: usize> Outputs<T> for Drives<T, ACTIVE, DRIVES> {
+impl<T, const ACTIVE: usize, const DRIVES: usize> OutputSink<T> for Drives<T, ACTIVE, DRIVES> {
     #[inline(always)]
     fn put(&mut self, k: usize, value: impl Term<T>) {
         if k < DRIVES {
@@ -77,18 +77,18 @@ impl<T, const ACTIVE: usize, const DRIVES: usize> Outputs<T> for Drives<T, ACTIV
     }
 }
 
-impl<T: Real, const ACTIVE: usize, const DRIVES: usize> Results<T> for Drives<T, ACTIVE, DRIVES> {
+impl<T: Real, const ACTIVE: usize, const DRIVES: usize> ZeroedOutputs<T> for Drives<T, ACTIVE, DRIVES> {
     fn zeros() -> Self {
         Self {
-            coordinate: Results::zeros(),
-            rate: Results::zeros(),
-            jacobian: Results::zeros(),
+            coordinate: ZeroedOutputs::zeros(),
+            rate: ZeroedOutputs::zeros(),
+            jacobian: ZeroedOutputs::zeros(),
         }
     }
 }
 
 #[allow(clippy::inline_always, reason = "one store")]
-impl<T, const PASSIVE: usize> Outputs<T> for Passive<T, PASSIVE> {
+impl<T, const PASSIVE: usize> OutputSink<T> for Passive<T, PASSIVE> {
     #[inline(always)]
     fn put(&mut self, k: usize, value: impl Term<T>) {
         if k < PASSIVE {
@@ -101,18 +101,18 @@ impl<T, const PASSIVE: usize> Outputs<T> for Passive<T, PASSIVE> {
     }
 }
 
-impl<T: Real, const PASSIVE: usize> Results<T> for Passive<T, PASSIVE> {
+impl<T: Real, const PASSIVE: usize> ZeroedOutputs<T> for Passive<T, PASSIVE> {
     fn zeros() -> Self {
         Self {
-            q: Results::zeros(),
-            qd: Results::zeros(),
-            qdd: Results::zeros(),
+            q: ZeroedOutputs::zeros(),
+            qd: ZeroedOutputs::zeros(),
+            qdd: ZeroedOutputs::zeros(),
         }
     }
 }
 
 #[allow(clippy::inline_always, reason = "one store")]
-impl<T, const VALUES: usize, const ROWS: usize> Outputs<T> for Linearised<T, VALUES, ROWS> {
+impl<T, const VALUES: usize, const ROWS: usize> OutputSink<T> for Linearisation<T, VALUES, ROWS> {
     #[inline(always)]
     fn put(&mut self, k: usize, value: impl Term<T>) {
         if k < VALUES {
@@ -123,17 +123,17 @@ impl<T, const VALUES: usize, const ROWS: usize> Outputs<T> for Linearised<T, VAL
     }
 }
 
-impl<T: Real, const VALUES: usize, const ROWS: usize> Results<T> for Linearised<T, VALUES, ROWS> {
+impl<T: Real, const VALUES: usize, const ROWS: usize> ZeroedOutputs<T> for Linearisation<T, VALUES, ROWS> {
     fn zeros() -> Self {
         Self {
-            values: Results::zeros(),
-            jacobian: Results::zeros(),
+            values: ZeroedOutputs::zeros(),
+            jacobian: ZeroedOutputs::zeros(),
         }
     }
 }
 
 #[allow(clippy::inline_always, reason = "one store")]
-impl<T, const ACTIVE: usize, const PASSIVE: usize> Outputs<T>
+impl<T, const ACTIVE: usize, const PASSIVE: usize> OutputSink<T>
     for Scales<[T; ACTIVE], [T; PASSIVE]>
 {
     #[inline(always)]
@@ -148,14 +148,14 @@ impl<T, const ACTIVE: usize, const PASSIVE: usize> Outputs<T>
     }
 }
 
-impl<T: Real, const ACTIVE: usize, const PASSIVE: usize> Results<T>
+impl<T: Real, const ACTIVE: usize, const PASSIVE: usize> ZeroedOutputs<T>
     for Scales<[T; ACTIVE], [T; PASSIVE]>
 {
     fn zeros() -> Self {
         Self {
-            residual: Results::zeros(),
-            passive: Results::zeros(),
-            active: Results::zeros(),
+            residual: ZeroedOutputs::zeros(),
+            passive: ZeroedOutputs::zeros(),
+            active: ZeroedOutputs::zeros(),
         }
     }
 }
@@ -165,35 +165,35 @@ impl<T: Real, const ACTIVE: usize, const PASSIVE: usize> Results<T>
 /// # Errors
 /// An input that is no number or too large, or what is wrong with the pose.
 #[inline]
-pub fn at<T, P, R, const INPUTS: usize, const OUTPUTS: usize>(
+pub fn run_checked<T, P, R, const INPUTS: usize, const OUTPUTS: usize>(
     program: &P,
     inputs: [T; INPUTS],
 ) -> Result<R, PoseError>
 where
     T: Real,
-    P: Program<T, INPUTS, OUTPUTS>,
-    R: Results<T>,
+    P: StateProgram<T, INPUTS, OUTPUTS>,
+    R: ZeroedOutputs<T>,
 {
     check_finite(&inputs, &P::NAMES)?;
     let mut results = R::zeros();
-    program.run(&crate::One::new(), inputs.map(Var), &mut results)?;
+    program.run(&crate::ScalarNumbers::new(), inputs.map(Var), &mut results)?;
     Ok(results)
 }
 
 /// Runs a program that asks nothing of its inputs.
 #[inline]
-pub fn plainly<T, P, R, const INPUTS: usize, const OUTPUTS: usize>(
+pub fn run_unchecked<T, P, R, const INPUTS: usize, const OUTPUTS: usize>(
     program: &P,
     inputs: [T; INPUTS],
 ) -> R
 where
     T: Real,
-    P: Program<T, INPUTS, OUTPUTS>,
-    R: Results<T>,
+    P: StateProgram<T, INPUTS, OUTPUTS>,
+    R: ZeroedOutputs<T>,
 {
     let mut results = R::zeros();
     // There is nothing in it that could fail.
-    _ = program.run(&crate::One::new(), inputs.map(Var), &mut results);
+    _ = program.run(&crate::ScalarNumbers::new(), inputs.map(Var), &mut results);
     results
 }
 
@@ -207,7 +207,7 @@ pub trait Run<T: Real, const INPUTS: usize>: crate::Numbers<Scalar = T> {
 
 /// A program that runs.
 #[derive(Debug)]
-pub struct Running<'a, N: crate::Numbers, O, const INPUTS: usize> {
+pub struct ProgramRun<'a, N: crate::Numbers, O, const INPUTS: usize> {
     /// The arithmetic.
     pub numbers: &'a N,
     /// The inputs.
@@ -217,26 +217,26 @@ pub struct Running<'a, N: crate::Numbers, O, const INPUTS: usize> {
 }
 
 #[allow(clippy::inline_always, reason = "as the arithmetic itself")]
-impl<N: crate::Numbers, O, const INPUTS: usize> crate::Numbers for Running<'_, N, O, INPUTS> {
+impl<N: crate::Numbers, O, const INPUTS: usize> crate::Numbers for ProgramRun<'_, N, O, INPUTS> {
     type Scalar = N::Scalar;
     type Value = N::Value;
 
     #[inline(always)]
-    fn of(&self, x: N::Scalar) -> Var<N::Value> {
-        self.numbers.of(x)
+    fn broadcast(&self, x: N::Scalar) -> Var<N::Value> {
+        self.numbers.broadcast(x)
     }
     #[inline(always)]
     fn sin_cos(&self, angle: impl Term<N::Value>) -> (Var<N::Value>, Var<N::Value>) {
         self.numbers.sin_cos(angle)
     }
     #[inline(always)]
-    fn angles<const K: usize>(&self, angles: [Var<N::Value>; K]) -> crate::Angles<N::Value, K> {
+    fn angles<const K: usize>(&self, angles: [Var<N::Value>; K]) -> crate::AngleBatch<N::Value, K> {
         self.numbers.angles(angles)
     }
     #[inline(always)]
     fn sin_cos_of<const K: usize>(
         &self,
-        angles: &crate::Angles<N::Value, K>,
+        angles: &crate::AngleBatch<N::Value, K>,
         k: usize,
     ) -> (Var<N::Value>, Var<N::Value>) {
         self.numbers.sin_cos_of(angles, k)
@@ -256,11 +256,11 @@ impl<N: crate::Numbers, O, const INPUTS: usize> crate::Numbers for Running<'_, N
 }
 
 #[allow(clippy::inline_always, reason = "as the arithmetic itself")]
-impl<T, N, O, const INPUTS: usize> Run<T, INPUTS> for Running<'_, N, O, INPUTS>
+impl<T, N, O, const INPUTS: usize> Run<T, INPUTS> for ProgramRun<'_, N, O, INPUTS>
 where
     T: Real,
     N: crate::Numbers<Scalar = T>,
-    O: Outputs<N::Value>,
+    O: OutputSink<N::Value>,
 {
     #[inline(always)]
     fn inputs(&self) -> [Var<N::Value>; INPUTS] {
@@ -396,7 +396,7 @@ macro_rules! variables {
 /// A force that is no number or too large, or a mass matrix that is singular.
 pub fn accelerations<T: Real, const ACTIVE: usize, const DRIVES: usize>(
     mut mass_matrix: [[T; ACTIVE]; ACTIVE],
-    bias: &Linearised<T, ACTIVE, DRIVES>,
+    bias: &Linearisation<T, ACTIVE, DRIVES>,
     forces: &[T; DRIVES],
     drives: &[&'static str; DRIVES],
 ) -> Result<[T; ACTIVE], PoseError> {
@@ -467,13 +467,13 @@ pub trait Assembly: Loops {
 
 /// A program whose last inputs are the passive coordinates of a model, which are followed from state to state.
 #[derive(Clone, Copy, Debug)]
-pub struct Followed<'a, P, M>(pub P, pub &'a M);
+pub struct ContinuationProgram<'a, P, M>(pub P, pub &'a M);
 
-impl<T, P, M, const INPUTS: usize, const OUTPUTS: usize> Program<T, INPUTS, OUTPUTS>
-    for Followed<'_, P, M>
+impl<T, P, M, const INPUTS: usize, const OUTPUTS: usize> StateProgram<T, INPUTS, OUTPUTS>
+    for ContinuationProgram<'_, P, M>
 where
     T: Real,
-    P: Program<T, INPUTS, OUTPUTS>,
+    P: StateProgram<T, INPUTS, OUTPUTS>,
     M: Assembly<Number = T>,
 {
     const NAMES: [&'static str; INPUTS] = P::NAMES;
@@ -485,7 +485,7 @@ where
         &self,
         numbers: &N,
         inputs: [Var<N::Value>; INPUTS],
-        outputs: &mut impl Outputs<N::Value>,
+        outputs: &mut impl OutputSink<N::Value>,
     ) -> Result<(), PoseError> {
         self.0.run(numbers, inputs, outputs)
     }
@@ -539,7 +539,7 @@ pub fn check_base<T: Real, const N: usize>(
 ///
 /// # Errors
 /// The same at the first state.
-pub fn ready(input: Result<(), PoseError>) -> Result<(), BlockError> {
+pub fn check_block_input(input: Result<(), PoseError>) -> Result<(), BlockError> {
     input.map_err(|reason| BlockError::At { sample: 0, reason })
 }
 

@@ -5,7 +5,7 @@
 
 use core::marker::PhantomData;
 
-use crate::arithmetic::{Term, Value, Var};
+use crate::arithmetic::{Term, ProgramValue, Var};
 use crate::{PoseError, Real};
 
 /// Arithmetic of a program: whatever needs more than what its variables know themselves.
@@ -13,15 +13,15 @@ pub trait Numbers {
     /// The numbers of the model: `f32` or `f64`.
     type Scalar: Real;
     /// What a variable of the program holds.
-    type Value: Value;
+    type Value: ProgramValue;
 
     /// A value that is the same at every state.
-    fn of(&self, x: Self::Scalar) -> Var<Self::Value>;
+    fn broadcast(&self, x: Self::Scalar) -> Var<Self::Value>;
     /// A number that stands in the program.
     #[allow(clippy::inline_always, reason = "nothing at all")]
     #[inline(always)]
     fn number(&self, x: f64) -> Var<Self::Value> {
-        self.of(Self::Scalar::from_f64(x))
+        self.broadcast(Self::Scalar::from_f64(x))
     }
     /// Sine and cosine of an angle in rad.
     fn sin_cos(&self, angle: impl Term<Self::Value>) -> (Var<Self::Value>, Var<Self::Value>);
@@ -30,8 +30,8 @@ pub trait Numbers {
     /// whether one is too large.
     #[allow(clippy::inline_always, reason = "nothing at all")]
     #[inline(always)]
-    fn angles<const N: usize>(&self, angles: [Var<Self::Value>; N]) -> Angles<Self::Value, N> {
-        Angles {
+    fn angles<const N: usize>(&self, angles: [Var<Self::Value>; N]) -> AngleBatch<Self::Value, N> {
+        AngleBatch {
             sines: angles,
             cosines: angles,
         }
@@ -41,7 +41,7 @@ pub trait Numbers {
     #[inline(always)]
     fn sin_cos_of<const N: usize>(
         &self,
-        angles: &Angles<Self::Value, N>,
+        angles: &AngleBatch<Self::Value, N>,
         k: usize,
     ) -> (Var<Self::Value>, Var<Self::Value>) {
         self.sin_cos(angles.sines[k])
@@ -70,16 +70,16 @@ pub trait Numbers {
 
 /// Angles whose sines and cosines are asked for later: both, or the angles themselves where these are not computed yet.
 #[derive(Clone, Copy, Debug)]
-pub struct Angles<V, const N: usize> {
+pub struct AngleBatch<V, const N: usize> {
     pub(crate) sines: [Var<V>; N],
     pub(crate) cosines: [Var<V>; N],
 }
 
 /// One number at a time.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct One<T>(PhantomData<T>);
+pub struct ScalarNumbers<T>(PhantomData<T>);
 
-impl<T> One<T> {
+impl<T> ScalarNumbers<T> {
     /// The arithmetic of `T`.
     #[must_use]
     pub const fn new() -> Self {
@@ -91,12 +91,12 @@ impl<T> One<T> {
     clippy::inline_always,
     reason = "each is an instruction or a call; without optimisation a program would be thousands of calls"
 )]
-impl<T: Real> Numbers for One<T> {
+impl<T: Real> Numbers for ScalarNumbers<T> {
     type Scalar = T;
     type Value = T;
 
     #[inline(always)]
-    fn of(&self, x: T) -> Var<T> {
+    fn broadcast(&self, x: T) -> Var<T> {
         Var(x)
     }
     #[inline(always)]
@@ -105,15 +105,15 @@ impl<T: Real> Numbers for One<T> {
         (Var(sin), Var(cos))
     }
     #[inline(always)]
-    fn angles<const N: usize>(&self, angles: [Var<T>; N]) -> Angles<T, N> {
+    fn angles<const N: usize>(&self, angles: [Var<T>; N]) -> AngleBatch<T, N> {
         let (sines, cosines) = T::sin_cos_all(angles.map(|angle| angle.0));
-        Angles {
+        AngleBatch {
             sines: sines.map(Var),
             cosines: cosines.map(Var),
         }
     }
     #[inline(always)]
-    fn sin_cos_of<const N: usize>(&self, angles: &Angles<T, N>, k: usize) -> (Var<T>, Var<T>) {
+    fn sin_cos_of<const N: usize>(&self, angles: &AngleBatch<T, N>, k: usize) -> (Var<T>, Var<T>) {
         (angles.sines[k], angles.cosines[k])
     }
     // Each is written so that what is no number fails as well.
@@ -144,19 +144,19 @@ impl<T: Real> Numbers for One<T> {
 }
 
 /// Where a program leaves its results.
-pub trait Outputs<V> {
+pub trait OutputSink<V> {
     /// Takes output `k`.
     fn put(&mut self, k: usize, value: impl Term<V>);
 }
 
 /// Results that begin as zeros.
-pub trait Results<T>: Outputs<T> {
+pub trait ZeroedOutputs<T>: OutputSink<T> {
     /// All of them zero.
     fn zeros() -> Self;
 }
 
 #[allow(clippy::inline_always, reason = "as above")]
-impl<V, const N: usize> Outputs<V> for [V; N] {
+impl<V, const N: usize> OutputSink<V> for [V; N] {
     #[inline(always)]
     fn put(&mut self, k: usize, value: impl Term<V>) {
         self[k] = value.get();
@@ -165,20 +165,20 @@ impl<V, const N: usize> Outputs<V> for [V; N] {
 
 /// Outputs row by row.
 #[allow(clippy::inline_always, reason = "as above")]
-impl<V, const ROWS: usize, const COLUMNS: usize> Outputs<V> for [[V; COLUMNS]; ROWS] {
+impl<V, const ROWS: usize, const COLUMNS: usize> OutputSink<V> for [[V; COLUMNS]; ROWS] {
     #[inline(always)]
     fn put(&mut self, k: usize, value: impl Term<V>) {
         self[k / COLUMNS][k % COLUMNS] = value.get();
     }
 }
 
-impl<T: Real, const N: usize> Results<T> for [T; N] {
+impl<T: Real, const N: usize> ZeroedOutputs<T> for [T; N] {
     fn zeros() -> Self {
         [T::from_f64(0.0); N]
     }
 }
 
-impl<T: Real, const ROWS: usize, const COLUMNS: usize> Results<T> for [[T; COLUMNS]; ROWS] {
+impl<T: Real, const ROWS: usize, const COLUMNS: usize> ZeroedOutputs<T> for [[T; COLUMNS]; ROWS] {
     fn zeros() -> Self {
         [[T::from_f64(0.0); COLUMNS]; ROWS]
     }
@@ -192,10 +192,10 @@ mod tests {
     /// below ten times what rounding leaves.
     #[test]
     fn singular_poses_are_told_by_the_digits_that_there_are() {
-        let double = |x| One::<f64>::new().regular(Var(x), Var(100.0));
+        let double = |x| ScalarNumbers::<f64>::new().regular(Var(x), Var(100.0));
         assert_eq!(double(0.9e-7), Err(PoseError::Singular));
         assert_eq!(double(-1.1e-7), Ok(()));
-        let single = |x| One::<f32>::new().regular(Var(x), Var(100.0));
+        let single = |x| ScalarNumbers::<f32>::new().regular(Var(x), Var(100.0));
         assert_eq!(single(1e-4), Err(PoseError::Singular));
         assert_eq!(single(-1.3e-4), Ok(()));
         assert_eq!(single(f32::NAN), Err(PoseError::Singular));

@@ -9,7 +9,7 @@ use crate::{PoseError, Real};
 
 /// A singular value below this share of the largest counts as zero, columns of length 1; forces differ by rounding if by
 /// less than this share of their terms.
-const NOTHING: f64 = 1e-9;
+const ZERO_SHARE: f64 = 1e-9;
 
 /// Random numbers that are the same on every machine (`SplitMix64`; Steele, Lea and Flood 2014).
 #[derive(Clone, Copy, Debug)]
@@ -22,7 +22,7 @@ impl Random {
     }
 
     /// Uniform between two numbers.
-    pub fn between(&mut self, low: f64, high: f64) -> f64 {
+    pub fn uniform(&mut self, low: f64, high: f64) -> f64 {
         self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
         let mut z = self.0;
         z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
@@ -33,8 +33,8 @@ impl Random {
     }
 
     /// A number of the same sign and some other size; any where there was none.
-    pub fn near(&mut self, value: f64) -> f64 {
-        let factor = self.between(0.5, 1.5);
+    pub fn perturb(&mut self, value: f64) -> f64 {
+        let factor = self.uniform(0.5, 1.5);
         if value == 0.0 { factor } else { value * factor }
     }
 }
@@ -138,8 +138,8 @@ pub fn self_test<const N_PRODUCTS: usize, const N_BASE: usize>(
     /// How often the reach is halved before states are given up.
     const HALVINGS: usize = 4;
     let needed = 2 * N_PRODUCTS + 20;
-    let mut all = Triangle::<N_PRODUCTS>::new();
-    let mut few = Triangle::<N_BASE>::new();
+    let mut all = GivensFactor::<N_PRODUCTS>::new();
+    let mut few = GivensFactor::<N_BASE>::new();
     let mut random = Random::new(1);
     let (mut found, mut reach, mut last) = (0, 1.0, PoseError::OutOfReach);
     let mut worst: Option<SelfTestError> = None;
@@ -151,9 +151,9 @@ pub fn self_test<const N_PRODUCTS: usize, const N_BASE: usize>(
             let shown = rows(&mut random, reach, &mut |h, h_min, force| {
                 all.add(*h);
                 few.add(*h_min);
-                let (expected, size) = sum(h, products);
-                let (reduced, reduced_size) = sum(h_min, base);
-                let limit = NOTHING * (size + reduced_size);
+                let (expected, size) = product_and_magnitude(h, products);
+                let (reduced, reduced_size) = product_and_magnitude(h_min, base);
+                let limit = ZERO_SHARE * (size + reduced_size);
                 for (of, found) in [("H_min p_min", reduced), ("the inverse dynamics", force)] {
                     // What is no number is wrong too.
                     let holds = Real::abs(found - expected) <= limit;
@@ -193,7 +193,7 @@ pub fn self_test<const N_PRODUCTS: usize, const N_BASE: usize>(
 }
 
 /// A row times a column, and the sum of the magnitudes of its terms.
-fn sum<const N: usize>(row: &[f64; N], column: &[f64; N]) -> (f64, f64) {
+fn product_and_magnitude<const N: usize>(row: &[f64; N], column: &[f64; N]) -> (f64, f64) {
     let terms = row.iter().zip(column).map(|(a, b)| a * b);
     terms.fold((0.0, 0.0), |(sum, size), term| {
         (sum + term, size + Real::abs(term))
@@ -201,9 +201,9 @@ fn sum<const N: usize>(row: &[f64; N], column: &[f64; N]) -> (f64, f64) {
 }
 
 /// The triangle of a QR factorisation that takes row after row by rotations (Givens 1958).
-struct Triangle<const N: usize>([[f64; N]; N]);
+struct GivensFactor<const N: usize>([[f64; N]; N]);
 
-impl<const N: usize> Triangle<N> {
+impl<const N: usize> GivensFactor<N> {
     fn new() -> Self {
         Self([[0.0; N]; N])
     }
@@ -277,7 +277,7 @@ impl<const N: usize> Triangle<N> {
         let largest = sizes
             .iter()
             .fold(0.0, |m: f64, x| if *x > m { *x } else { m });
-        sizes.iter().filter(|x| **x > NOTHING * largest).count()
+        sizes.iter().filter(|x| **x > ZERO_SHARE * largest).count()
     }
 }
 

@@ -14,15 +14,15 @@ use std::sync::OnceLock;
 
 use pulp::{Arch, Simd, WithSimd};
 
-use crate::arithmetic::{Term, Value, Var};
-use crate::blocks::{BlockError, Blocks, Job, Line, Line32, Line64, Program, Vectors};
+use crate::arithmetic::{Term, ProgramValue, Var};
+use crate::blocks::{BlockError, BlockScalar, VectorJob, CacheLine, Line32, Line64, StateProgram, VectorWidth};
 use crate::lanes::{self, LARGEST_ANGLE, reduced_sin_cos};
-use crate::numbers::Angles;
-use crate::{Numbers, Outputs, PoseError, Real};
+use crate::numbers::AngleBatch;
+use crate::{Numbers, OutputSink, PoseError, Real};
 
 /// The widest vectors of the machine, or narrower ones if the environment variable `MODELMILL_VECTORS` asks for `256` bits
 /// or `none`, so that the figures of another machine can be seen on this one.
-fn vectors() -> Arch {
+fn widest_vectors() -> Arch {
     static CHOSEN: OnceLock<Arch> = OnceLock::new();
     *CHOSEN.get_or_init(|| match std::env::var("MODELMILL_VECTORS").as_deref() {
         Ok("none") => Arch::Scalar,
@@ -33,7 +33,7 @@ fn vectors() -> Arch {
 }
 
 /// A job inside the vectors that `pulp` chose.
-struct Chosen<J, T>(J, core::marker::PhantomData<T>);
+struct DispatchedJob<J, T>(J, core::marker::PhantomData<T>);
 
 macro_rules! wide {
     (
@@ -388,7 +388,7 @@ impl<S: Simd> Wide64<S> {
 
     /// The other one where the mask is set.
     #[inline(always)]
-    fn like_or(self, mask: S::m64s, other: Self) -> Self {
+    fn select_lanes(self, mask: S::m64s, other: Self) -> Self {
         Self {
             simd: self.simd,
             v: self.simd.select_f64s(mask, other.v, self.v),
@@ -408,17 +408,17 @@ impl<S: Simd> Wide64<S> {
     }
 }
 
-impl<S: Simd> lanes::Angle for Wide64<S> {
+impl<S: Simd> lanes::LaneAngle for Wide64<S> {
     #[inline(always)]
-    fn turned(shifted: Self, sin: Self, cos: Self) -> (Self, Self) {
+    fn rotate_by_quarters(shifted: Self, sin: Self, cos: Self) -> (Self, Self) {
         let simd = shifted.simd;
         let one = simd.splat_u64s(1);
         let quarter = simd.transmute_u64s_f64s(shifted.v);
         let odd = simd.equal_u64s(simd.and_u64s(quarter, one), one);
         let next = simd.add_u64s(quarter, one);
         (
-            sin.like_or(odd, cos).with_sign(quarter),
-            cos.like_or(odd, sin).with_sign(next),
+            sin.select_lanes(odd, cos).with_sign(quarter),
+            cos.select_lanes(odd, sin).with_sign(next),
         )
     }
 }

@@ -8,7 +8,7 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::PathBuf;
 
-use modelmill_boundary::files::Memory;
+use modelmill_boundary::files::MemoryFiles;
 use modelmill_tests::fixtures::model_file;
 use modelmill_tests::stream::Stream;
 
@@ -44,7 +44,7 @@ fn main() {
         ("humanoid", humanoid),
     ] {
         let start = processor_seconds();
-        let loaded = modelmill_spec::load(name, &text, &Memory::default())
+        let loaded = modelmill_spec::load(name, &text, &MemoryFiles::default())
             .unwrap_or_else(|failure| panic!("{}", failure.render(false)));
         let derivation = modelmill_codegen::derive(&loaded.mechanism)
             .unwrap_or_else(|error| panic!("{name}: {error}"));

@@ -13,7 +13,7 @@ use std::process::Command;
 use std::time::Instant;
 
 use modelmill_codegen::expr::{Atom, Unary};
-use modelmill_codegen::{Derivation, Evaluator, Op, PoseFault, Program};
+use modelmill_codegen::{Derivation, ModelEvaluator, ProgramOp, PoseFault, StraightLineProgram};
 use modelmill_identify::{LeastSquares, LeastSquaresError};
 use modelmill_tests::base_parameters;
 use modelmill_tests::fixtures::{derived, fixtures};
@@ -38,7 +38,7 @@ fn run(name: &str, samples: usize, reach: f64) {
         &derivation,
         &base_parameters::nominal(&derivation.mechanism),
     );
-    let evaluator = Evaluator::new(&derivation);
+    let evaluator = ModelEvaluator::new(&derivation);
     let mut noise = Stream::new(8);
     let mut measured = evaluator
         .inverse_dynamics(&sample.states(), &base)
@@ -95,7 +95,7 @@ fn identify(derivation: &Derivation, sample: &Sample, measured: &[Vec<f64>]) -> 
     let (n, drives) = (derivation.reduction.retained.len(), measured.len());
     let mut regression = LeastSquares::with_channels(n, drives);
     let mut start = 0;
-    Evaluator::new(derivation)
+    ModelEvaluator::new(derivation)
         .regressor_blocks::<Fault>(&sample.states(), |len, columns| {
             for (drive, measured) in measured.iter().enumerate() {
                 let columns = &columns[drive * n..(drive + 1) * n];
@@ -186,7 +186,7 @@ fn numpy(
 
 /// The regressor's straight-line program as a numpy function of blocks of states.
 fn source(derivation: &Derivation) -> String {
-    let program: &Program = &derivation.programs.regressor;
+    let program: &StraightLineProgram = &derivation.programs.regressor;
     let mechanism = &derivation.mechanism;
     let active: Vec<usize> = (0..mechanism.coordinates.len())
         .filter(|i| !mechanism.coordinates[*i].passive)
@@ -196,24 +196,24 @@ fn source(derivation: &Derivation) -> String {
     for (i, op) in program.ops.iter().enumerate() {
         let v = |id: &modelmill_codegen::ValueId| format!("v{}", id.index());
         let value = match op {
-            Op::Number(number) => format!("{:?}", number.to_f64()),
-            Op::Input(Atom::Coordinate(c)) => format!("q[{}]", place(*c)),
-            Op::Input(Atom::Rate(c)) => format!("qd[{}]", place(*c)),
-            Op::Input(Atom::Acceleration(c)) => format!("qdd[{}]", place(*c)),
-            Op::Input(Atom::Constant(c)) => format!("{:?}", mechanism.constants[*c].value),
-            Op::Input(Atom::Pi) => "np.pi".to_owned(),
-            Op::Input(other) => unreachable!("no input of these models: {other:?}"),
-            Op::Add(a, b) => format!("{} + {}", v(a), v(b)),
-            Op::Sub(a, b) => format!("{} - {}", v(a), v(b)),
-            Op::Mul(a, b) => format!("{} * {}", v(a), v(b)),
-            Op::Div(a, b) => format!("{} / {}", v(a), v(b)),
-            Op::Atan2(a, b) => format!("np.arctan2({}, {})", v(a), v(b)),
-            Op::Neg(a) => format!("-{}", v(a)),
-            Op::Sin(a) => format!("np.sin({})", v(a)),
-            Op::Cos(a) => format!("np.cos({})", v(a)),
-            Op::Unary(Unary::Sqrt, a) => format!("np.sqrt({})", v(a)),
-            Op::Unary(Unary::Abs, a) => format!("np.abs({})", v(a)),
-            Op::Unary(function, _) => unreachable!("no function of these models: {function:?}"),
+            ProgramOp::Number(number) => format!("{:?}", number.to_f64()),
+            ProgramOp::Input(Atom::Coordinate(c)) => format!("q[{}]", place(*c)),
+            ProgramOp::Input(Atom::Rate(c)) => format!("qd[{}]", place(*c)),
+            ProgramOp::Input(Atom::Acceleration(c)) => format!("qdd[{}]", place(*c)),
+            ProgramOp::Input(Atom::Constant(c)) => format!("{:?}", mechanism.constants[*c].value),
+            ProgramOp::Input(Atom::Pi) => "np.pi".to_owned(),
+            ProgramOp::Input(other) => unreachable!("no input of these models: {other:?}"),
+            ProgramOp::Add(a, b) => format!("{} + {}", v(a), v(b)),
+            ProgramOp::Sub(a, b) => format!("{} - {}", v(a), v(b)),
+            ProgramOp::Mul(a, b) => format!("{} * {}", v(a), v(b)),
+            ProgramOp::Div(a, b) => format!("{} / {}", v(a), v(b)),
+            ProgramOp::Atan2(a, b) => format!("np.arctan2({}, {})", v(a), v(b)),
+            ProgramOp::Neg(a) => format!("-{}", v(a)),
+            ProgramOp::Sin(a) => format!("np.sin({})", v(a)),
+            ProgramOp::Cos(a) => format!("np.cos({})", v(a)),
+            ProgramOp::Unary(Unary::Sqrt, a) => format!("np.sqrt({})", v(a)),
+            ProgramOp::Unary(Unary::Abs, a) => format!("np.abs({})", v(a)),
+            ProgramOp::Unary(function, _) => unreachable!("no function of these models: {function:?}"),
         };
         writeln!(text, "    v{i} = {value}").expect("a string");
     }

@@ -8,7 +8,7 @@
 use std::hint::black_box;
 use std::process::{Command, ExitCode};
 
-use modelmill_codegen::{Evaluator, Program, Stage};
+use modelmill_codegen::{ModelEvaluator, StraightLineProgram, ProgramStage};
 use modelmill_tests::base_parameters;
 use modelmill_tests::fixtures::{derive, derived, model};
 use modelmill_tests::sample::Sample;
@@ -92,8 +92,8 @@ fn report(wanted: Option<&str>) -> ExitCode {
     ExitCode::SUCCESS
 }
 
-fn operations(program: &Program) -> String {
-    let c = program.count(Stage::State);
+fn operations(program: &StraightLineProgram) -> String {
+    let c = program.count_operations(ProgramStage::State);
     format!("{} ({}, {}, {})", c.add + c.mul, c.div, c.sqrt, c.sincos)
 }
 
@@ -133,7 +133,7 @@ fn measured_by_name(name: &str, function: &str, calls: usize) {
         }
         "H_min, block" | "inverse dynamics, block" => {
             let derivation = derived(name);
-            let evaluator = Evaluator::new(&derivation);
+            let evaluator = ModelEvaluator::new(&derivation);
             let sample =
                 Sample::random(&derivation.mechanism, 4 * STATES, 0.2, &mut Stream::new(5));
             let sample = sample.reachable(&evaluator).filtered(|i| i < STATES);

@@ -1,6 +1,6 @@
 //! Laws of mass matrix, velocity terms, gravity, effects and forward dynamics.
 
-use modelmill_codegen::{Dynamics, Evaluator, PoseFault};
+use modelmill_codegen::{DynamicsPrograms, ModelEvaluator, PoseFault};
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use crate::base_parameters::{base, nominal};
@@ -22,8 +22,8 @@ pub struct Terms {
 
 /// Evaluates all terms at the only state of a sample.
 pub fn terms(
-    evaluator: &Evaluator<'_>,
-    dynamics: &Dynamics,
+    evaluator: &ModelEvaluator<'_>,
+    dynamics: &DynamicsPrograms,
     one: &Sample,
     p_min: &[f64],
 ) -> Result<Terms, PoseFault> {
@@ -43,7 +43,7 @@ impl Case {
     /// `J' f = M q'' + c + g + e` with the inverse dynamics' forces f, whatever accelerations the terms are shown; with
     /// them forward dynamics gives the accelerations back. Returns the largest relative error of the equation.
     pub fn equation_of_motion_is_the_inverse_dynamics(&self) -> Result<f64, String> {
-        let evaluator = Evaluator::new(&self.derivation);
+        let evaluator = ModelEvaluator::new(&self.derivation);
         let dynamics = self
             .derivation
             .dynamics()
@@ -57,7 +57,7 @@ impl Case {
             let forces = evaluator
                 .inverse_dynamics(&one.states(), &p_min)
                 .map_err(fault)?;
-            let drives = evaluator.drives(&one.states()).map_err(fault)?;
+            let drives = evaluator.drive_motion(&one.states()).map_err(fault)?;
             let n_drives = forces.len();
             let jacobian =
                 DMatrix::from_fn(n_drives, n, |d, a| drives[2 * n_drives + d * n + a][0]);
@@ -113,7 +113,7 @@ impl Case {
         is_physical: bool,
     ) -> Result<f64, String> {
         let mechanism = self.mechanism();
-        let evaluator = Evaluator::new(&self.derivation);
+        let evaluator = ModelEvaluator::new(&self.derivation);
         let dynamics = self
             .derivation
             .dynamics()

@@ -4,7 +4,7 @@
 //! Wrenches are in the axes of the base, moments about its origin. Nothing is shared with the mill: motion comes from
 //! Taylor series of poses, inertia from pseudo-inertias, and no equation is projected.
 
-use modelmill_codegen::{Evaluator, Reactions};
+use modelmill_codegen::{ModelEvaluator, ReactionPrograms};
 use modelmill_spec::{DriveKind, FrameIdx, Mechanism, PointIdx};
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix4, Vector3};
 
@@ -354,7 +354,7 @@ impl Case {
             .derivation
             .reactions()
             .map_err(|e| self.breach(&e.to_string()))?;
-        let evaluator = Evaluator::new(&self.derivation);
+        let evaluator = ModelEvaluator::new(&self.derivation);
         let numbers = Numbers::new(mechanism, nominal(mechanism));
         let p_min = base(&self.derivation, &nominal(mechanism));
         let mut found = Found::default();
@@ -429,7 +429,7 @@ fn components(
     mechanism: &Mechanism,
     numbers: &Numbers<'_>,
     motion: &[Jet],
-    reactions: &Reactions,
+    reactions: &ReactionPrograms,
     balances: &Balances,
 ) -> Vec<(String, Option<usize>, DVector<f64>)> {
     let n = balances.matrix.ncols();

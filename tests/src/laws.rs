@@ -1,8 +1,8 @@
 //! Laws that hold for every mechanism, checked on one; a breach says where and by how much.
 
-use modelmill_codegen::{Derivation, Evaluator};
+use modelmill_codegen::{Derivation, ModelEvaluator};
 use modelmill_spec::{
-    Angle, Axis, Constant, ConstantIdx, Exact, FrameIdx, Function, Mechanism, Step, Symbol,
+    ExactAngle, FrameAxis, ModelConstant, ConstantIdx, ExactExpression, FrameIdx, ExactFunction, Mechanism, FrameStep, ModelSymbol,
 };
 use nalgebra::{Cholesky, DMatrix, DVector};
 
@@ -36,7 +36,7 @@ impl Case {
         let derivation = modelmill_codegen::derive(mechanism)
             .map_err(|error| format!("{}: {error}", mechanism.name))?;
         let sample = {
-            let evaluator = Evaluator::new(&derivation);
+            let evaluator = ModelEvaluator::new(&derivation);
             let mut stream = Stream::new(mechanism.name.len() as u64 + 77);
             let drawn = Sample::random(mechanism, 4 * n, reach, &mut stream).reachable(&evaluator);
             let full: Vec<bool> = (0..drawn.len())
@@ -67,7 +67,7 @@ impl Case {
             .map_err(|error| format!("{}: {error}", mechanism.name))?;
         let mut stream = Stream::new(mechanism.name.len() as u64 + 78);
         let drawn = Sample::random(mechanism, n, reach, &mut stream);
-        let sample = drawn.reachable(&Evaluator::new(&derivation));
+        let sample = drawn.reachable(&ModelEvaluator::new(&derivation));
         if sample.len() < n / 2 {
             let n = sample.len();
             return Err(format!("{}: only {n} states in reach", mechanism.name));
@@ -85,7 +85,7 @@ impl Case {
 
     /// The exact rank is the rank of a large sample; returns the gap of the singular values.
     pub fn exact_rank_is_numeric_rank(&self) -> Result<f64, String> {
-        let evaluator = Evaluator::new(&self.derivation);
+        let evaluator = ModelEvaluator::new(&self.derivation);
         let exact = self.derivation.reduction.retained.len();
         if self.derivation.reduction.products.is_empty() {
             return Ok(f64::INFINITY);
@@ -109,7 +109,7 @@ impl Case {
 
     /// `H p_g = H_min p_min`, and the inverse dynamics is that force; errors relative to the row's largest terms.
     pub fn reduction_keeps_the_forces(&self) -> Result<f64, String> {
-        let evaluator = Evaluator::new(&self.derivation);
+        let evaluator = ModelEvaluator::new(&self.derivation);
         let states = self.sample.states();
         let fault = |e: modelmill_codegen::PoseFault| self.breach(&e.to_string());
         let parameters = nominal(self.mechanism());
@@ -176,7 +176,7 @@ impl Case {
     /// The largest error with where it is, or the first that is no number.
     fn worst_beside_dalembert(&self, n_states: usize) -> Result<(f64, String), String> {
         let mechanism = self.mechanism();
-        let evaluator = Evaluator::new(&self.derivation);
+        let evaluator = ModelEvaluator::new(&self.derivation);
         let parameters = nominal(mechanism);
         let p_min = base(&self.derivation, &parameters);
         let numbers = Numbers::new(mechanism, parameters);
@@ -220,7 +220,7 @@ impl Case {
     /// The points that loops join coincide, and so do their velocities and accelerations.
     pub fn loops_stay_closed(&self) -> Result<f64, String> {
         let mechanism = self.mechanism();
-        let evaluator = Evaluator::new(&self.derivation);
+        let evaluator = ModelEvaluator::new(&self.derivation);
         let numbers = Numbers::new(mechanism, nominal(mechanism));
         let mut worst: f64 = 0.0;
         for i in 0..self.sample.len().min(30) {
@@ -249,7 +249,7 @@ impl Case {
             mechanism.effects.is_empty(),
             "friction turns power into heat"
         );
-        let evaluator = Evaluator::new(&self.derivation);
+        let evaluator = ModelEvaluator::new(&self.derivation);
         let parameters = nominal(mechanism);
         let p_min = base(&self.derivation, &parameters);
         let numbers = Numbers::new(mechanism, parameters);
@@ -264,7 +264,7 @@ impl Case {
                     later.q[k][0] = q + v * t + 0.5 * a * t * t;
                     later.qd[k][0] = v + a * t;
                 }
-                evaluator.passive(&later.states()).map_err(fault)?;
+                evaluator.passive_motion(&later.states()).map_err(fault)?;
                 Ok(numbers.energy(&motion(&evaluator, mechanism, &later)))
             };
             let forces = evaluator
@@ -305,7 +305,7 @@ impl Case {
     /// The mass matrix, taken from the regressor at rest, is symmetric and positive definite.
     pub fn mass_matrix_is_symmetric_and_positive_definite(&self) -> Result<f64, String> {
         let mechanism = self.mechanism();
-        let evaluator = Evaluator::new(&self.derivation);
+        let evaluator = ModelEvaluator::new(&self.derivation);
         let p_min = DVector::from_vec(base(&self.derivation, &nominal(mechanism)));
         let numbers = Numbers::new(mechanism, nominal(mechanism));
         let fault = |e: modelmill_codegen::PoseFault| self.breach(&e.to_string());
@@ -359,7 +359,7 @@ impl Case {
         let parameters = nominal(self.mechanism());
         let states = self.sample.states();
         let forces = |derivation: &Derivation| {
-            Evaluator::new(derivation)
+            ModelEvaluator::new(derivation)
                 .inverse_dynamics(&states, &base(derivation, &parameters))
                 .map_err(|e| self.breach(&e.to_string()))
         };
@@ -381,7 +381,7 @@ impl Case {
 
 /// All coordinates at a single state, passive ones from the evaluator.
 pub(crate) fn coordinates(
-    evaluator: &Evaluator<'_>,
+    evaluator: &ModelEvaluator<'_>,
     mechanism: &Mechanism,
     one: &Sample,
 ) -> Vec<f64> {
@@ -392,8 +392,8 @@ pub(crate) fn coordinates(
 }
 
 /// All coordinates with rates and accelerations at a single state, passive ones from the evaluator.
-pub fn motion(evaluator: &Evaluator<'_>, mechanism: &Mechanism, one: &Sample) -> Vec<Jet> {
-    let passive = evaluator.passive(&one.states()).expect("a reachable state");
+pub fn motion(evaluator: &ModelEvaluator<'_>, mechanism: &Mechanism, one: &Sample) -> Vec<Jet> {
+    let passive = evaluator.passive_motion(&one.states()).expect("a reachable state");
     let n_passive = passive.len() / 3;
     let (mut a, mut p) = (0, 0);
     mechanism
@@ -458,7 +458,7 @@ fn with_turned_base(mechanism: &Mechanism) -> Mechanism {
     let mut turned = mechanism.clone();
     turned.name = format!("{}_turned", mechanism.name);
     let angle = ConstantIdx(turned.constants.len());
-    turned.constants.push(Constant {
+    turned.constants.push(ModelConstant {
         name: "turn".to_owned(),
         value: 0.7,
         unit: "rad".to_owned(),
@@ -467,38 +467,38 @@ fn with_turned_base(mechanism: &Mechanism) -> Mechanism {
     });
     let integer = |n: i64| num_rational::BigRational::from_integer(n.into());
     let half = num_rational::BigRational::new(1.into(), 2.into());
-    let mut steps = vec![Step::Rotate(
-        Axis::Z,
-        Angle {
+    let mut steps = vec![FrameStep::Rotate(
+        FrameAxis::Z,
+        ExactAngle {
             pi: integer(0),
-            terms: vec![(Symbol::Constant(angle), 1)],
+            terms: vec![(ModelSymbol::Constant(angle), 1)],
         },
     )];
     let [x, y, z] = mechanism.gravity.clone();
     let (tilted, is_tree) = (
-        [x.clone(), Exact::Negative(Box::new(z.clone())), y.clone()],
+        [x.clone(), ExactExpression::Negative(Box::new(z.clone())), y.clone()],
         mechanism.loops.is_empty(),
     );
     let [x, y, z] = if is_tree { tilted } else { [x, y, z] };
     if is_tree {
-        steps.push(Step::Rotate(
-            Axis::X,
-            Angle {
+        steps.push(FrameStep::Rotate(
+            FrameAxis::X,
+            ExactAngle {
                 pi: half,
                 terms: Vec::new(),
             },
         ));
     }
-    let symbol = || Box::new(Exact::Symbol(Symbol::Constant(angle)));
-    let cos = Exact::Apply(Function::Cos, symbol());
-    let sin = Exact::Apply(Function::Sin, symbol());
-    let times = |a: &Exact, b: &Exact| Exact::Product(vec![a.clone(), b.clone()]);
+    let symbol = || Box::new(ExactExpression::Symbol(ModelSymbol::Constant(angle)));
+    let cos = ExactExpression::Apply(ExactFunction::Cos, symbol());
+    let sin = ExactExpression::Apply(ExactFunction::Sin, symbol());
+    let times = |a: &ExactExpression, b: &ExactExpression| ExactExpression::Product(vec![a.clone(), b.clone()]);
     turned.gravity = [
-        Exact::Sum(vec![
+        ExactExpression::Sum(vec![
             times(&cos, &x),
-            Exact::Negative(Box::new(times(&sin, &y))),
+            ExactExpression::Negative(Box::new(times(&sin, &y))),
         ]),
-        Exact::Sum(vec![times(&sin, &x), times(&cos, &y)]),
+        ExactExpression::Sum(vec![times(&sin, &x), times(&cos, &y)]),
         z,
     ];
     // The new frame comes right after the base; everything else moves up by one.

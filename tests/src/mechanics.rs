@@ -7,8 +7,8 @@
 use std::ops::{Add, Mul, Neg, Sub};
 
 use modelmill_spec::{
-    Axis, DriveKind, Exact, FreeBody, Function, Inertial, LumpedMass, Mechanics, Mechanism, Place,
-    PlaceQuantity, PointIdx, Step, Symbol, TwistAxes,
+    FrameAxis, DriveKind, ExactExpression, FreeBody, ExactFunction, PartInertia, LumpedMass, Mechanics, Mechanism, EffectPlace,
+    PlaceQuantity, PointIdx, FrameStep, ModelSymbol, TwistAxes,
 };
 use nalgebra::{DMatrix, Matrix3, Matrix4, Quaternion, UnitQuaternion, Vector3};
 
@@ -105,12 +105,12 @@ impl Pose {
         }))
     }
 
-    fn rotation(axis: Axis, angle: Jet) -> Self {
+    fn rotation(axis: FrameAxis, angle: Jet) -> Self {
         let mut pose = Self::identity();
         let (j, k) = match axis {
-            Axis::X => (1, 2),
-            Axis::Y => (2, 0),
-            Axis::Z => (0, 1),
+            FrameAxis::X => (1, 2),
+            FrameAxis::Y => (2, 0),
+            FrameAxis::Z => (0, 1),
         };
         let (c, s) = (angle.cos(), angle.sin());
         pose.0[j][j] = c;
@@ -120,7 +120,7 @@ impl Pose {
         pose
     }
 
-    fn translation(axis: Axis, length: Jet) -> Self {
+    fn translation(axis: FrameAxis, length: Jet) -> Self {
         let mut pose = Self::identity();
         pose.0[axis as usize][3] = length;
         pose
@@ -217,44 +217,44 @@ impl<'a> Numbers<'a> {
     }
 
     /// Value of an expression over constants and parameters.
-    pub fn value(&self, exact: &Exact) -> f64 {
+    pub fn value(&self, exact: &ExactExpression) -> f64 {
         self.value_at(exact, &|_| {
             unreachable!("no quantity of a place stands here")
         })
     }
 
-    fn value_at(&self, exact: &Exact, place: &dyn Fn(PlaceQuantity) -> f64) -> f64 {
-        let value = |e: &Exact| self.value_at(e, place);
+    fn value_at(&self, exact: &ExactExpression, place: &dyn Fn(PlaceQuantity) -> f64) -> f64 {
+        let value = |e: &ExactExpression| self.value_at(e, place);
         match exact {
-            Exact::Rational(r) => rational(r),
-            Exact::Pi => std::f64::consts::PI,
-            Exact::Symbol(Symbol::Constant(i)) => self.constants[i.0],
-            Exact::Symbol(Symbol::Parameter(i)) => self.parameters[i.0],
-            Exact::Symbol(Symbol::Coordinate(_)) => {
+            ExactExpression::Rational(r) => rational(r),
+            ExactExpression::Pi => std::f64::consts::PI,
+            ExactExpression::Symbol(ModelSymbol::Constant(i)) => self.constants[i.0],
+            ExactExpression::Symbol(ModelSymbol::Parameter(i)) => self.parameters[i.0],
+            ExactExpression::Symbol(ModelSymbol::Coordinate(_)) => {
                 unreachable!("coordinates stand in steps alone")
             }
-            Exact::Symbol(Symbol::Place(quantity)) => place(*quantity),
-            Exact::Sum(operands) => operands.iter().map(value).sum(),
-            Exact::Product(operands) => operands.iter().map(value).product(),
-            Exact::Quotient(a, b) => value(a) / value(b),
-            Exact::Negative(a) => -value(a),
-            Exact::Power(a, n) => value(a).powi(*n),
-            Exact::Apply(function, a) => {
+            ExactExpression::Symbol(ModelSymbol::Place(quantity)) => place(*quantity),
+            ExactExpression::Sum(operands) => operands.iter().map(value).sum(),
+            ExactExpression::Product(operands) => operands.iter().map(value).product(),
+            ExactExpression::Quotient(a, b) => value(a) / value(b),
+            ExactExpression::Negative(a) => -value(a),
+            ExactExpression::Power(a, n) => value(a).powi(*n),
+            ExactExpression::Apply(function, a) => {
                 let a = value(a);
                 match function {
-                    Function::Sin => a.sin(),
-                    Function::Cos => a.cos(),
-                    Function::Sqrt => a.sqrt(),
-                    Function::Abs => a.abs(),
-                    Function::Sign => f64::from(i8::from(a > 0.0) - i8::from(a < 0.0)),
-                    Function::Tanh => a.tanh(),
-                    Function::Exp => a.exp(),
+                    ExactFunction::Sin => a.sin(),
+                    ExactFunction::Cos => a.cos(),
+                    ExactFunction::Sqrt => a.sqrt(),
+                    ExactFunction::Abs => a.abs(),
+                    ExactFunction::Sign => f64::from(i8::from(a > 0.0) - i8::from(a < 0.0)),
+                    ExactFunction::Tanh => a.tanh(),
+                    ExactFunction::Exp => a.exp(),
                 }
             }
         }
     }
 
-    fn vector(&self, exact: &[Exact; 3]) -> [f64; 3] {
+    fn vector(&self, exact: &[ExactExpression; 3]) -> [f64; 3] {
         std::array::from_fn(|i| self.value(&exact[i]))
     }
 
@@ -265,22 +265,22 @@ impl<'a> Numbers<'a> {
             let mut pose = poses[frame.parent.0].clone();
             for step in &frame.steps {
                 pose = pose.then(&match step {
-                    Step::Free(body) => Pose::free(body, coordinates),
-                    Step::Rotate(axis, angle) => {
+                    FrameStep::Free(body) => Pose::free(body, coordinates),
+                    FrameStep::Rotate(axis, angle) => {
                         let mut total = Jet::constant(rational(&angle.pi) * std::f64::consts::PI);
                         for (symbol, n) in &angle.terms {
                             let factor = Jet::constant(f64::from(*n));
                             total = total
                                 + factor
                                     * match symbol {
-                                        Symbol::Constant(i) => Jet::constant(self.constants[i.0]),
-                                        Symbol::Coordinate(i) => coordinates[i.0],
+                                        ModelSymbol::Constant(i) => Jet::constant(self.constants[i.0]),
+                                        ModelSymbol::Coordinate(i) => coordinates[i.0],
                                         _ => unreachable!("an angle is made of angles"),
                                     };
                         }
                         Pose::rotation(*axis, total)
                     }
-                    Step::Translate(axis, length) => {
+                    FrameStep::Translate(axis, length) => {
                         let mut total = Jet::constant(self.value(&length.offset));
                         for (i, factor) in &length.coordinates {
                             total = total + Jet::constant(rational(factor)) * coordinates[i.0];
@@ -318,28 +318,28 @@ impl<'a> Numbers<'a> {
         frame: usize,
         coordinate: usize,
     ) -> Matrix4<f64> {
-        let moves = |step: &Step| match step {
-            Step::Rotate(_, angle) => angle
+        let moves = |step: &FrameStep| match step {
+            FrameStep::Rotate(_, angle) => angle
                 .terms
                 .iter()
-                .any(|(s, _)| matches!(s, Symbol::Coordinate(c) if c.0 == coordinate)),
-            Step::Translate(_, length) => length.coordinates.iter().any(|(c, _)| c.0 == coordinate),
-            Step::Free(body) => {
+                .any(|(s, _)| matches!(s, ModelSymbol::Coordinate(c) if c.0 == coordinate)),
+            FrameStep::Translate(_, length) => length.coordinates.iter().any(|(c, _)| c.0 == coordinate),
+            FrameStep::Free(body) => {
                 let mut all = body.position.iter().chain(&body.quaternion);
                 all.any(|c| c.0 == coordinate)
             }
         };
-        let axis = |step: &Step| match step {
-            Step::Rotate(axis, _) | Step::Translate(axis, _) => *axis,
+        let axis = |step: &FrameStep| match step {
+            FrameStep::Rotate(axis, _) | FrameStep::Translate(axis, _) => *axis,
             // Nothing follows along or about an axis of its own.
-            Step::Free(_) => Axis::X,
+            FrameStep::Free(_) => FrameAxis::X,
         };
         let mut behind = self.mechanism.clone();
         let steps = &mut behind.frames[frame].steps;
         let joint = steps.iter().rposition(moves).expect("a joint of it");
         let mut end = joint + 1;
-        if axis(&steps[joint]) == Axis::Z {
-            let more = steps[end..].iter().take_while(|s| axis(s) == Axis::Z);
+        if axis(&steps[joint]) == FrameAxis::Z {
+            let more = steps[end..].iter().take_while(|s| axis(s) == FrameAxis::Z);
             end += more.count();
         }
         steps.truncate(end);
@@ -353,7 +353,7 @@ impl<'a> Numbers<'a> {
 
     /// Frames and pseudo-inertias of all bodies but lumped masses.
     pub fn bodies(&self) -> Vec<(usize, Matrix4<f64>)> {
-        let mut parts: Vec<&modelmill_spec::Part> = self.mechanism.parts.iter().collect();
+        let mut parts: Vec<&modelmill_spec::ModelPart> = self.mechanism.parts.iter().collect();
         let mut points = Vec::new();
         for effect in &self.mechanism.effects {
             parts.extend(&effect.bodies.parts);
@@ -361,7 +361,7 @@ impl<'a> Numbers<'a> {
                 continue;
             }
             for place in &effect.places {
-                let Place::Point(p) = place else { continue };
+                let EffectPlace::Point(p) = place else { continue };
                 let point = &self.mechanism.points[p.0];
                 for term in &effect.terms {
                     let mass = self.parameters[term.parameter.0] * self.value(&term.expression);
@@ -397,13 +397,13 @@ impl<'a> Numbers<'a> {
         for effect in &self.mechanism.effects {
             let motions: Vec<Option<Jet>> = (effect.places.iter())
                 .map(|place| match place {
-                    Place::Drive(d) => Some(drives[d.0]),
-                    Place::Coordinate(i) => Some(coordinates[i.0]),
+                    EffectPlace::Drive(d) => Some(drives[d.0]),
+                    EffectPlace::Coordinate(i) => Some(coordinates[i.0]),
                     _ => None,
                 })
                 .collect();
             for (p, place) in effect.places.iter().enumerate() {
-                let Place::Coordinate(i) = place else {
+                let EffectPlace::Coordinate(i) = place else {
                     continue;
                 };
                 let other = motions[(p + 1) % motions.len()];
@@ -423,7 +423,7 @@ impl<'a> Numbers<'a> {
         let mut rods = Vec::new();
         for effect in &self.mechanism.effects {
             for place in &effect.places {
-                if let (Some(Mechanics::Rod), Place::Drive(d)) = (effect.mechanics, place) {
+                if let (Some(Mechanics::Rod), EffectPlace::Drive(d)) = (effect.mechanics, place) {
                     let moments = |k: usize| self.parameters[effect.terms[k].parameter.0];
                     rods.push((d.0, [0, 1, 2].map(moments)));
                 }
@@ -445,7 +445,7 @@ impl<'a> Numbers<'a> {
             let [a, b] = l.joins.map(|p| self.point(&poses, p));
             std::array::from_fn::<Jet, 3, _>(|i| a[i] - b[i])
         });
-        let value = |exact: &Exact| exact.evaluate(&|symbol| self.mechanism.symbol_nominal(symbol));
+        let value = |exact: &ExactExpression| exact.evaluate(&|symbol| self.mechanism.symbol_nominal(symbol));
         let of_couplings = self.mechanism.couplings.iter().map(|coupling| {
             let own = coordinates[coupling.coordinate.0] - Jet::constant(value(&coupling.offset));
             coupling.terms.iter().fold(own, |off, (i, factor)| {
@@ -520,7 +520,7 @@ impl<'a> Numbers<'a> {
                 let (pose, change) = (&poses[lump.frame.0], &displaced[lump.frame.0]);
                 self.add_lump(&mut balance, pose, change, lump, &gravity);
             }
-            if let (Some(Mechanics::Strut), [Place::Point(a), Place::Point(b)]) =
+            if let (Some(Mechanics::Strut), [EffectPlace::Point(a), EffectPlace::Point(b)]) =
                 (effect.mechanics, effect.places.as_slice())
             {
                 let ends = self.ends([*a, *b], [&poses, &displaced]);
@@ -529,15 +529,15 @@ impl<'a> Numbers<'a> {
             }
             let motions: Vec<Option<Jet>> = (effect.places.iter())
                 .map(|place| match place {
-                    Place::Drive(d) => Some(drives[d.0]),
-                    Place::Coordinate(i) => Some(coordinates[i.0]),
+                    EffectPlace::Drive(d) => Some(drives[d.0]),
+                    EffectPlace::Coordinate(i) => Some(coordinates[i.0]),
                     _ => None,
                 })
                 .collect();
             for (p, place) in effect.places.iter().enumerate() {
                 let other = motions[(p + 1) % motions.len()];
                 let other = other.unwrap_or(Jet::constant(f64::NAN));
-                if let (Some(Mechanics::Rod), Place::Drive(d)) = (effect.mechanics, place) {
+                if let (Some(Mechanics::Rod), EffectPlace::Drive(d)) = (effect.mechanics, place) {
                     let [second, first, mass] =
                         [0, 1, 2].map(|i| self.parameters[effect.terms[i].parameter.0]);
                     let DriveKind::Linear { from, to } = self.mechanism.drives[d.0].kind else {
@@ -552,7 +552,7 @@ impl<'a> Numbers<'a> {
                 for term in &effect.terms {
                     let parameter = self.parameters[term.parameter.0];
                     match place {
-                        Place::Point(p) => {
+                        EffectPlace::Point(p) => {
                             let point = &self.mechanism.points[p.0];
                             let factor = self.value(&term.expression);
                             let inertia =
@@ -560,17 +560,17 @@ impl<'a> Numbers<'a> {
                             let (pose, change) = (&poses[point.frame.0], &displaced[point.frame.0]);
                             add_body(&mut balance, pose, change, &inertia, &gravity);
                         }
-                        Place::Drive(d) => {
+                        EffectPlace::Drive(d) => {
                             let quantity = quantity(drives[d.0], load[d.0], other);
                             let force = parameter * self.value_at(&term.expression, &quantity);
                             balance.add(force * drive_rates[d.0].0[1]);
                         }
-                        Place::Coordinate(i) => {
+                        EffectPlace::Coordinate(i) => {
                             let quantity = quantity(coordinates[i.0], f64::NAN, other);
                             let force = parameter * self.value_at(&term.expression, &quantity);
                             balance.add(force * direction[i.0]);
                         }
-                        Place::Part(_) | Place::Base | Place::Force => {}
+                        EffectPlace::Part(_) | EffectPlace::Base | EffectPlace::Force => {}
                     }
                 }
             }
@@ -595,7 +595,7 @@ impl<'a> Numbers<'a> {
         }
         for effect in &self.mechanism.effects {
             for place in &effect.places {
-                if let Place::Point(p) = place {
+                if let EffectPlace::Point(p) = place {
                     let point = &self.mechanism.points[p.0];
                     for term in &effect.terms {
                         let mass = self.parameters[term.parameter.0] * self.value(&term.expression);
@@ -652,9 +652,9 @@ impl<'a> Numbers<'a> {
         balance.add(mass * turn.dot(&arm.cross(&acceleration(moment_at))));
     }
 
-    fn pseudo_inertia(&self, inertial: &Inertial) -> Matrix4<f64> {
+    fn pseudo_inertia(&self, inertial: &PartInertia) -> Matrix4<f64> {
         match inertial {
-            Inertial::Linear {
+            PartInertia::Linear {
                 mass,
                 first_moment,
                 inertia,
@@ -669,7 +669,7 @@ impl<'a> Numbers<'a> {
                 j[(3, 3)] = self.value(mass);
                 j
             }
-            Inertial::AboutCentre {
+            PartInertia::AboutCentre {
                 mass,
                 centre,
                 inertia,

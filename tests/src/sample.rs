@@ -1,6 +1,6 @@
 //! States of motion to evaluate a model at.
 
-use modelmill_codegen::{Evaluator, States};
+use modelmill_codegen::{ModelEvaluator, MotionStates};
 use modelmill_spec::Mechanism;
 
 use crate::fixtures::Table;
@@ -62,8 +62,8 @@ impl Sample {
     }
 
     /// As the evaluator takes them.
-    pub fn states(&self) -> States<'_> {
-        States {
+    pub fn states(&self) -> MotionStates<'_> {
+        MotionStates {
             q: self.q.iter().map(Vec::as_slice).collect(),
             qd: self.qd.iter().map(Vec::as_slice).collect(),
             qdd: self.qdd.iter().map(Vec::as_slice).collect(),
@@ -106,7 +106,7 @@ impl Sample {
 
     /// The states that the mechanism can take, away from singular ones.
     #[must_use]
-    pub fn reachable(&self, evaluator: &Evaluator<'_>) -> Self {
+    pub fn reachable(&self, evaluator: &ModelEvaluator<'_>) -> Self {
         self.filtered(|i| {
             let one = self.only(i);
             evaluator.full_regressor(&one.states()).is_ok()

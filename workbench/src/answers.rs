@@ -6,10 +6,10 @@ use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
-use crate::sitting::{Keeping, Seeing, Sitting};
+use crate::sitting::{KeepTrajectoryRequest, PictureRequest, WorkbenchSession};
 
 /// What a page gets.
-pub(crate) enum Answer {
+pub(crate) enum PageResponse {
     Json(Value),
     Svg(String),
     Html(String),
@@ -17,7 +17,7 @@ pub(crate) enum Answer {
 
 /// Why it gets none.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Fault {
+pub(crate) enum RequestFault {
     /// Nothing of that name can be asked.
     Unknown,
     /// The body is none of this question.
@@ -28,7 +28,7 @@ pub(crate) enum Fault {
     Refused,
 }
 
-impl Fault {
+impl RequestFault {
     /// As HTTP counts it.
     pub(crate) fn status(self) -> u16 {
         match self {
@@ -41,16 +41,16 @@ impl Fault {
 }
 
 /// No answer, with a sentence that says why.
-pub(crate) struct Refusal(pub(crate) Fault, pub(crate) String);
+pub(crate) struct RequestRefusal(pub(crate) RequestFault, pub(crate) String);
 
-impl From<String> for Refusal {
+impl From<String> for RequestRefusal {
     fn from(says: String) -> Self {
-        Self(Fault::Refused, says)
+        Self(RequestFault::Refused, says)
     }
 }
 
 #[derive(Deserialize)]
-struct Edit {
+struct EditRequest {
     /// The revision that the text was made of.
     base: u64,
     text: String,
@@ -60,12 +60,12 @@ struct Edit {
 }
 
 #[derive(Deserialize)]
-struct Choice {
+struct ConflictRequest {
     theirs: bool,
 }
 
 #[derive(Deserialize)]
-struct Comparing {
+struct CompareRequest {
     /// Whether to look where the error lives.
     places: bool,
     /// Whether to read the recordings again.
@@ -73,72 +73,72 @@ struct Comparing {
 }
 
 #[derive(Deserialize)]
-struct Curves {
+struct CurvesRequest {
     /// With identified values rather than those of the file.
     identified: bool,
 }
 
 #[derive(Deserialize)]
-struct Variant {
+struct VariantRequest {
     /// The model that is held beside the text, as `models` names it; the text as it was saved if there is none.
     beside: Option<String>,
 }
 
 #[derive(Deserialize)]
-struct Add {
+struct AddEffectRequest {
     entry: usize,
 }
 
 /// Answers a question about a sitting.
-pub(crate) fn answer(
-    sitting: &Arc<Sitting>,
+pub(crate) fn answer_request(
+    sitting: &Arc<WorkbenchSession>,
     question: &str,
     body: &[u8],
-) -> Result<Answer, Refusal> {
-    Ok(Answer::Json(match question {
+) -> Result<PageResponse, RequestRefusal> {
+    Ok(PageResponse::Json(match question {
         "view" => sitting.view(),
         "edit" => {
-            let Edit { base, text, did } = read(body)?;
+            let EditRequest { base, text, did } = parse_body(body)?;
             let told = sitting.edit(base, &text, did.as_deref());
             told.ok_or_else(|| {
                 let says = "the text was changed elsewhere meanwhile";
-                Refusal(Fault::Conflict, says.to_owned())
+                RequestRefusal(RequestFault::Conflict, says.to_owned())
             })?
         }
         "save" => sitting.save()?,
-        "choose" => sitting.choose(read::<Choice>(body)?.theirs),
-        "picture" => return Ok(Answer::Svg(sitting.picture(&read::<Seeing>(body)?)?)),
-        "equations" => return Ok(Answer::Html(sitting.equations()?)),
+        "choose" => sitting.resolve_conflict(parse_body::<ConflictRequest>(body)?.theirs),
+        "picture" => return Ok(PageResponse::Svg(sitting.picture(&parse_body::<PictureRequest>(body)?)?)),
+        "equations" => return Ok(PageResponse::Html(sitting.equations()?)),
         "compare" => {
-            let Comparing { places, afresh } = read(body)?;
+            let CompareRequest { places, afresh } = parse_body(body)?;
             sitting.compare(places, afresh)?
         }
         "curves" => {
-            let Curves { identified } = read(body)?;
-            return Ok(Answer::Html(sitting.curves(identified)?));
+            let CurvesRequest { identified } = parse_body(body)?;
+            return Ok(PageResponse::Html(sitting.curves(identified)?));
         }
         "motion" => sitting.motion()?,
         "models" => sitting.models(),
-        "variant" => sitting.variant(read::<Variant>(body)?.beside.as_deref())?,
+        "variant" => sitting.variant(parse_body::<VariantRequest>(body)?.beside.as_deref())?,
         "diagnosis" => sitting.diagnosis(),
         "diagnose" => sitting.diagnose()?,
         "cancel" => sitting.cancel(),
-        "add" => sitting.add(read::<Add>(body)?.entry)?,
-        "words" => sitting.words()?,
+        "add" => sitting.add(parse_body::<AddEffectRequest>(body)?.entry)?,
+        "words" => sitting.completions()?,
         "limits" => sitting.limits()?,
-        "excite" => sitting.excite(read(body)?)?,
+        "excite" => sitting.excite(parse_body(body)?)?,
         "excitation" => sitting.excitation(),
         "stop_excitation" => sitting.stop_excitation(),
         "trajectory" => sitting.trajectory()?,
-        "keep_trajectory" => sitting.keep_trajectory(&read::<Keeping>(body)?)?,
+        "keep_trajectory" => sitting.keep_trajectory(&parse_body::<KeepTrajectoryRequest>(body)?)?,
         other => {
             let says = format!("nothing called `{other}` can be asked");
-            return Err(Refusal(Fault::Unknown, says));
+            return Err(RequestRefusal(RequestFault::Unknown, says));
         }
     }))
 }
 
 /// A body of JSON.
-pub(crate) fn read<T: DeserializeOwned>(body: &[u8]) -> Result<T, Refusal> {
-    serde_json::from_slice(body).map_err(|error| Refusal(Fault::Malformed, error.to_string()))
+pub(crate) fn parse_body<T: DeserializeOwned>(body: &[u8]) -> Result<T, RequestRefusal> {
+    serde_json::from_slice(body).map_err(|error| RequestRefusal(RequestFault::Malformed, error.to_string()))
 }

@@ -4,24 +4,24 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use modelmill::Host;
-use modelmill::print::{Spelling, Words};
+use modelmill::print::{AdviceFormatter, PlainAdvice};
 use serde::Deserialize;
 use serde_json::json;
 
-use crate::answers::{Answer, Refusal, answer, read};
-use crate::options::{Commands, Excitation, Options, Step};
-use crate::shelf::Shelf;
-use crate::sitting::Sitting;
+use crate::answers::{PageResponse, RequestRefusal, answer_request, parse_body};
+use crate::options::{WorkbenchCommands, ExcitationSettings, Options, WorkbenchStep};
+use crate::shelf::MemoryStore;
+use crate::sitting::WorkbenchSession;
 
 /// A sitting in memory, and the files for the next one.
-pub struct Desk {
-    shelf: Shelf,
-    sitting: Option<Arc<Sitting>>,
+pub struct RequestHandler {
+    shelf: MemoryStore,
+    sitting: Option<Arc<WorkbenchSession>>,
 }
 
 /// What a page opens.
 #[derive(Deserialize)]
-struct Opening {
+struct OpenRequest {
     model: PathBuf,
     #[serde(default)]
     data: Vec<PathBuf>,
@@ -32,41 +32,41 @@ struct Opening {
     first: u64,
 }
 
-impl Desk {
+impl RequestHandler {
     /// An empty desk. `seconds` is its clock, and `goes_on` gets JSON that says how far long work is (`what`, `done`, `total`).
     pub fn new(seconds: fn() -> f64, goes_on: fn(&serde_json::Value)) -> Self {
         Self {
-            shelf: Shelf::new(seconds, goes_on),
+            shelf: MemoryStore::new(seconds, goes_on),
             sitting: None,
         }
     }
 
     /// Puts a file there, in the place of one of that name.
-    pub fn put(&mut self, name: &str, bytes: &[u8]) {
-        self.shelf.put(Path::new(name), bytes);
+    pub fn add_file(&mut self, name: &str, bytes: &[u8]) {
+        self.shelf.insert_file(Path::new(name), bytes);
     }
 
     /// Answers a question: JSON with the `status` that a server would give, and what is `told`. `open` (`model`, `data`,
     /// `check`: names of files) begins a sitting, all other questions are the server's.
-    pub fn ask(&mut self, question: &str, body: &[u8]) -> String {
+    pub fn answer_request(&mut self, question: &str, body: &[u8]) -> String {
         let found = if question == "open" {
-            self.open(body)
+            self.open_session(body)
         } else {
             match &self.sitting {
-                Some(sitting) => answer(sitting, question, body),
+                Some(sitting) => answer_request(sitting, question, body),
                 None => Err("no model is open".to_owned().into()),
             }
         };
         let (status, told) = match found {
-            Ok(Answer::Json(told)) => (200, told),
-            Ok(Answer::Svg(told) | Answer::Html(told)) => (200, json!(told)),
-            Err(Refusal(fault, says)) => (fault.status(), json!({ "says": says })),
+            Ok(PageResponse::Json(told)) => (200, told),
+            Ok(PageResponse::Svg(told) | PageResponse::Html(told)) => (200, json!(told)),
+            Err(RequestRefusal(fault, says)) => (fault.status(), json!({ "says": says })),
         };
         json!({ "status": status, "told": told }).to_string()
     }
 
-    fn open(&mut self, body: &[u8]) -> Result<Answer, Refusal> {
-        let asked: Opening = read(body)?;
+    fn open_session(&mut self, body: &[u8]) -> Result<PageResponse, RequestRefusal> {
+        let asked: OpenRequest = parse_body(body)?;
         let alone = |files: Vec<PathBuf>| files.into_iter().map(|file| vec![file]).collect();
         let options = Options {
             model: asked.model,
@@ -76,49 +76,49 @@ impl Desk {
             ..Options::default()
         };
         let shelf = Arc::new(self.shelf.clone());
-        let opened = Sitting::open(&Host::new(), options, Arc::new(Plain), shelf);
+        let opened = WorkbenchSession::open(&Host::new(), options, Arc::new(BrowserAdvice), shelf);
         let sitting = Arc::new(opened.map_err(|error| error.to_string())?);
         let told = sitting.view();
         self.sitting = Some(sitting);
-        Ok(Answer::Json(told))
+        Ok(PageResponse::Json(told))
     }
 }
 
 /// Plain words, where there is no command line.
-struct Plain;
+struct BrowserAdvice;
 
-impl Spelling for Plain {
-    fn add(&self, model: &modelmill::Model, effect: &modelmill::edit::NewEffect) -> String {
-        Words.add(model, effect)
+impl AdviceFormatter for BrowserAdvice {
+    fn add_effect(&self, model: &modelmill::Model, effect: &modelmill::edit::NewEffect) -> String {
+        PlainAdvice.add_effect(model, effect)
     }
 
     fn identify(&self, model: &modelmill::Model) -> String {
-        Words.identify(model)
+        PlainAdvice.identify(model)
     }
 
-    fn separate(
+    fn separate_effects(
         &self,
         model: &modelmill::Model,
-        separation: &modelmill::diagnose::Separation,
+        separation: &modelmill::diagnose::SeparationProposal,
     ) -> Option<String> {
-        Words.separate(model, separation)
+        PlainAdvice.separate_effects(model, separation)
     }
 
-    fn held(&self) -> String {
-        Words.held()
+    fn fix_parameters(&self) -> String {
+        PlainAdvice.fix_parameters()
     }
 }
 
-impl Commands for Plain {
-    fn same(&self, _: Step) -> Option<String> {
+impl WorkbenchCommands for BrowserAdvice {
+    fn step_command(&self, _: WorkbenchStep) -> Option<String> {
         None
     }
 
-    fn variant(&self, _: &Path) -> Option<String> {
+    fn variant_command(&self, _: &Path) -> Option<String> {
         None
     }
 
-    fn excite(&self, _: &Excitation) -> Option<String> {
+    fn excite_command(&self, _: &ExcitationSettings) -> Option<String> {
         None
     }
 }
@@ -137,41 +137,41 @@ mod tests {
 
     #[test]
     fn a_desk_answers_as_the_server_does() {
-        let mut desk = Desk::new(|| 0.0, |_| {});
-        assert_eq!(told(&desk.ask("view", b"")).0, 422);
+        let mut desk = RequestHandler::new(|| 0.0, |_| {});
+        assert_eq!(told(&desk.answer_request("view", b"")).0, 422);
         let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../model-spec/models/");
         for name in ["delta.toml", "delta_tied.toml"] {
-            desk.put(name, &std::fs::read(format!("{folder}{name}")).unwrap());
+            desk.add_file(name, &std::fs::read(format!("{folder}{name}")).unwrap());
         }
         let (status, view) =
-            told(&desk.ask("open", br#"{ "model": "delta_tied.toml", "first": 40 }"#));
+            told(&desk.answer_request("open", br#"{ "model": "delta_tied.toml", "first": 40 }"#));
         assert_eq!((status, &view["valid"]), (200, &json!(true)), "{view}");
         assert_eq!(
             (&view["revision"], &view["version"]),
             (&json!(41), &json!(41))
         );
         let edit = |base: u64, text: &str| json!({ "base": base, "text": text }).to_string();
-        let (status, fault) = told(&desk.ask("edit", edit(41, "schema = [").as_bytes()));
+        let (status, fault) = told(&desk.answer_request("edit", edit(41, "schema = [").as_bytes()));
         assert_eq!((status, &fault["valid"]), (200, &json!(false)));
         assert_eq!(fault["diagnostics"][0]["line"], 1, "{fault}");
         // Beside the file as saved, and beside a model that is there.
         let text = view["text"].as_str().unwrap();
-        let saved = desk.ask("edit", edit(42, text).as_bytes());
+        let saved = desk.answer_request("edit", edit(42, text).as_bytes());
         assert_eq!(told(&saved).1["valid"], true, "{saved}");
-        let (_, models) = told(&desk.ask("models", b"{}"));
+        let (_, models) = told(&desk.answer_request("models", b"{}"));
         assert_eq!(models, json!({ "models": ["delta.toml"], "named": null }));
         for beside in [json!(null), json!("delta.toml")] {
             let body = json!({ "beside": beside }).to_string();
-            let (status, variant) = told(&desk.ask("variant", body.as_bytes()));
+            let (status, variant) = told(&desk.answer_request("variant", body.as_bytes()));
             assert_eq!((status, &variant["same"]), (200, &json!(beside.is_null())));
             assert_eq!(variant["along"], json!(null), "there is no recording");
         }
         // Made of a text that is no longer there, or of nothing.
-        assert_eq!(told(&desk.ask("edit", edit(41, "").as_bytes())).0, 409);
-        assert_eq!(told(&desk.ask("edit", b"{}")).0, 400);
-        assert_eq!(told(&desk.ask("compile", b"{}")).0, 404);
+        assert_eq!(told(&desk.answer_request("edit", edit(41, "").as_bytes())).0, 409);
+        assert_eq!(told(&desk.answer_request("edit", b"{}")).0, 400);
+        assert_eq!(told(&desk.answer_request("compile", b"{}")).0, 404);
         assert_eq!(
-            told(&desk.ask("open", br#"{ "model": "none.toml" }"#)).0,
+            told(&desk.answer_request("open", br#"{ "model": "none.toml" }"#)).0,
             422
         );
     }

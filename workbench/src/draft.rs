@@ -5,7 +5,7 @@ use std::borrow::Cow;
 
 /// The text of a model file that is edited.
 #[derive(Debug)]
-pub(crate) struct Draft {
+pub(crate) struct EditedDocument {
     /// The text as it is edited.
     text: String,
     /// What the disk held when the text was last read from it or written to it.
@@ -18,16 +18,16 @@ pub(crate) struct Draft {
 
 /// What came of a look at the disk.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Seen {
+pub(crate) enum DiskChange {
     /// Nothing that was not known.
-    Nothing,
+    Unchanged,
     /// The text had no changes of its own and is now what the disk holds.
-    Followed,
+    Reloaded,
     /// Both have changes: somebody must choose.
     Conflict,
 }
 
-impl Draft {
+impl EditedDocument {
     /// What was just read from the disk; its changes count from `revision`.
     pub(crate) fn new(text: String, revision: u64) -> Self {
         Self {
@@ -89,47 +89,47 @@ impl Draft {
     }
 
     /// Looks at what the disk holds.
-    pub(crate) fn see(&mut self, disk: &str) -> Seen {
+    pub(crate) fn update_from_disk(&mut self, disk: &str) -> DiskChange {
         if disk == self.saved {
             self.outside = None;
-            return Seen::Nothing;
+            return DiskChange::Unchanged;
         }
         if disk == self.text {
-            self.written();
-            return Seen::Nothing;
+            self.mark_saved();
+            return DiskChange::Unchanged;
         }
         if self.is_changed() {
             if self.outside.as_deref() == Some(disk) {
-                return Seen::Nothing;
+                return DiskChange::Unchanged;
             }
             self.outside = Some(disk.to_owned());
-            return Seen::Conflict;
+            return DiskChange::Conflict;
         }
         disk.clone_into(&mut self.text);
-        self.written();
+        self.mark_saved();
         self.revision += 1;
-        Seen::Followed
+        DiskChange::Reloaded
     }
 
     /// The disk holds the text now.
-    pub(crate) fn written(&mut self) {
+    pub(crate) fn mark_saved(&mut self) {
         self.saved.clone_from(&self.text);
         self.outside = None;
     }
 
     /// Ends a conflict: the text stays, and may be saved over what the other program wrote; what it writes later is a conflict
     /// again.
-    pub(crate) fn keep(&mut self) {
+    pub(crate) fn keep_own_text(&mut self) {
         if let Some(outside) = self.outside.take() {
             self.saved = outside;
         }
     }
 
     /// Ends a conflict: what the other program wrote takes the place of the text.
-    pub(crate) fn take(&mut self) {
+    pub(crate) fn accept_outside_text(&mut self) {
         if let Some(outside) = self.outside.take() {
             self.text = outside;
-            self.written();
+            self.mark_saved();
             self.revision += 1;
         }
     }
@@ -141,9 +141,9 @@ mod tests {
 
     #[test]
     fn what_others_write_is_followed_where_nothing_is_lost() {
-        let mut draft = Draft::new("a".to_owned(), 1);
-        assert_eq!(draft.see("a"), Seen::Nothing);
-        assert_eq!(draft.see("b"), Seen::Followed);
+        let mut draft = EditedDocument::new("a".to_owned(), 1);
+        assert_eq!(draft.update_from_disk("a"), DiskChange::Unchanged);
+        assert_eq!(draft.update_from_disk("b"), DiskChange::Reloaded);
         assert_eq!(
             (draft.text(), draft.saved(), draft.revision()),
             ("b", "b", 2)
@@ -153,18 +153,18 @@ mod tests {
         assert!(!draft.edit(1, "late"));
         assert_eq!(draft.text(), "b");
         assert!(draft.edit(2, "mine"));
-        assert_eq!(draft.see("mine"), Seen::Nothing);
+        assert_eq!(draft.update_from_disk("mine"), DiskChange::Unchanged);
         assert!(!draft.is_changed());
     }
 
     #[test]
     fn lines_end_as_they_did() {
-        let mut draft = Draft::new("a\r\nb\r\n".to_owned(), 1);
+        let mut draft = EditedDocument::new("a\r\nb\r\n".to_owned(), 1);
         assert!(draft.edit(1, "a\nb\n"));
         assert!(!draft.is_changed());
         assert!(draft.edit(1, "a\nc\nb\n"));
         assert_eq!(draft.text(), "a\r\nc\r\nb\r\n");
-        let mut draft = Draft::new("a\nb\n".to_owned(), 1);
+        let mut draft = EditedDocument::new("a\nb\n".to_owned(), 1);
         assert!(draft.edit(1, "a\nc\n"));
         assert_eq!(draft.text(), "a\nc\n");
     }
@@ -172,25 +172,25 @@ mod tests {
     #[test]
     fn both_texts_stay_until_somebody_chooses() {
         let conflict = || {
-            let mut draft = Draft::new("a".to_owned(), 1);
+            let mut draft = EditedDocument::new("a".to_owned(), 1);
             assert!(draft.edit(1, "mine"));
-            assert_eq!(draft.see("theirs"), Seen::Conflict);
-            assert_eq!(draft.see("theirs"), Seen::Nothing);
+            assert_eq!(draft.update_from_disk("theirs"), DiskChange::Conflict);
+            assert_eq!(draft.update_from_disk("theirs"), DiskChange::Unchanged);
             assert!(draft.is_in_conflict() && draft.text() == "mine");
             draft
         };
         let mut draft = conflict();
-        draft.keep();
+        draft.keep_own_text();
         assert!(draft.is_changed() && !draft.is_in_conflict());
         // A further change by others is a further conflict.
-        assert_eq!(draft.see("theirs"), Seen::Nothing);
-        assert_eq!(draft.see("theirs again"), Seen::Conflict);
+        assert_eq!(draft.update_from_disk("theirs"), DiskChange::Unchanged);
+        assert_eq!(draft.update_from_disk("theirs again"), DiskChange::Conflict);
         let mut draft = conflict();
-        draft.take();
+        draft.accept_outside_text();
         assert_eq!((draft.text(), draft.saved()), ("theirs", "theirs"));
         // What goes back to what it was is no conflict any more.
         let mut draft = conflict();
-        assert_eq!(draft.see("a"), Seen::Nothing);
+        assert_eq!(draft.update_from_disk("a"), DiskChange::Unchanged);
         assert!(!draft.is_in_conflict() && draft.text() == "mine");
     }
 }

@@ -5,48 +5,48 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, RwLock};
 
-use modelmill::files::{Disk, FileError, FileFault, Files, Kind, Opened};
+use modelmill::files::{DiskFiles, FileError, FileFault, FileSource, PathKind, OpenFile};
 use modelmill::{Error, Host};
 
 use crate::options::Options;
 
 /// The disk, as far as a sitting may read it.
-pub(crate) struct Fence {
-    disk: Disk,
+pub(crate) struct FileAccessPolicy {
+    disk: DiskFiles,
     folder: PathBuf,
     named: RwLock<Vec<PathBuf>>,
 }
 
-impl Fence {
+impl FileAccessPolicy {
     /// The folder of the model, and nothing else yet.
-    fn around(model: &Path) -> Arc<Self> {
+    fn for_model_folder(model: &Path) -> Arc<Self> {
         let folder = match model.parent() {
             Some(parent) if parent != Path::new("") => parent,
             _ => Path::new("."),
         };
         Arc::new(Self {
-            disk: Disk::default(),
-            folder: real(folder),
+            disk: DiskFiles::default(),
+            folder: canonical_path(folder),
             named: RwLock::default(),
         })
     }
 
     /// Lets in what a sitting was opened with: what was named, and what the model file as the disk holds it is made of.
-    pub(crate) fn opened(host: &Host, options: &Options) -> Arc<Self> {
-        let fence = Self::around(&options.model);
+    pub(crate) fn for_session(host: &Host, options: &Options) -> Arc<Self> {
+        let fence = Self::for_model_folder(&options.model);
         let named = (options.data.iter().chain(&options.check).flatten())
             .chain(host.libraries())
             .chain([&options.model])
             .chain(&options.beside);
-        named.for_each(|path| fence.admit(path));
+        named.for_each(|path| fence.allow_file(path));
         for model in [Some(&options.model), options.beside.as_ref()]
             .into_iter()
             .flatten()
         {
             match host.load(model) {
-                Ok(loaded) => loaded.sources.paths().for_each(|path| fence.admit(path)),
+                Ok(loaded) => loaded.sources.paths().for_each(|path| fence.allow_file(path)),
                 Err(Error::Model(fault)) => {
-                    fault.sources.paths().for_each(|path| fence.admit(path));
+                    fault.sources.paths().for_each(|path| fence.allow_file(path));
                 }
                 Err(_) => {}
             }
@@ -55,16 +55,16 @@ impl Fence {
     }
 
     /// Lets a file in that was named on purpose.
-    fn admit(&self, path: &Path) {
+    fn allow_file(&self, path: &Path) {
         let mut named = match self.named.write() {
             Ok(named) => named,
             Err(poisoned) => poisoned.into_inner(),
         };
-        named.push(real(path));
+        named.push(canonical_path(path));
     }
 
-    fn check(&self, path: &Path) -> Result<(), FileError> {
-        let real = real(path);
+    fn check_access(&self, path: &Path) -> Result<(), FileError> {
+        let real = canonical_path(path);
         let named = match self.named.read() {
             Ok(named) => named,
             Err(poisoned) => poisoned.into_inner(),
@@ -82,30 +82,30 @@ impl Fence {
 }
 
 /// The path without links, where it leads to anything.
-fn real(path: &Path) -> PathBuf {
+fn canonical_path(path: &Path) -> PathBuf {
     path.canonicalize().unwrap_or_else(|_| path.to_owned())
 }
 
-impl Files for Fence {
+impl FileSource for FileAccessPolicy {
     fn read(&self, path: &Path, most: u64) -> Result<Vec<u8>, FileError> {
-        self.check(path)?;
+        self.check_access(path)?;
         self.disk.read(path, most)
     }
 
-    fn kind(&self, path: &Path) -> Kind {
-        match self.check(path) {
+    fn kind(&self, path: &Path) -> PathKind {
+        match self.check_access(path) {
             Ok(()) => self.disk.kind(path),
-            Err(_) => Kind::Missing,
+            Err(_) => PathKind::Missing,
         }
     }
 
     fn list(&self, folder: &Path) -> Result<Vec<PathBuf>, FileError> {
-        self.check(folder)?;
+        self.check_access(folder)?;
         self.disk.list(folder)
     }
 
-    fn open(&self, path: &Path, most: u64) -> Result<Opened, FileError> {
-        self.check(path)?;
+    fn open(&self, path: &Path, most: u64) -> Result<OpenFile, FileError> {
+        self.check_access(path)?;
         self.disk.open(path, most)
     }
 }
@@ -122,11 +122,11 @@ mod tests {
         for name in ["models/arm.toml", "models/base.toml", "secret", "run.csv"] {
             std::fs::write(folder.join(name), name).unwrap();
         }
-        let fence = Fence::around(&inside.join("arm.toml"));
+        let fence = FileAccessPolicy::for_model_folder(&inside.join("arm.toml"));
         let read = |name: &str| fence.read(&inside.join(name), 100).is_ok();
         assert!(read("arm.toml") && read("base.toml"));
         assert!(!read("../secret") && !read("../run.csv") && !read("/etc/passwd"));
-        fence.admit(&folder.join("run.csv"));
+        fence.allow_file(&folder.join("run.csv"));
         assert!(read("../run.csv") && !read("../secret"));
         #[cfg(unix)]
         {

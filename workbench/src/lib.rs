@@ -30,10 +30,10 @@ mod page;
 #[cfg(not(target_family = "wasm"))]
 mod server;
 
-pub use desk::Desk;
-pub use options::{Commands, Excitation, Options, Step};
+pub use desk::RequestHandler;
+pub use options::{WorkbenchCommands, ExcitationSettings, Options, WorkbenchStep};
 #[cfg(not(target_family = "wasm"))]
-pub use page::{Bundle, alone};
+pub use page::{PageBundle, standalone_page};
 
 /// Serves the workbench on the loopback address until the program is stopped; `opened` gets the link as soon as it answers.
 ///
@@ -44,11 +44,11 @@ pub use page::{Bundle, alone};
 pub fn serve(
     host: &modelmill::Host,
     options: Options,
-    commands: std::sync::Arc<dyn Commands>,
+    commands: std::sync::Arc<dyn WorkbenchCommands>,
     opened: impl FnOnce(&str),
 ) -> modelmill::Outcome {
     let port = options.port;
-    let machine = std::sync::Arc::new(machine::Machine::new(fence::Fence::opened(host, &options)));
-    let sitting = sitting::Sitting::open(host, options, commands, machine.clone())?;
+    let machine = std::sync::Arc::new(machine::LocalMachine::new(fence::FileAccessPolicy::for_session(host, &options)));
+    let sitting = sitting::WorkbenchSession::open(host, options, commands, machine.clone())?;
     server::serve(std::sync::Arc::new(sitting), machine, port, opened)
 }

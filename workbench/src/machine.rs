@@ -4,26 +4,26 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
-use modelmill::files::{self, Files};
+use modelmill::files::{self, FileSource};
 use serde_json::Value;
 use tokio::sync::watch;
 
-use crate::fence::Fence;
-use crate::surroundings::Surroundings;
+use crate::fence::FileAccessPolicy;
+use crate::surroundings::SessionEnvironment;
 
 /// Bytes of stack for long work, as the program itself has.
 pub(crate) const STACK: usize = 16 << 20;
 
 /// This machine, as far as a sitting may use it.
-pub(crate) struct Machine {
-    fence: Arc<Fence>,
+pub(crate) struct LocalMachine {
+    fence: Arc<FileAccessPolicy>,
     since: Instant,
     changes: watch::Sender<u64>,
 }
 
-impl Machine {
+impl LocalMachine {
     /// Files come through the fence.
-    pub(crate) fn new(fence: Arc<Fence>) -> Self {
+    pub(crate) fn new(fence: Arc<FileAccessPolicy>) -> Self {
         Self {
             fence,
             since: Instant::now(),
@@ -37,8 +37,8 @@ impl Machine {
     }
 }
 
-impl Surroundings for Machine {
-    fn files(&self) -> Arc<dyn Files> {
+impl SessionEnvironment for LocalMachine {
+    fn files(&self) -> Arc<dyn FileSource> {
         Arc::clone(&self.fence) as _
     }
 
@@ -50,15 +50,15 @@ impl Surroundings for Machine {
         self.since.elapsed().as_secs_f64()
     }
 
-    fn changed(&self, version: u64) {
+    fn notify_change(&self, version: u64) {
         self.changes.send_replace(version);
     }
 
-    fn goes_on(&self, _: &Value) {
+    fn report_progress(&self, _: &Value) {
         // Pages ask how far it is.
     }
 
-    fn begin(&self, work: Box<dyn FnOnce() + Send>) -> Result<(), String> {
+    fn spawn_work(&self, work: Box<dyn FnOnce() + Send>) -> Result<(), String> {
         let thread = std::thread::Builder::new().name("diagnosis".to_owned());
         let begun = thread.stack_size(STACK).spawn(work);
         begun.map(|_| ()).map_err(|error| error.to_string())

@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use modelmill::excite::Request;
-use modelmill::print::Spelling;
-use modelmill::recording::Reading;
+use modelmill::excite::ExcitationRequest;
+use modelmill::print::AdviceFormatter;
+use modelmill::recording::RecordingOptions;
 use serde::Deserialize;
 
 /// What is put on the workbench.
@@ -19,7 +19,7 @@ pub struct Options {
     /// A model file beside the model, which may lie in another folder.
     pub beside: Option<PathBuf>,
     /// How recordings are read.
-    pub reading: Reading,
+    pub reading: RecordingOptions,
     /// What revisions and versions are counted from, so that a page which opens one sitting after the other never takes one's
     /// answers for the other's.
     pub first: u64,
@@ -28,21 +28,21 @@ pub struct Options {
 }
 
 /// What a reader is told that does the same without the workbench.
-pub trait Commands: Spelling + Send + Sync {
+pub trait WorkbenchCommands: AdviceFormatter + Send + Sync {
     /// Does what a pane of the workbench does; `None` where nothing else does.
-    fn same(&self, step: Step) -> Option<String>;
+    fn step_command(&self, step: WorkbenchStep) -> Option<String>;
 
     /// Holds the model of the workbench against another model file, as it was before.
-    fn variant(&self, before: &Path) -> Option<String>;
+    fn variant_command(&self, before: &Path) -> Option<String>;
 
     /// Plans the motion that was asked for; `None` where nothing else does.
-    fn excite(&self, asked: &Excitation) -> Option<String>;
+    fn excite_command(&self, asked: &ExcitationSettings) -> Option<String>;
 }
 
 /// What is asked of an excitation; what is not named is as `excite` has it.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct Excitation {
+pub struct ExcitationSettings {
     /// Harmonics of each coordinate's series.
     pub harmonics: usize,
     /// Period, s.
@@ -59,9 +59,9 @@ pub struct Excitation {
     pub limits: Vec<String>,
 }
 
-impl Default for Excitation {
+impl Default for ExcitationSettings {
     fn default() -> Self {
-        let usual = Request::default();
+        let usual = ExcitationRequest::default();
         Self {
             harmonics: usual.options.harmonics,
             period: usual.options.period,
@@ -76,7 +76,7 @@ impl Default for Excitation {
 
 /// What a pane of the workbench does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Step {
+pub enum WorkbenchStep {
     /// Draws the mechanism.
     Picture,
     /// Derives the model and writes out its equations.

@@ -12,7 +12,7 @@ use serde::Serialize;
 
 /// Models and recordings that a page brings along.
 #[derive(Clone, Debug, Default, Serialize)]
-pub struct Bundle {
+pub struct PageBundle {
     /// Model files: names and texts. They may name each other.
     pub models: Vec<(String, String)>,
     /// Recordings that belong to a model: its name, the recording's, its text, and whether it is kept from the fit.
@@ -20,14 +20,14 @@ pub struct Bundle {
 }
 
 /// The page that a server sends; `nonce` is what lets its scripts run, and no other.
-pub(crate) fn page(nonce: &str) -> String {
+pub(crate) fn served_page(nonce: &str) -> String {
     let who = include_str!("served.js");
-    written("", &format!(" nonce=\"{nonce}\""), "", who)
+    render_page("", &format!(" nonce=\"{nonce}\""), "", who)
 }
 
 /// The page that has the mill in itself and needs neither server nor network. `module` is the mill as WebAssembly, with the
 /// functions and the imports of `in-browser`; nothing that the page is given leaves it, which its policy says.
-pub fn alone(module: &[u8], bundle: &Bundle) -> String {
+pub fn standalone_page(module: &[u8], bundle: &PageBundle) -> String {
     let policy = "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; \
                   script-src 'unsafe-inline' 'wasm-unsafe-eval' blob:; worker-src blob:; style-src 'unsafe-inline'; \
                   img-src data:; base-uri 'none'; form-action 'none'\">\n";
@@ -37,7 +37,7 @@ pub fn alone(module: &[u8], bundle: &Bundle) -> String {
         let _ = writeln!(
             carried,
             "<script type=\"application/gzip\" id=\"{id}\">{}</script>",
-            packed(bytes)
+            compress_to_base64(bytes)
         );
     }
     let worker = include_str!("worker.js");
@@ -45,11 +45,11 @@ pub fn alone(module: &[u8], bundle: &Bundle) -> String {
         carried,
         "<script type=\"text/plain\" id=\"worker\">\n{worker}</script>\n"
     );
-    written(policy, "", &carried, include_str!("alone.js"))
+    render_page(policy, "", &carried, include_str!("alone.js"))
 }
 
 /// Gzip in Base64.
-fn packed(bytes: &[u8]) -> String {
+fn compress_to_base64(bytes: &[u8]) -> String {
     let mut packer = GzEncoder::new(Vec::new(), Compression::best());
     // Memory takes whatever is written to it.
     let _ = packer.write_all(bytes);
@@ -65,7 +65,7 @@ const SCRIPTS: [&str; 4] = [
 ];
 
 /// `who` is the script that knows who answers.
-fn written(head: &str, attributes: &str, carried: &str, who: &'static str) -> String {
+fn render_page(head: &str, attributes: &str, carried: &str, who: &'static str) -> String {
     let mut page = format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n{head}\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\

@@ -4,45 +4,45 @@
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use modelmill::recording::Recording;
+use modelmill::recording::PreparedRecording;
 use modelmill::{Model, Outcome};
 
 /// Recordings of fit and check.
-pub(crate) type Read = [Vec<Recording>; 2];
+pub(crate) type SessionRecordings = [Vec<PreparedRecording>; 2];
 
 /// The recordings as they were last read.
 #[derive(Default)]
-pub(crate) struct Readings {
-    kept: Mutex<Option<(String, Arc<Read>)>>,
+pub(crate) struct RecordingCache {
+    kept: Mutex<Option<(String, Arc<SessionRecordings>)>>,
 }
 
-impl Readings {
+impl RecordingCache {
     /// Recordings as `model` reads them, and whether they were read for this model itself; `read` does it.
-    pub(crate) fn of(
+    pub(crate) fn recordings_for(
         &self,
         model: &Model,
         is_afresh: bool,
-        read: impl FnOnce() -> Outcome<Read>,
-    ) -> Outcome<(Arc<Read>, bool)> {
-        let mechanism = but_for_values(model);
-        let known = self.kept().clone();
+        read: impl FnOnce() -> Outcome<SessionRecordings>,
+    ) -> Outcome<(Arc<SessionRecordings>, bool)> {
+        let mechanism = mechanism_key(model);
+        let known = self.lock_cache().clone();
         match known {
             Some((same, kept)) if same == mechanism && !is_afresh => Ok((kept, false)),
             _ => {
                 let read = Arc::new(read()?);
-                *self.kept() = Some((mechanism, Arc::clone(&read)));
+                *self.lock_cache() = Some((mechanism, Arc::clone(&read)));
                 Ok((read, true))
             }
         }
     }
 
-    fn kept(&self) -> MutexGuard<'_, Option<(String, Arc<Read>)>> {
+    fn lock_cache(&self) -> MutexGuard<'_, Option<(String, Arc<SessionRecordings>)>> {
         self.kept.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 /// A mechanism in words, complete but for the values of its parameters.
-fn but_for_values(model: &Model) -> String {
+fn mechanism_key(model: &Model) -> String {
     let mut mechanism = model.derivation.mechanism.clone();
     for parameter in &mut mechanism.parameters {
         parameter.nominal = 0.0;
@@ -59,12 +59,12 @@ mod tests {
     fn only_values_of_parameters_leave_a_reading_as_it_is() {
         let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../model-spec/models/");
         let text = std::fs::read_to_string(format!("{folder}spidermill.toml")).unwrap();
-        let readings = Readings::default();
+        let readings = RecordingCache::default();
         let is_new = |from: &str, to: &str| {
             assert!(text.contains(from), "{from}");
             let model = Model::from_text("a.toml", &text.replace(from, to)).unwrap();
             let read = || Ok([Vec::new(), Vec::new()]);
-            readings.of(&model, false, read).unwrap().1
+            readings.recordings_for(&model, false, read).unwrap().1
         };
         assert!(is_new("schema", "schema"));
         assert!(!is_new("12.4560", "22.4560") && !is_new("0.565", "0.6"));
@@ -73,8 +73,8 @@ mod tests {
         assert!(is_new("spindle_left", "left"));
         let model = Model::from_text("a.toml", &text).unwrap();
         let read = || Ok([Vec::new(), Vec::new()]);
-        assert!(readings.of(&model, false, read).unwrap().1);
-        assert!(!readings.of(&model, false, read).unwrap().1);
-        assert!(readings.of(&model, true, read).unwrap().1);
+        assert!(readings.recordings_for(&model, false, read).unwrap().1);
+        assert!(!readings.recordings_for(&model, false, read).unwrap().1);
+        assert!(readings.recordings_for(&model, true, read).unwrap().1);
     }
 }

@@ -24,22 +24,22 @@ use serde::Deserialize;
 use serde_json::json;
 use tokio::net::TcpListener;
 
-use crate::answers::{Answer, Refusal, answer};
-use crate::machine::{Machine, STACK};
+use crate::answers::{PageResponse, RequestRefusal, answer_request};
+use crate::machine::{LocalMachine, STACK};
 use crate::page;
-use crate::sitting::{LONGEST, Sitting};
+use crate::sitting::{LONGEST, WorkbenchSession};
 
 /// How the page shows that it is the one that was opened with the link.
 const TOKEN: HeaderName = HeaderName::from_static("x-modelmill-token");
 /// How often the disk is looked at. Files are read rather than watched for notices of the system: a model is short, and notices
 /// do not come from every disk, nor for every way in which editors put a new file in the place of an old one.
-const LOOK: Duration = Duration::from_millis(250);
+const POLL_INTERVAL: Duration = Duration::from_millis(250);
 /// How long a page waits for news before it asks again.
-const NEWS: Duration = Duration::from_secs(20);
+const NEWS_TIMEOUT: Duration = Duration::from_secs(20);
 
-struct App {
-    sitting: Arc<Sitting>,
-    machine: Arc<Machine>,
+struct ServerState {
+    sitting: Arc<WorkbenchSession>,
+    machine: Arc<LocalMachine>,
     token: String,
     port: u16,
 }
@@ -48,8 +48,8 @@ struct App {
 ///
 /// Fails when the port cannot be had.
 pub(crate) fn serve(
-    sitting: Arc<Sitting>,
-    machine: Arc<Machine>,
+    sitting: Arc<WorkbenchSession>,
+    machine: Arc<LocalMachine>,
     port: u16,
     opened: impl FnOnce(&str),
 ) -> Outcome {
@@ -68,10 +68,10 @@ pub(crate) fn serve(
         };
         let listener = TcpListener::bind(address).await.map_err(taken)?;
         let port = listener.local_addr().map_err(taken)?.port();
-        let token = random().map_err(Error::input)?;
+        let token = random_token().map_err(Error::input)?;
         let link = format!("http://127.0.0.1:{port}/?token={token}");
-        tokio::spawn(look(Arc::clone(&sitting)));
-        let app = Arc::new(App {
+        tokio::spawn(poll_files(Arc::clone(&sitting)));
+        let app = Arc::new(ServerState {
             sitting,
             machine,
             token,
@@ -85,34 +85,34 @@ pub(crate) fn serve(
 }
 
 /// 128 random bits in hexadecimal digits.
-fn random() -> Result<String, String> {
+fn random_token() -> Result<String, String> {
     let mut bytes = [0_u8; 16];
     getrandom::fill(&mut bytes).map_err(|error| format!("no token can be drawn: {error}"))?;
     Ok(format!("{:032x}", u128::from_le_bytes(bytes)))
 }
 
-async fn look(sitting: Arc<Sitting>) {
+async fn poll_files(sitting: Arc<WorkbenchSession>) {
     loop {
-        tokio::time::sleep(LOOK).await;
+        tokio::time::sleep(POLL_INTERVAL).await;
         let sitting = Arc::clone(&sitting);
         // What fails once is tried again.
-        let _ = tokio::task::spawn_blocking(move || sitting.look()).await;
+        let _ = tokio::task::spawn_blocking(move || sitting.check_disk()).await;
     }
 }
 
-fn router(app: Arc<App>) -> Router {
+fn router(app: Arc<ServerState>) -> Router {
     let most = usize::try_from(8 * LONGEST).unwrap_or(usize::MAX);
     Router::new()
-        .route("/", get(start))
+        .route("/", get(serve_page))
         .route("/api/view", get(view))
-        .route("/api/{question}", post(asked))
+        .route("/api/{question}", post(handle_request))
         .layer(DefaultBodyLimit::max(most))
         .layer(middleware::from_fn_with_state(Arc::clone(&app), guard))
         .with_state(app)
 }
 
 /// Refuses what does not come from the page that was opened with the link.
-async fn guard(State(app): State<Arc<App>>, request: Request, next: Next) -> Response {
+async fn guard(State(app): State<Arc<ServerState>>, request: Request, next: Next) -> Response {
     let headers = request.headers();
     let refused = |says: &'static str| (StatusCode::FORBIDDEN, says).into_response();
     let names = [
@@ -142,7 +142,7 @@ async fn guard(State(app): State<Arc<App>>, request: Request, next: Next) -> Res
     } else {
         text(TOKEN)
     };
-    if !given.is_some_and(|given| is_same(given, &app.token)) {
+    if !given.is_some_and(|given| is_same_token(given, &app.token)) {
         return refused(
             "Open the link that `modelmill work` printed; its token is missing here.\n",
         );
@@ -162,52 +162,52 @@ async fn guard(State(app): State<Arc<App>>, request: Request, next: Next) -> Res
 }
 
 /// Compares without telling by its time how much was right.
-fn is_same(given: &str, token: &str) -> bool {
+fn is_same_token(given: &str, token: &str) -> bool {
     let pairs = given.bytes().zip(token.bytes());
     given.len() == token.len() && pairs.fold(0, |differs, (a, b)| differs | (a ^ b)) == 0
 }
 
 /// What a handler answers, or why it does not.
-type Reply = Result<Response, Refused>;
+type HandlerResult = Result<Response, HttpRefusal>;
 
 /// Why there is no answer.
-struct Refused(StatusCode, String);
+struct HttpRefusal(StatusCode, String);
 
-impl IntoResponse for Refused {
+impl IntoResponse for HttpRefusal {
     fn into_response(self) -> Response {
         (self.0, Json(json!({ "says": self.1 }))).into_response()
     }
 }
 
-impl From<Refusal> for Refused {
-    fn from(Refusal(fault, says): Refusal) -> Self {
+impl From<RequestRefusal> for HttpRefusal {
+    fn from(RequestRefusal(fault, says): RequestRefusal) -> Self {
         let status = StatusCode::from_u16(fault.status());
         Self(status.unwrap_or(StatusCode::UNPROCESSABLE_ENTITY), says)
     }
 }
 
 /// Does work that takes its time where it keeps nobody else waiting.
-async fn worked<T: Send + 'static>(
-    app: &App,
-    work: impl FnOnce(&Arc<Sitting>) -> T + Send + 'static,
-) -> Result<T, Refused> {
+async fn run_blocking<T: Send + 'static>(
+    app: &ServerState,
+    work: impl FnOnce(&Arc<WorkbenchSession>) -> T + Send + 'static,
+) -> Result<T, HttpRefusal> {
     let sitting = Arc::clone(&app.sitting);
     let done = tokio::task::spawn_blocking(move || work(&sitting)).await;
     done.map_err(|_| {
-        Refused(
+        HttpRefusal(
             StatusCode::INTERNAL_SERVER_ERROR,
             "a fault of the program, which is none of yours; the text is kept".to_owned(),
         )
     })
 }
 
-async fn start() -> Reply {
-    let nonce = random().map_err(Refusal::from)?;
+async fn serve_page() -> HandlerResult {
+    let nonce = random_token().map_err(RequestRefusal::from)?;
     let policy = format!(
         "default-src 'none'; script-src 'nonce-{nonce}'; style-src 'unsafe-inline'; img-src data:; connect-src 'self'; \
          base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
     );
-    let mut response = Html(page::page(&nonce)).into_response();
+    let mut response = Html(page::served_page(&nonce)).into_response();
     if let Ok(policy) = HeaderValue::from_str(&policy) {
         let headers = response.headers_mut();
         headers.insert(CONTENT_SECURITY_POLICY, policy);
@@ -216,29 +216,29 @@ async fn start() -> Reply {
 }
 
 #[derive(Deserialize)]
-struct Since {
+struct SinceQuery {
     /// The version that the page has.
     #[serde(default)]
     since: u64,
 }
 
 /// What stands, as soon as it is news.
-async fn view(State(app): State<Arc<App>>, Query(Since { since }): Query<Since>) -> Reply {
+async fn view(State(app): State<Arc<ServerState>>, Query(SinceQuery { since }): Query<SinceQuery>) -> HandlerResult {
     let mut changes = app.machine.changes();
     let news = changes.wait_for(|version| *version != since);
     // Without news it is told once more.
-    let _ = tokio::time::timeout(NEWS, news).await;
-    let told = worked(&app, |sitting| sitting.view()).await?;
+    let _ = tokio::time::timeout(NEWS_TIMEOUT, news).await;
+    let told = run_blocking(&app, |sitting| sitting.view()).await?;
     Ok(Json(told).into_response())
 }
 
 /// Anything else.
-async fn asked(State(app): State<Arc<App>>, Path(question): Path<String>, body: Bytes) -> Reply {
-    let found = worked(&app, move |sitting| answer(sitting, &question, &body)).await?;
+async fn handle_request(State(app): State<Arc<ServerState>>, Path(question): Path<String>, body: Bytes) -> HandlerResult {
+    let found = run_blocking(&app, move |sitting| answer_request(sitting, &question, &body)).await?;
     Ok(match found? {
-        Answer::Json(told) => Json(told).into_response(),
-        Answer::Svg(svg) => ([(CONTENT_TYPE, "image/svg+xml")], svg).into_response(),
-        Answer::Html(html) => Html(html).into_response(),
+        PageResponse::Json(told) => Json(told).into_response(),
+        PageResponse::Svg(svg) => ([(CONTENT_TYPE, "image/svg+xml")], svg).into_response(),
+        PageResponse::Html(html) => Html(html).into_response(),
     })
 }
 
@@ -248,8 +248,8 @@ mod tests {
 
     #[test]
     fn tokens_are_long_and_differ() {
-        let [a, b] = [(); 2].map(|()| random().unwrap());
+        let [a, b] = [(); 2].map(|()| random_token().unwrap());
         assert!(a.len() == 32 && a != b);
-        assert!(is_same(&a, &a) && !is_same(&a, &b) && !is_same("", &a) && !is_same(&a[1..], &a));
+        assert!(is_same_token(&a, &a) && !is_same_token(&a, &b) && !is_same_token("", &a) && !is_same_token(&a[1..], &a));
     }
 }

@@ -3,20 +3,20 @@
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use modelmill::files::{FileError, Files, Kind, Memory, Opened};
+use modelmill::files::{FileError, FileSource, PathKind, MemoryFiles, OpenFile};
 use serde_json::Value;
 
-use crate::surroundings::Surroundings;
+use crate::surroundings::SessionEnvironment;
 
 /// Files in memory, a clock, and who hears how far long work is. Clones share the files.
 #[derive(Clone)]
-pub(crate) struct Shelf {
-    files: Arc<Mutex<Memory>>,
+pub(crate) struct MemoryStore {
+    files: Arc<Mutex<MemoryFiles>>,
     seconds: fn() -> f64,
     goes_on: fn(&Value),
 }
 
-impl Shelf {
+impl MemoryStore {
     /// No files yet; `seconds` is the clock.
     pub(crate) fn new(seconds: fn() -> f64, goes_on: fn(&Value)) -> Self {
         Self {
@@ -27,40 +27,40 @@ impl Shelf {
     }
 
     /// Adds a file, which takes the place of one of its name.
-    pub(crate) fn put(&self, path: &Path, bytes: &[u8]) {
-        self.with(|files| files.insert(path, bytes));
+    pub(crate) fn insert_file(&self, path: &Path, bytes: &[u8]) {
+        self.with_files(|files| files.insert(path, bytes));
     }
 
-    fn with<T>(&self, look: impl FnOnce(&mut Memory) -> T) -> T {
+    fn with_files<T>(&self, look: impl FnOnce(&mut MemoryFiles) -> T) -> T {
         look(&mut self.files.lock().unwrap_or_else(PoisonError::into_inner))
     }
 }
 
-impl Files for Shelf {
+impl FileSource for MemoryStore {
     fn read(&self, path: &Path, most: u64) -> Result<Vec<u8>, FileError> {
-        self.with(|files| files.read(path, most))
+        self.with_files(|files| files.read(path, most))
     }
 
-    fn kind(&self, path: &Path) -> Kind {
-        self.with(|files| files.kind(path))
+    fn kind(&self, path: &Path) -> PathKind {
+        self.with_files(|files| files.kind(path))
     }
 
     fn list(&self, folder: &Path) -> Result<Vec<PathBuf>, FileError> {
-        self.with(|files| files.list(folder))
+        self.with_files(|files| files.list(folder))
     }
 
-    fn open(&self, path: &Path, most: u64) -> Result<Opened, FileError> {
-        self.with(|files| files.open(path, most))
+    fn open(&self, path: &Path, most: u64) -> Result<OpenFile, FileError> {
+        self.with_files(|files| files.open(path, most))
     }
 }
 
-impl Surroundings for Shelf {
-    fn files(&self) -> Arc<dyn Files> {
+impl SessionEnvironment for MemoryStore {
+    fn files(&self) -> Arc<dyn FileSource> {
         Arc::new(self.clone())
     }
 
     fn write(&self, path: &Path, bytes: &[u8]) -> Result<(), String> {
-        self.put(path, bytes);
+        self.insert_file(path, bytes);
         Ok(())
     }
 
@@ -68,15 +68,15 @@ impl Surroundings for Shelf {
         (self.seconds)()
     }
 
-    fn changed(&self, _: u64) {
+    fn notify_change(&self, _: u64) {
         // Nobody but who asks changes anything.
     }
 
-    fn goes_on(&self, told: &Value) {
+    fn report_progress(&self, told: &Value) {
         (self.goes_on)(told);
     }
 
-    fn begin(&self, work: Box<dyn FnOnce() + Send>) -> Result<(), String> {
+    fn spawn_work(&self, work: Box<dyn FnOnce() + Send>) -> Result<(), String> {
         // There are no threads: whoever asks waits.
         work();
         Ok(())

@@ -5,14 +5,14 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use modelmill::diagnose::{Held, Question, Version};
+use modelmill::diagnose::{FixedParameters, DiagnosisOptions, ModelVersion};
 use modelmill::edit::NewEffect;
 use modelmill::files::FileError;
-use modelmill::identify::Estimation;
-use modelmill::model::Format;
-use modelmill::picture::{Drawing, Load, Style};
-use modelmill::recording::Recording;
-use modelmill::stretch::Stretch;
+use modelmill::identify::EstimatorOptions;
+use modelmill::model::PageFormat;
+use modelmill::picture::{PictureOptions, DriveArrow, DrawingStyle};
+use modelmill::recording::PreparedRecording;
+use modelmill::stretch::RecordingSegment;
 use modelmill::{Error, Host, Model, Outcome, report};
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -20,17 +20,17 @@ use serde_json::{Value, json};
 mod excitation;
 mod ladder;
 
-pub(crate) use excitation::Keeping;
-use excitation::Planning;
-use ladder::Ladder;
+pub(crate) use excitation::KeepTrajectoryRequest;
+use excitation::ExcitationJob;
+use ladder::ErrorLadder;
 
-use crate::draft::Draft;
-use crate::options::{Commands, Excitation, Options, Step};
-use crate::readings::{Read, Readings};
-use crate::surroundings::Surroundings;
+use crate::draft::EditedDocument;
+use crate::options::{WorkbenchCommands, ExcitationSettings, Options, WorkbenchStep};
+use crate::readings::{SessionRecordings, RecordingCache};
+use crate::surroundings::SessionEnvironment;
 use crate::told;
-use crate::variant::{self, Variant};
-use crate::watch::Watch;
+use crate::variant::{self, VariantCache};
+use crate::watch::JobWatch;
 
 /// Longest model file that is edited, bytes.
 pub(crate) const LONGEST: u64 = 4 << 20;
@@ -38,47 +38,47 @@ pub(crate) const LONGEST: u64 = 4 << 20;
 const POSES: usize = 600;
 
 /// A model file on the workbench.
-pub(crate) struct Sitting {
+pub(crate) struct WorkbenchSession {
     host: Host,
     options: Options,
-    commands: Arc<dyn Commands>,
-    state: Mutex<State>,
-    planning: Mutex<Planning>,
-    surroundings: Arc<dyn Surroundings>,
+    commands: Arc<dyn WorkbenchCommands>,
+    state: Mutex<SessionState>,
+    planning: Mutex<ExcitationJob>,
+    surroundings: Arc<dyn SessionEnvironment>,
     /// Counts everything that pages should hear of.
     version: AtomicU64,
-    readings: Readings,
-    variant: Variant,
+    readings: RecordingCache,
+    variant: VariantCache,
 }
 
-struct State {
-    draft: Draft,
-    now: Now,
+struct SessionState {
+    draft: EditedDocument,
+    derived: DerivedRevision,
     /// The model as it was last read or saved, if it has a meaning.
     saved: Option<Model>,
     /// Other files that the model is made of, as they were.
-    others: Vec<Option<Vec<u8>>>,
+    other_files: Vec<Option<Vec<u8>>>,
     /// Why the file cannot be read any more.
     unreadable: Option<String>,
-    ladder: Ladder,
-    diagnosis: Diagnosis,
+    ladder: ErrorLadder,
+    diagnosis: DiagnosisJob,
 }
 
 /// What was derived of a revision of the text.
 #[derive(Clone)]
-struct Now {
+struct DerivedRevision {
     revision: u64,
     found: Arc<Result<Model, Error>>,
     seconds: f64,
 }
 
 #[derive(Default)]
-struct Diagnosis {
+struct DiagnosisJob {
     /// Counts the diagnoses of the sitting.
     number: u64,
     /// The text that is asked about.
     revision: u64,
-    going: Option<(Arc<Watch>, f64)>,
+    running: Option<(Arc<JobWatch>, f64)>,
     /// What came of the last one.
     answer: Option<Result<Value, String>>,
     was_cancelled: bool,
@@ -88,7 +88,7 @@ struct Diagnosis {
 /// What a page wants to see of the mechanism.
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
-pub(crate) struct Seeing {
+pub(crate) struct PictureRequest {
     at: Vec<(String, f64)>,
     /// Azimuth and elevation, degrees.
     from: Option<[f64; 2]>,
@@ -102,25 +102,25 @@ pub(crate) struct Seeing {
     loads: Vec<(String, f64, f64)>,
 }
 
-impl Sitting {
+impl WorkbenchSession {
     /// Reads the model file and derives it, if it has a meaning.
     ///
     /// Fails when it cannot be read.
     pub(crate) fn open(
         host: &Host,
         options: Options,
-        commands: Arc<dyn Commands>,
-        surroundings: Arc<dyn Surroundings>,
+        commands: Arc<dyn WorkbenchCommands>,
+        surroundings: Arc<dyn SessionEnvironment>,
     ) -> Outcome<Self> {
         let host = Host::new()
             .with_libraries(host.libraries().to_vec())
             .at_values(host.is_at_values())
             .with_files(surroundings.files());
-        let text = read(&host, &options.model).map_err(Error::input)?;
-        let draft = Draft::new(text, options.first + 1);
+        let text = read_model_text(&host, &options.model).map_err(Error::input)?;
+        let draft = EditedDocument::new(text, options.first + 1);
         let version = AtomicU64::new(options.first + 1);
-        surroundings.changed(options.first + 1);
-        let now = derived(
+        surroundings.notify_change(options.first + 1);
+        let now = derive_revision(
             &host,
             &*surroundings,
             &options.model,
@@ -128,28 +128,28 @@ impl Sitting {
             draft.revision(),
         );
         let saved = now.found.as_ref().as_ref().ok().cloned();
-        let state = State {
-            others: others(&host, saved.as_ref()),
+        let state = SessionState {
+            other_files: other_file_contents(&host, saved.as_ref()),
             draft,
-            now,
+            derived: now,
             saved,
             unreadable: None,
-            ladder: Ladder::new(options.first + 1),
-            diagnosis: Diagnosis {
+            ladder: ErrorLadder::new(options.first + 1),
+            diagnosis: DiagnosisJob {
                 number: options.first,
-                ..Diagnosis::default()
+                ..DiagnosisJob::default()
             },
         };
         Ok(Self {
             host,
-            planning: Mutex::new(Planning::new(options.first)),
+            planning: Mutex::new(ExcitationJob::new(options.first)),
             options,
             commands,
             state: Mutex::new(state),
             surroundings,
             version,
-            readings: Readings::default(),
-            variant: Variant::default(),
+            readings: RecordingCache::default(),
+            variant: VariantCache::default(),
         })
     }
 
@@ -158,24 +158,24 @@ impl Sitting {
         self.options.model.display().to_string()
     }
 
-    fn state(&self) -> MutexGuard<'_, State> {
+    fn state(&self) -> MutexGuard<'_, SessionState> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn tell(&self) {
+    fn notify_pages(&self) {
         let version = 1 + self.version.fetch_add(1, Ordering::Relaxed);
-        self.surroundings.changed(version);
+        self.surroundings.notify_change(version);
     }
 
     /// All that stands at once: the text, what it means, the ladder.
     pub(crate) fn view(&self) -> Value {
         let state = self.state();
         let name = self.name();
-        let now = &state.now;
+        let now = &state.derived;
         let (model, saved) = (now.found.as_ref().as_ref().ok(), state.saved.as_ref());
-        let mut told = told::derived(&now.found, &name);
+        let mut told = told::derivation_view(&now.found, &name);
         told["model"] = model.map_or(Value::Null, |model| told::equations(model, saved));
-        let mut told = told::spelled(told, &*self.commands);
+        let mut told = told::format_advice_in_json(told, &*self.commands);
         told["version"] = json!(self.version.load(Ordering::Relaxed));
         told["revision"] = json!(state.draft.revision());
         told["derived"] = json!(now.revision);
@@ -187,14 +187,14 @@ impl Sitting {
         told["unreadable"] = json!(state.unreadable);
         told["data"] = json!(!self.options.data.is_empty());
         told["opened"] = json!(self.options.first);
-        told["ladder"] = state.ladder.told();
+        told["ladder"] = state.ladder.view();
         told["commands"] = json!({
-            "picture": self.commands.same(Step::Picture),
-            "equations": self.commands.same(Step::Equations),
-            "compare": self.commands.same(Step::Compare),
-            "identify": self.commands.same(Step::Identify),
-            "diagnose": self.commands.same(Step::Diagnose),
-            "excite": self.commands.excite(&Excitation::default()),
+            "picture": self.commands.step_command(WorkbenchStep::Picture),
+            "equations": self.commands.step_command(WorkbenchStep::Equations),
+            "compare": self.commands.step_command(WorkbenchStep::Compare),
+            "identify": self.commands.step_command(WorkbenchStep::Identify),
+            "diagnose": self.commands.step_command(WorkbenchStep::Diagnose),
+            "excite": self.commands.excite_command(&ExcitationSettings::default()),
         });
         told
     }
@@ -206,7 +206,7 @@ impl Sitting {
             let mut state = self.state();
             let before = state.draft.revision();
             if did.is_some() {
-                state.ladder.ends_typing(before);
+                state.ladder.end_typing(before);
             }
             if !state.draft.edit(base, text) {
                 return None;
@@ -216,7 +216,7 @@ impl Sitting {
                 return Some(self.view());
             }
             if let Some(what) = did {
-                state.did(what);
+                state.record_step(what);
             }
         }
         self.derive();
@@ -229,7 +229,7 @@ impl Sitting {
             let state = self.state();
             (state.draft.text().to_owned(), state.draft.revision())
         };
-        let now = derived(
+        let now = derive_revision(
             &self.host,
             &*self.surroundings,
             &self.options.model,
@@ -240,26 +240,26 @@ impl Sitting {
         if state.draft.revision() == revision {
             if !state.draft.is_changed() {
                 state.saved = now.found.as_ref().as_ref().ok().cloned();
-                state.others = others(&self.host, state.saved.as_ref());
+                state.other_files = other_file_contents(&self.host, state.saved.as_ref());
             }
-            state.now = now;
+            state.derived = now;
         }
         drop(state);
-        self.tell();
+        self.notify_pages();
     }
 
     /// Writes the text to the file as a whole, unless another program wrote something else there.
     ///
     /// Fails with a sentence when that is so, or the file cannot be written.
     pub(crate) fn save(&self) -> Result<Value, String> {
-        let disk = read(&self.host, &self.options.model);
+        let disk = read_model_text(&self.host, &self.options.model);
         let mut state = self.state();
         if let Ok(disk) = disk {
-            state.draft.see(&disk);
+            state.draft.update_from_disk(&disk);
         }
         if state.draft.is_in_conflict() {
             drop(state);
-            self.tell();
+            self.notify_pages();
             return Err(format!(
                 "{} was changed by another program; choose which text stays before it is saved",
                 self.name()
@@ -269,28 +269,28 @@ impl Sitting {
             let bytes = state.draft.text().as_bytes();
             (self.surroundings.write(&self.options.model, bytes))
                 .map_err(|error| format!("nothing is saved: {error}"))?;
-            state.draft.written();
-            if state.now.revision == state.draft.revision() {
-                state.saved = state.now.found.as_ref().as_ref().ok().cloned();
-                state.others = others(&self.host, state.saved.as_ref());
+            state.draft.mark_saved();
+            if state.derived.revision == state.draft.revision() {
+                state.saved = state.derived.found.as_ref().as_ref().ok().cloned();
+                state.other_files = other_file_contents(&self.host, state.saved.as_ref());
             }
             state.unreadable = None;
-            state.did("edited and saved");
+            state.record_step("edited and saved");
         }
         drop(state);
-        self.tell();
+        self.notify_pages();
         Ok(self.view())
     }
 
     /// Ends a conflict with another program: its text is taken, or the text of the page may be saved over it.
-    pub(crate) fn choose(&self, take_theirs: bool) -> Value {
+    pub(crate) fn resolve_conflict(&self, take_theirs: bool) -> Value {
         {
             let mut state = self.state();
             if take_theirs {
-                state.draft.take();
-                state.did("changed outside");
+                state.draft.accept_outside_text();
+                state.record_step("changed outside");
             } else {
-                state.draft.keep();
+                state.draft.keep_own_text();
             }
         }
         self.derive();
@@ -299,34 +299,34 @@ impl Sitting {
 
     /// Looks whether another program changed the files.
     #[cfg(not(target_family = "wasm"))]
-    pub(crate) fn look(&self) {
-        use crate::draft::Seen;
+    pub(crate) fn check_disk(&self) {
+        use crate::draft::DiskChange;
 
-        let disk = read(&self.host, &self.options.model);
+        let disk = read_model_text(&self.host, &self.options.model);
         let mut state = self.state();
         let unreadable = disk.as_ref().err().map(ToString::to_string);
         let is_news = state.unreadable != unreadable;
         state.unreadable = unreadable;
-        let seen = disk.map_or(Seen::Nothing, |disk| state.draft.see(&disk));
-        if seen == Seen::Followed {
-            state.did("changed outside");
+        let seen = disk.map_or(DiskChange::Unchanged, |disk| state.draft.update_from_disk(&disk));
+        if seen == DiskChange::Reloaded {
+            state.record_step("changed outside");
         }
         let saved = state.saved.clone();
-        let before = state.others.clone();
+        let before = state.other_files.clone();
         drop(state);
-        let others_changed = others(&self.host, saved.as_ref()) != before;
-        if seen == Seen::Followed || others_changed {
+        let others_changed = other_file_contents(&self.host, saved.as_ref()) != before;
+        if seen == DiskChange::Reloaded || others_changed {
             self.derive();
             let mut state = self.state();
-            state.others = others(&self.host, state.saved.as_ref());
-        } else if seen == Seen::Conflict || is_news {
-            self.tell();
+            state.other_files = other_file_contents(&self.host, state.saved.as_ref());
+        } else if seen == DiskChange::Conflict || is_news {
+            self.notify_pages();
         }
     }
 
     /// The model of the text as it stands, with its revision.
     fn model(&self) -> Result<(Model, u64), String> {
-        let now = self.state().now.clone();
+        let now = self.state().derived.clone();
         match now.found.as_ref() {
             Ok(model) => Ok((model.clone(), now.revision)),
             Err(_) => Err("the text has no meaning yet; mend what is said beside it".to_owned()),
@@ -334,18 +334,18 @@ impl Sitting {
     }
 
     /// The mechanism as SVG.
-    pub(crate) fn picture(&self, seeing: &Seeing) -> Result<String, String> {
+    pub(crate) fn picture(&self, seeing: &PictureRequest) -> Result<String, String> {
         let (model, _) = self.model()?;
-        let drawing = Drawing {
+        let drawing = PictureOptions {
             at: seeing.at.clone(),
             from: seeing.from.map(|from| from.map(f64::to_radians)),
-            style: Style {
+            style: DrawingStyle {
                 names: seeing.names,
                 frames: seeing.frames,
-                ..Style::default()
+                ..DrawingStyle::default()
             },
             loads: (seeing.loads.iter())
-                .map(|(drive, force, error)| Load {
+                .map(|(drive, force, error)| DriveArrow {
                     drive: drive.clone(),
                     force: *force,
                     error: *error,
@@ -353,13 +353,13 @@ impl Sitting {
                 .collect(),
         };
         let shadow = match &seeing.beside {
-            Some(name) => Some(self.beside(Some(name))?),
+            Some(name) => Some(self.comparison_model(Some(name))?),
             None => {
                 let saved = self.state().saved.clone();
                 saved.filter(|saved| seeing.shadow && saved.text() != model.text())
             }
         };
-        let told = |error| self.said(&error);
+        let told = |error| self.error_text(&error);
         match model.picture(&drawing, shadow.as_ref()) {
             // The other mechanism may have other coordinates, or not reach that pose.
             Err(_) if shadow.is_some() => model.picture(&drawing, None).map_err(told),
@@ -370,13 +370,13 @@ impl Sitting {
     /// The page of equations.
     pub(crate) fn equations(&self) -> Result<String, String> {
         let (model, _) = self.model()?;
-        let written = model.equations(Format::Html).map_err(|e| self.said(&e))?;
+        let written = model.equations(PageFormat::Html).map_err(|e| self.error_text(&e))?;
         Ok(written.text)
     }
 
     /// Recordings of fit and check as a model reads them.
-    fn recordings(&self, model: &Model) -> Outcome<Read> {
-        let read = |all: &[Vec<PathBuf>]| -> Outcome<Vec<Recording>> {
+    fn recordings(&self, model: &Model) -> Outcome<SessionRecordings> {
+        let read = |all: &[Vec<PathBuf>]| -> Outcome<Vec<PreparedRecording>> {
             let one = |run: &Vec<PathBuf>| {
                 let paths: Vec<&Path> = run.iter().map(PathBuf::as_path).collect();
                 model.recording_of(&paths, &self.options.reading)
@@ -392,9 +392,9 @@ impl Sitting {
         let (model, revision) = self.model()?;
         let mut told = (|| {
             let read = || self.recordings(&model);
-            let (read, is_read) = self.readings.of(&model, is_afresh, read)?;
+            let (read, is_read) = self.readings.recordings_for(&model, is_afresh, read)?;
             let [fit, check] = read.each_ref().map(|all| all.iter().collect::<Vec<_>>());
-            let identified = model.identify(&fit, &check, &Estimation::default())?;
+            let identified = model.identify(&fit, &check, &EstimatorOptions::default())?;
             let mut told = told::errors(&identified, &read);
             told["afresh"] = json!(is_read);
             if with_places {
@@ -402,15 +402,15 @@ impl Sitting {
             }
             Ok(told)
         })()
-        .map_err(|error| self.said(&error))?;
-        told = told::spelled(told, &*self.commands);
+        .map_err(|error| self.error_text(&error))?;
+        told = told::format_advice_in_json(told, &*self.commands);
         told["revision"] = json!(revision);
         let mut state = self.state();
         if state.draft.revision() == revision {
-            let errors = json!({ "nominal": brief(&told["nominal"]), "identified": brief(&told["identified"]) });
-            if state.ladder.compared(revision, errors) {
+            let errors = json!({ "nominal": relative_errors(&told["nominal"]), "identified": relative_errors(&told["identified"]) });
+            if state.ladder.add_errors(revision, errors) {
                 drop(state);
-                self.tell();
+                self.notify_pages();
             }
         }
         Ok(told)
@@ -420,22 +420,22 @@ impl Sitting {
     pub(crate) fn curves(&self, is_identified: bool) -> Result<String, String> {
         let (model, _) = self.model()?;
         let saved = self.state().saved.clone();
-        let version = |model: Model| -> Outcome<Version> {
+        let version = |model: Model| -> Outcome<ModelVersion> {
             let [fit, check] = self.recordings(&model)?;
-            let stretches = |all: Vec<Recording>| all.into_iter().flat_map(|one| one.stretches);
+            let stretches = |all: Vec<PreparedRecording>| all.into_iter().flat_map(|one| one.segments);
             let held = if is_identified {
-                Held::Known
+                FixedParameters::Known
             } else {
-                Held::All
+                FixedParameters::All
             };
-            Version::new(
+            ModelVersion::new(
                 model,
                 stretches(fit).collect(),
                 stretches(check).collect(),
                 held,
             )
         };
-        let told = |error| self.said(&error);
+        let told = |error| self.error_text(&error);
         // A model whose drives are others has other curves.
         let other =
             saved.filter(|saved| saved.text() != model.text() && saved.drives() == model.drives());
@@ -456,7 +456,7 @@ impl Sitting {
             .beside
             .as_ref()
             .map(|path| path.display().to_string());
-        let mut models = variant::models_near(&self.host, &self.options.model);
+        let mut models = variant::models_in_folder(&self.host, &self.options.model);
         models.retain(|name| {
             let near = self.options.model.with_file_name(name);
             self.options.beside.as_ref() != Some(&near)
@@ -466,14 +466,14 @@ impl Sitting {
     }
 
     /// The model that the text is held beside, by its name of [`Self::models`]; the saved one without a name.
-    fn beside(&self, name: Option<&str>) -> Result<Model, String> {
+    fn comparison_model(&self, name: Option<&str>) -> Result<Model, String> {
         let Some(name) = name else {
             let saved = self.state().saved.clone();
             return saved.ok_or_else(|| "the file as it was saved has no meaning".to_owned());
         };
         let path = self.path_of(name);
         let found = self.variant.model(&self.host, &path);
-        found.map_err(|error| self.said(&error))
+        found.map_err(|error| self.error_text(&error))
     }
 
     /// The file of a model of [`Self::models`].
@@ -487,49 +487,49 @@ impl Sitting {
     /// What changes from another model, or from the saved one, to the text, and what it costs along the recordings.
     pub(crate) fn variant(&self, beside: Option<&str>) -> Result<Value, String> {
         let (model, revision) = self.model()?;
-        let other = self.beside(beside)?;
-        let told = self.variant.told(
+        let other = self.comparison_model(beside)?;
+        let told = self.variant.comparison_view(
             &other,
             &model,
             || self.recordings(&other),
             || {
                 let read = || self.recordings(&model);
-                Ok(self.readings.of(&model, false, read)?.0)
+                Ok(self.readings.recordings_for(&model, false, read)?.0)
             },
         );
-        let told = told.map_err(|error| self.said(&error))?;
-        let mut told = told::spelled(told, &*self.commands);
+        let told = told.map_err(|error| self.error_text(&error))?;
+        let mut told = told::format_advice_in_json(told, &*self.commands);
         told["revision"] = json!(revision);
         told["same"] = json!(other.text() == model.text());
-        told["command"] = json!(beside.and_then(|name| self.commands.variant(&self.path_of(name))));
+        told["command"] = json!(beside.and_then(|name| self.commands.variant_command(&self.path_of(name))));
         Ok(told)
     }
 
     /// Poses along the recordings, in time, with measured forces and what the model misses of them where it can be run.
     pub(crate) fn motion(&self) -> Result<Value, String> {
         let (model, _) = self.model()?;
-        let [fit, check] = self.recordings(&model).map_err(|e| self.said(&e))?;
-        let names = model.active();
+        let [fit, check] = self.recordings(&model).map_err(|e| self.error_text(&e))?;
+        let names = model.active_coordinates();
         let drives = model.drives();
-        let stretches = |all: Vec<Recording>| -> Vec<Stretch> {
-            all.into_iter().flat_map(|one| one.stretches).collect()
+        let stretches = |all: Vec<PreparedRecording>| -> Vec<RecordingSegment> {
+            all.into_iter().flat_map(|one| one.segments).collect()
         };
         let [fit, check] = [fit, check].map(stretches);
         let mut runs: Vec<Value> = (fit.iter().chain(&check))
             .map(|one| {
                 let run = &one.run;
-                let q: Vec<_> = run.q.iter().map(|q| thinned(q)).collect();
-                json!({ "file": run.file, "time": thinned(&run.time), "q": q })
+                let q: Vec<_> = run.q.iter().map(|q| thin_out(q)).collect();
+                json!({ "file": run.file, "time": thin_out(&run.time), "q": q })
             })
             .collect();
         // A picture without arrows is better than none.
-        if let Ok(version) = Version::new(model, fit, check, Held::All) {
+        if let Ok(version) = ModelVersion::new(model, fit, check, FixedParameters::All) {
             for (told, run) in runs.iter_mut().zip(&version.runs) {
                 let all = 0..drives.len();
                 told["forces"] = json!({
-                    "time": thinned(&run.time),
-                    "measured": run.measured.iter().map(|f| thinned(f)).collect::<Vec<_>>(),
-                    "error": all.map(|d| thinned(&run.error(d))).collect::<Vec<_>>(),
+                    "time": thin_out(&run.time),
+                    "measured": run.measured.iter().map(|f| thin_out(f)).collect::<Vec<_>>(),
+                    "error": all.map(|d| thin_out(&run.error(d))).collect::<Vec<_>>(),
                 });
             }
         }
@@ -544,17 +544,17 @@ impl Sitting {
             return Err("there is no recording to find anything in".to_owned());
         }
         self.model()?;
-        let watch = Arc::new(Watch::new(Arc::clone(&self.surroundings)));
+        let watch = Arc::new(JobWatch::new(Arc::clone(&self.surroundings)));
         let (text, number) = {
             let mut state = self.state();
-            if state.diagnosis.going.is_some() {
+            if state.diagnosis.running.is_some() {
                 return Err("a diagnosis goes on; wait for it, or cancel it".to_owned());
             }
-            state.diagnosis = Diagnosis {
+            state.diagnosis = DiagnosisJob {
                 number: state.diagnosis.number + 1,
                 revision: state.draft.revision(),
-                going: Some((Arc::clone(&watch), self.surroundings.seconds())),
-                ..Diagnosis::default()
+                running: Some((Arc::clone(&watch), self.surroundings.seconds())),
+                ..DiagnosisJob::default()
             };
             (state.draft.text().to_owned(), state.diagnosis.number)
         };
@@ -562,55 +562,55 @@ impl Sitting {
         let host = self.host.clone().with_progress(Arc::clone(&watch) as _);
         let work = move || {
             // A panic must not leave the page waiting for ever.
-            let asked = std::panic::AssertUnwindSafe(|| sitting.find(&host, &text));
+            let asked = std::panic::AssertUnwindSafe(|| sitting.run_diagnosis(&host, &text));
             let found = std::panic::catch_unwind(asked).unwrap_or_else(|_| {
                 Err(Error::input(
                     "the diagnosis ended by a fault of the program, which is none of yours",
                 ))
             });
-            sitting.ended(number, found);
+            sitting.finish_diagnosis(number, found);
         };
-        if let Err(error) = self.surroundings.begin(Box::new(work)) {
-            self.state().diagnosis.going = None;
+        if let Err(error) = self.surroundings.spawn_work(Box::new(work)) {
+            self.state().diagnosis.running = None;
             return Err(format!("the diagnosis cannot begin: {error}"));
         }
         Ok(self.diagnosis())
     }
 
-    fn find(&self, host: &Host, text: &str) -> Outcome<(Value, Vec<NewEffect>)> {
+    fn run_diagnosis(&self, host: &Host, text: &str) -> Outcome<(Value, Vec<NewEffect>)> {
         let path = &self.options.model;
         let model = host.derive(&self.name(), host.load_text(path, text)?)?;
         let [fit, check] = self.recordings(&model)?;
         let [fit, check] = [&fit, &check].map(|all| all.iter().collect::<Vec<_>>());
-        let findings = model.diagnose(&fit, &check, &Question::default())?;
+        let findings = model.diagnose(&fit, &check, &DiagnosisOptions::default())?;
         Ok((
             told::findings(&findings, &*self.commands),
-            findings.to_add().to_vec(),
+            findings.entries_to_add().to_vec(),
         ))
     }
 
-    fn ended(&self, number: u64, found: Outcome<(Value, Vec<NewEffect>)>) {
+    fn finish_diagnosis(&self, number: u64, found: Outcome<(Value, Vec<NewEffect>)>) {
         let mut state = self.state();
         let diagnosis = &mut state.diagnosis;
         if diagnosis.number != number {
             return;
         }
-        diagnosis.going = None;
+        diagnosis.running = None;
         match found {
             Ok((told, entries)) => {
-                diagnosis.answer = Some(Ok(told::spelled(told, &*self.commands)));
+                diagnosis.answer = Some(Ok(told::format_advice_in_json(told, &*self.commands)));
                 diagnosis.entries = entries;
             }
             Err(Error::Cancelled) => diagnosis.was_cancelled = true,
-            Err(error) => diagnosis.answer = Some(Err(self.said(&error))),
+            Err(error) => diagnosis.answer = Some(Err(self.error_text(&error))),
         }
         drop(state);
-        self.tell();
+        self.notify_pages();
     }
 
     /// Asks the diagnosis that goes on to stop.
     pub(crate) fn cancel(&self) -> Value {
-        if let Some((watch, _)) = &self.state().diagnosis.going {
+        if let Some((watch, _)) = &self.state().diagnosis.running {
             watch.cancel();
         }
         self.diagnosis()
@@ -620,8 +620,8 @@ impl Sitting {
     pub(crate) fn diagnosis(&self) -> Value {
         let state = self.state();
         let diagnosis = &state.diagnosis;
-        let going = diagnosis.going.as_ref().map(|(watch, since)| {
-            let mut told = watch.told();
+        let going = diagnosis.running.as_ref().map(|(watch, since)| {
+            let mut told = watch.progress_view();
             told["seconds"] = json!(self.surroundings.seconds() - since);
             told
         });
@@ -650,11 +650,11 @@ impl Sitting {
             )
         };
         let edited = self.host.edit(&self.name(), &text, &effect);
-        let edited = edited.map_err(|error| self.said(&error))?;
+        let edited = edited.map_err(|error| self.error_text(&error))?;
         {
             let mut state = self.state();
             let now = state.draft.revision();
-            state.ladder.ends_typing(now);
+            state.ladder.end_typing(now);
             if !state.draft.edit(revision, &edited.text) {
                 return Err("the text was changed meanwhile; add it again".to_owned());
             }
@@ -663,52 +663,52 @@ impl Sitting {
                 effect.kind.replace('_', " "),
                 effect.at.join(", ")
             );
-            state.did(&what);
+            state.record_step(&what);
         }
         self.derive();
         Ok(self.view())
     }
 
     /// What an error says, in the words of the reader.
-    fn said(&self, error: &Error) -> String {
+    fn error_text(&self, error: &Error) -> String {
         let says = match error {
             Error::Model(faults) => faults.render(false),
             error => error.to_string(),
         };
-        self.commands.text(&says).into_owned()
+        self.commands.format_text(&says).into_owned()
     }
 }
 
-impl State {
+impl SessionState {
     /// Something was done to the text as it stands.
-    fn did(&mut self, what: &str) {
-        self.ladder.did(self.draft.revision(), what);
+    fn record_step(&mut self, what: &str) {
+        self.ladder.record_step(self.draft.revision(), what);
     }
 }
 
 /// As many values as a moving picture needs.
-fn thinned(all: &[f64]) -> Vec<f64> {
+fn thin_out(all: &[f64]) -> Vec<f64> {
     let step = all.len().div_ceil(POSES).max(1);
     all.iter().copied().step_by(step).collect()
 }
 
-fn read(host: &Host, path: &Path) -> Result<String, FileError> {
+fn read_model_text(host: &Host, path: &Path) -> Result<String, FileError> {
     host.files().read_text(path, LONGEST)
 }
 
 /// Derives a text, and measures how long that takes.
-fn derived(
+fn derive_revision(
     host: &Host,
-    surroundings: &dyn Surroundings,
+    surroundings: &dyn SessionEnvironment,
     path: &Path,
     text: &str,
     revision: u64,
-) -> Now {
+) -> DerivedRevision {
     let since = surroundings.seconds();
     let found = host
         .load_text(path, text)
         .and_then(|loaded| host.derive(&path.display().to_string(), loaded));
-    Now {
+    DerivedRevision {
         revision,
         found: Arc::new(found),
         seconds: surroundings.seconds() - since,
@@ -716,7 +716,7 @@ fn derived(
 }
 
 /// What stands in the other files that a model is made of.
-fn others(host: &Host, model: Option<&Model>) -> Vec<Option<Vec<u8>>> {
+fn other_file_contents(host: &Host, model: Option<&Model>) -> Vec<Option<Vec<u8>>> {
     let paths = model.into_iter().flat_map(|model| model.files().skip(1));
     paths
         .map(|path| host.files().read(path, LONGEST).ok())
@@ -724,6 +724,6 @@ fn others(host: &Host, model: Option<&Model>) -> Vec<Option<Vec<u8>>> {
 }
 
 /// Relative errors of fit and check alone.
-fn brief(figures: &Value) -> Value {
+fn relative_errors(figures: &Value) -> Value {
     json!({ "fit": figures["fit"]["nrms"], "check": figures["check"]["nrms"] })
 }

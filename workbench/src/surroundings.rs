@@ -4,13 +4,13 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use modelmill::files::Files;
+use modelmill::files::FileSource;
 use serde_json::Value;
 
 /// Where a sitting takes place.
-pub(crate) trait Surroundings: Send + Sync {
+pub(crate) trait SessionEnvironment: Send + Sync {
     /// Where files are read.
-    fn files(&self) -> Arc<dyn Files>;
+    fn files(&self) -> Arc<dyn FileSource>;
 
     /// Writes a file as a whole; fails with a sentence, and the old one is as it was.
     fn write(&self, path: &Path, bytes: &[u8]) -> Result<(), String>;
@@ -19,11 +19,11 @@ pub(crate) trait Surroundings: Send + Sync {
     fn seconds(&self) -> f64;
 
     /// Something changed that pages should hear of; `version` counts that.
-    fn changed(&self, version: u64);
+    fn notify_change(&self, version: u64);
 
     /// Long work has come to something else: an object with `what`, `done` and `total` (0 where nobody knows it).
-    fn goes_on(&self, told: &Value);
+    fn report_progress(&self, told: &Value);
 
     /// Does long work, beside everything else where that is possible; fails with a sentence when it cannot begin.
-    fn begin(&self, work: Box<dyn FnOnce() + Send>) -> Result<(), String>;
+    fn spawn_work(&self, work: Box<dyn FnOnce() + Send>) -> Result<(), String>;
 }

@@ -1,17 +1,17 @@
 //! What the page is told, as JSON: the model with its base parameters beside those of the file as it was saved, errors, findings.
 
-use modelmill::diagnose::{Findings, words};
+use modelmill::diagnose::{DiagnosisFindings, words};
 use modelmill::identify::Identification;
-use modelmill::model::Checked;
-use modelmill::print::{self, Spelling, edit};
-use modelmill::recording::Recording;
-use modelmill::{EffectKind, Error, Model, Note, report};
+use modelmill::model::ModelCheck;
+use modelmill::print::{self, AdviceFormatter, edit};
+use modelmill::recording::PreparedRecording;
+use modelmill::{EffectKind, Error, Model, RecordingNote, report};
 use serde_json::{Value, json};
 
-use crate::options::Commands;
+use crate::options::WorkbenchCommands;
 
 /// A text that was derived, or why it was not, with what is to be said at its lines.
-pub(crate) fn derived(found: &Result<Model, Error>, path: &str) -> Value {
+pub(crate) fn derivation_view(found: &Result<Model, Error>, path: &str) -> Value {
     match found {
         Ok(model) => json!({
             "valid": true,
@@ -62,7 +62,7 @@ pub(crate) fn equations(model: &Model, saved: Option<&Model>) -> Value {
         })
         .map(|old| old.expression.as_str())
         .collect();
-    let summary = Checked {
+    let summary = ModelCheck {
         model: model.clone(),
         summary: model.summary(),
         rank: None,
@@ -71,7 +71,7 @@ pub(crate) fn equations(model: &Model, saved: Option<&Model>) -> Value {
     json!({
         "base": base,
         "gone": gone,
-        "summary": summary.text(modelmill::text::Style::PLAIN),
+        "summary": summary.text(modelmill::text::TerminalStyle::PLAIN),
         "products": model.derivation.reduction.products.len(),
         "coordinates": model.motions().iter().map(|(name, is_angle)| {
             let mut all = model.derivation.mechanism.coordinates.iter();
@@ -83,9 +83,9 @@ pub(crate) fn equations(model: &Model, saved: Option<&Model>) -> Value {
 }
 
 /// Errors of a model along recordings, with its own values and once it is identified, and remarks on both.
-pub(crate) fn errors(found: &Identification, recordings: &[Vec<Recording>; 2]) -> Value {
-    let remarks = recordings.iter().flatten().flat_map(Recording::notes);
-    let mut notes: Vec<&Note> = Vec::new();
+pub(crate) fn errors(found: &Identification, recordings: &[Vec<PreparedRecording>; 2]) -> Value {
+    let remarks = recordings.iter().flatten().flat_map(PreparedRecording::notes);
+    let mut notes: Vec<&RecordingNote> = Vec::new();
     for note in remarks.chain(&found.notes) {
         if !notes.contains(&note) {
             notes.push(note);
@@ -100,22 +100,22 @@ pub(crate) fn errors(found: &Identification, recordings: &[Vec<Recording>; 2]) -
 }
 
 /// What a diagnosis found: its JSON with sentences, the picture of its ladder, and what can be added.
-pub(crate) fn findings(findings: &Findings, commands: &dyn Commands) -> Value {
+pub(crate) fn findings(findings: &DiagnosisFindings, commands: &dyn WorkbenchCommands) -> Value {
     let model = &findings.before.model;
     let mut told = findings.json(commands);
     told["says"] = json!(words::verdict(
         &findings.diagnosis,
         findings.channels(),
-        findings.judged
+        findings.validation
     ));
     told["ladder"] = json!(report::ladder(findings));
-    told["judged"] = json!(findings.judged.words());
+    told["judged"] = json!(findings.validation.phrase());
     told["entries"] = findings
-        .to_add()
+        .entries_to_add()
         .iter()
         .map(|entry| {
-            let mut told = edit::described(entry);
-            told["command"] = json!(commands.add(model, entry));
+            let mut told = edit::effect_json(entry);
+            told["command"] = json!(commands.add_effect(model, entry));
             told
         })
         .collect();
@@ -123,23 +123,23 @@ pub(crate) fn findings(findings: &Findings, commands: &dyn Commands) -> Value {
 }
 
 /// What an editor offers while one types: the schema of a model file, and the kinds of effects that are known.
-pub(crate) fn words(kinds: &[EffectKind]) -> Value {
+pub(crate) fn completion_data(kinds: &[EffectKind]) -> Value {
     let schema: Value = serde_json::from_str(modelmill::SCHEMA).unwrap_or_default();
     json!({ "schema": schema, "kinds": print::effects::json(kinds)["kinds"] })
 }
 
 /// A JSON value with all its texts spelled as the reader asks for what they advise.
-pub(crate) fn spelled(value: Value, spelling: &dyn Spelling) -> Value {
+pub(crate) fn format_advice_in_json(value: Value, spelling: &dyn AdviceFormatter) -> Value {
     match value {
-        Value::String(text) => Value::String(spelling.text(&text).into_owned()),
+        Value::String(text) => Value::String(spelling.format_text(&text).into_owned()),
         Value::Array(values) => {
             let values = values.into_iter();
-            values.map(|value| spelled(value, spelling)).collect()
+            values.map(|value| format_advice_in_json(value, spelling)).collect()
         }
         Value::Object(members) => {
             let members = members.into_iter();
             members
-                .map(|(name, value)| (name, spelled(value, spelling)))
+                .map(|(name, value)| (name, format_advice_in_json(value, spelling)))
                 .collect()
         }
         other => other,

@@ -4,45 +4,45 @@
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use modelmill::model::Changes;
-use modelmill::recording::Recording;
-use modelmill::variants::Variants;
+use modelmill::model::ModelChanges;
+use modelmill::recording::PreparedRecording;
+use modelmill::variants::VariantComparison;
 use modelmill::{Error, Host, Model, Outcome};
 use serde_json::{Value, json};
 
-use crate::readings::{Read, Readings};
+use crate::readings::{SessionRecordings, RecordingCache};
 
 /// Longest model file that is held beside the text, bytes.
 const LONGEST: u64 = 4 << 20;
 
 /// What was read and derived of variants, kept while nothing changes on which it depends.
 #[derive(Default)]
-pub(crate) struct Variant {
-    kept: Mutex<Option<Kept>>,
-    readings: Readings,
+pub(crate) struct VariantCache {
+    kept: Mutex<Option<CachedVariant>>,
+    readings: RecordingCache,
 }
 
 /// The other model, with its files as they were.
 #[derive(Clone)]
-struct Kept {
+struct CachedVariant {
     path: PathBuf,
     files: Vec<Option<Vec<u8>>>,
     model: Model,
 }
 
-impl Variant {
+impl VariantCache {
     /// A model file beside the text, derived anew when any file of it has changed.
     pub(crate) fn model(&self, host: &Host, path: &Path) -> Outcome<Model> {
-        let known = self.kept().clone();
+        let known = self.lock_cache().clone();
         if let Some(known) = known
             && known.path == path
-            && known.files == contents(host, &known.model)
+            && known.files == file_contents(host, &known.model)
         {
             return Ok(known.model);
         }
         let model = host.model(path)?;
-        let files = contents(host, &model);
-        *self.kept() = Some(Kept {
+        let files = file_contents(host, &model);
+        *self.lock_cache() = Some(CachedVariant {
             path: path.to_owned(),
             files,
             model: model.clone(),
@@ -50,30 +50,30 @@ impl Variant {
         Ok(model)
     }
 
-    fn kept(&self) -> MutexGuard<'_, Option<Kept>> {
+    fn lock_cache(&self) -> MutexGuard<'_, Option<CachedVariant>> {
         self.kept.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// What changes from `before` to `after`, and along recordings, if there are any: `read` reads them for `before`, `after`
     /// has read them. Where both cannot be held beside each other, `refused` says why.
-    pub(crate) fn told(
+    pub(crate) fn comparison_view(
         &self,
         before: &Model,
         after: &Model,
-        read: impl FnOnce() -> Outcome<Read>,
-        after_read: impl FnOnce() -> Outcome<Arc<Read>>,
+        read: impl FnOnce() -> Outcome<SessionRecordings>,
+        after_read: impl FnOnce() -> Outcome<Arc<SessionRecordings>>,
     ) -> Outcome<Value> {
-        let mut told = Changes::between(before, after).json(before, after);
+        let mut told = ModelChanges::from_models(before, after).json(before, after);
         let along = (|| {
-            Variants::check([before, after])?;
-            let first = self.readings.of(before, false, read)?.0;
+            VariantComparison::check([before, after])?;
+            let first = self.readings.recordings_for(before, false, read)?.0;
             let second = after_read()?;
             let runs =
-                [&first, &second].map(|read| read.iter().flatten().collect::<Vec<&Recording>>());
+                [&first, &second].map(|read| read.iter().flatten().collect::<Vec<&PreparedRecording>>());
             if runs[0].is_empty() {
                 return Ok(Value::Null);
             }
-            Ok(Variants::along([before, after], [&runs[0], &runs[1]])?.json())
+            Ok(VariantComparison::along_recordings([before, after], [&runs[0], &runs[1]])?.json())
         })();
         match along {
             Ok(along) => told["along"] = along,
@@ -85,7 +85,7 @@ impl Variant {
 }
 
 /// Names of the model files in the folder of a model, without its own.
-pub(crate) fn models_near(host: &Host, model: &Path) -> Vec<String> {
+pub(crate) fn models_in_folder(host: &Host, model: &Path) -> Vec<String> {
     let folder = match model.parent() {
         Some(parent) if parent != Path::new("") => parent,
         _ => Path::new("."),
@@ -101,7 +101,7 @@ pub(crate) fn models_near(host: &Host, model: &Path) -> Vec<String> {
 }
 
 /// What stands in the files that a model is made of.
-fn contents(host: &Host, model: &Model) -> Vec<Option<Vec<u8>>> {
+fn file_contents(host: &Host, model: &Model) -> Vec<Option<Vec<u8>>> {
     let paths = model.files();
     paths
         .map(|path| host.files().read(path, LONGEST).ok())

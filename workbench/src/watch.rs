@@ -3,28 +3,28 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use modelmill::progress::{Job, Progress};
+use modelmill::progress::{JobHandle, ProgressListener};
 use serde_json::{Value, json};
 
-use crate::surroundings::Surroundings;
+use crate::surroundings::SessionEnvironment;
 
 /// Watches the jobs of one verb.
-pub(crate) struct Watch {
-    surroundings: Arc<dyn Surroundings>,
-    jobs: Mutex<Vec<Going>>,
+pub(crate) struct JobWatch {
+    surroundings: Arc<dyn SessionEnvironment>,
+    jobs: Mutex<Vec<RunningJob>>,
     is_cancelled: AtomicBool,
 }
 
 /// A job that goes on.
-struct Going {
+struct RunningJob {
     what: String,
     total: usize,
-    job: Arc<Job>,
+    job: Arc<JobHandle>,
 }
 
-impl Watch {
+impl JobWatch {
     /// Nothing goes on yet; the surroundings hear of every job.
-    pub(crate) fn new(surroundings: Arc<dyn Surroundings>) -> Self {
+    pub(crate) fn new(surroundings: Arc<dyn SessionEnvironment>) -> Self {
         Self {
             surroundings,
             jobs: Mutex::default(),
@@ -41,7 +41,7 @@ impl Watch {
     }
 
     /// What goes on: the outermost job that counts its steps, or else the innermost one.
-    pub(crate) fn told(&self) -> Value {
+    pub(crate) fn progress_view(&self) -> Value {
         let jobs = self.jobs();
         let counting = jobs.iter().find(|going| going.total > 0);
         match counting.or(jobs.last()) {
@@ -52,27 +52,27 @@ impl Watch {
         }
     }
 
-    fn jobs(&self) -> std::sync::MutexGuard<'_, Vec<Going>> {
+    fn jobs(&self) -> std::sync::MutexGuard<'_, Vec<RunningJob>> {
         self.jobs.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-impl Progress for Watch {
-    fn begins(&self, what: &str, total: usize, job: &Arc<Job>) {
+impl ProgressListener for JobWatch {
+    fn on_job_start(&self, what: &str, total: usize, job: &Arc<JobHandle>) {
         let mut jobs = self.jobs();
         if self.is_cancelled.load(Ordering::Relaxed) {
             job.cancel();
         }
-        jobs.push(Going {
+        jobs.push(RunningJob {
             what: what.to_owned(),
             total,
             job: Arc::clone(job),
         });
         drop(jobs);
-        self.surroundings.goes_on(&self.told());
+        self.surroundings.report_progress(&self.progress_view());
     }
 
-    fn ends(&self) {
+    fn on_job_end(&self) {
         self.jobs().pop();
     }
 }
@@ -80,22 +80,22 @@ impl Progress for Watch {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::shelf::Shelf;
+    use crate::shelf::MemoryStore;
 
     #[test]
     fn what_is_cancelled_stops_every_job() {
-        let watch = Watch::new(Arc::new(Shelf::new(|| 0.0, |_| {})));
-        let [outer, inner, later] = [(); 3].map(|()| Arc::new(Job::default()));
-        watch.begins("searching", 10, &outer);
-        watch.begins("fitting", 0, &inner);
+        let watch = JobWatch::new(Arc::new(MemoryStore::new(|| 0.0, |_| {})));
+        let [outer, inner, later] = [(); 3].map(|()| Arc::new(JobHandle::default()));
+        watch.on_job_start("searching", 10, &outer);
+        watch.on_job_start("fitting", 0, &inner);
         outer.add(3);
         assert_eq!(
-            watch.told(),
+            watch.progress_view(),
             json!({ "what": "searching", "done": 3, "total": 10 })
         );
         watch.cancel();
-        watch.ends();
-        watch.begins("judging", 0, &later);
+        watch.on_job_end();
+        watch.on_job_start("judging", 0, &later);
         assert!(outer.is_cancelled() && inner.is_cancelled() && later.is_cancelled());
     }
 }

@@ -12,8 +12,8 @@ use std::ops::{Add, Mul, Neg, Sub};
 use num_bigint::BigInt;
 use num_traits::{Signed, ToPrimitive};
 
-pub use extension::Extended;
-pub use number::Number;
+pub use extension::ExtensionElement;
+pub use number::FieldNumber;
 
 use crate::Rational;
 
@@ -34,9 +34,9 @@ pub const MODULUS: u64 = PRIMES[0];
 
 /// An element of the field with `P` elements, always below `P`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
-pub struct Element<const P: u64 = MODULUS>(u64);
+pub struct FieldElement<const P: u64 = MODULUS>(u64);
 
-impl<const P: u64> Element<P> {
+impl<const P: u64> FieldElement<P> {
     /// 0
     pub const ZERO: Self = Self(0);
     /// 1
@@ -117,7 +117,7 @@ impl<const P: u64> Element<P> {
     }
 }
 
-fn reduce<const P: u64>(x: u128) -> Element<P> {
+fn reduce<const P: u64>(x: u128) -> FieldElement<P> {
     const MASK: u128 = (1 << 61) - 1;
     let excess = u128::from((1 << 61) - P);
     let x = (x & MASK) + (x >> 61) * excess;
@@ -127,10 +127,10 @@ fn reduce<const P: u64>(x: u128) -> Element<P> {
         reason = "below 2^62 after two folds"
     )]
     let x = x as u64;
-    Element(if x >= P { x - P } else { x })
+    FieldElement(if x >= P { x - P } else { x })
 }
 
-impl<const P: u64> Add for Element<P> {
+impl<const P: u64> Add for FieldElement<P> {
     type Output = Self;
     fn add(self, other: Self) -> Self {
         let sum = self.0 + other.0;
@@ -138,21 +138,21 @@ impl<const P: u64> Add for Element<P> {
     }
 }
 
-impl<const P: u64> Sub for Element<P> {
+impl<const P: u64> Sub for FieldElement<P> {
     type Output = Self;
     fn sub(self, other: Self) -> Self {
         self + -other
     }
 }
 
-impl<const P: u64> Neg for Element<P> {
+impl<const P: u64> Neg for FieldElement<P> {
     type Output = Self;
     fn neg(self) -> Self {
         Self(if self.0 == 0 { 0 } else { P - self.0 })
     }
 }
 
-impl<const P: u64> Mul for Element<P> {
+impl<const P: u64> Mul for FieldElement<P> {
     type Output = Self;
     fn mul(self, other: Self) -> Self {
         reduce(u128::from(self.0) * u128::from(other.0))
@@ -161,43 +161,43 @@ impl<const P: u64> Mul for Element<P> {
 
 /// A reproducible stream of elements (SplitMix64, Steele 2014): the same seed gives the same model text on any machine.
 #[derive(Clone, Debug)]
-pub struct Stream(u64);
+pub struct RandomStream(u64);
 
-impl Stream {
+impl RandomStream {
     /// A stream that starts from a seed.
     pub fn new(seed: u64) -> Self {
         Self(seed)
     }
 
     /// The next 64 bits.
-    pub fn bits(&mut self) -> u64 {
+    pub fn next_bits(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        mix(self.0)
+        mix_bits(self.0)
     }
 
     /// The next element, uniformly distributed to within 2^-52.
-    pub fn element<const P: u64>(&mut self) -> Element<P> {
-        reduce((u128::from(self.bits()) << 50) ^ u128::from(self.bits()))
+    pub fn next_element<const P: u64>(&mut self) -> FieldElement<P> {
+        reduce((u128::from(self.next_bits()) << 50) ^ u128::from(self.next_bits()))
     }
 
     /// A point (cosine, sine) of the unit circle, from its rational parametrisation.
-    pub fn circle<const P: u64>(&mut self) -> (Element<P>, Element<P>) {
-        let t: Element<P> = self.element();
+    pub fn next_circle_point<const P: u64>(&mut self) -> (FieldElement<P>, FieldElement<P>) {
+        let t: FieldElement<P> = self.next_element();
         // -1 is not a square in the field, so 1 + t^2 has an inverse.
-        let scale = (Element::ONE + t * t)
+        let scale = (FieldElement::ONE + t * t)
             .inverse()
             .expect("-1 is no square modulo a prime that is 3 modulo 4");
-        ((Element::ONE - t * t) * scale, (t + t) * scale)
+        ((FieldElement::ONE - t * t) * scale, (t + t) * scale)
     }
 }
 
 /// A value that depends on `key` and `seed` alone and otherwise looks random.
-pub fn hashed<const P: u64>(seed: u64, key: Element<P>) -> Element<P> {
-    let mut stream = Stream::new(mix(seed ^ mix(key.0)));
-    stream.element()
+pub fn hash_element<const P: u64>(seed: u64, key: FieldElement<P>) -> FieldElement<P> {
+    let mut stream = RandomStream::new(mix_bits(seed ^ mix_bits(key.0)));
+    stream.next_element()
 }
 
-fn mix(mut z: u64) -> u64 {
+fn mix_bits(mut z: u64) -> u64 {
     z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
     z ^ (z >> 31)
@@ -208,25 +208,25 @@ mod tests {
     use super::*;
 
     fn laws<const P: u64>() {
-        let mut stream = Stream::new(7);
+        let mut stream = RandomStream::new(7);
         for _ in 0..500 {
-            let (a, b, c): (Element<P>, Element<P>, Element<P>) =
-                (stream.element(), stream.element(), stream.element());
+            let (a, b, c): (FieldElement<P>, FieldElement<P>, FieldElement<P>) =
+                (stream.next_element(), stream.next_element(), stream.next_element());
             assert_eq!(a * (b + c), a * b + a * c);
             assert_eq!((a - b) + b, a);
-            assert_eq!(a * a.inverse().unwrap(), Element::ONE);
+            assert_eq!(a * a.inverse().unwrap(), FieldElement::ONE);
             assert_eq!((a * a).square_root().map(|r| r * r), Some(a * a));
             let wide = u128::from(a.0) * u128::from(b.0) % u128::from(P);
             assert_eq!(u128::from((a * b).0), wide);
-            let (cos, sin) = stream.circle::<P>();
-            assert_eq!(cos * cos + sin * sin, Element::ONE);
+            let (cos, sin) = stream.next_circle_point::<P>();
+            assert_eq!(cos * cos + sin * sin, FieldElement::ONE);
         }
         for n in [2, 3, 5, 7, 11, 13] {
-            assert!(Element::<P>::from_i64(n).square_root().is_some());
+            assert!(FieldElement::<P>::from_i64(n).square_root().is_some());
         }
-        assert!(Element::<P>::from_i64(-1).square_root().is_none());
-        let largest = Element::<P>(P - 1);
-        assert_eq!(largest * largest, Element::ONE);
+        assert!(FieldElement::<P>::from_i64(-1).square_root().is_none());
+        let largest = FieldElement::<P>(P - 1);
+        assert_eq!(largest * largest, FieldElement::ONE);
     }
 
     #[test]

@@ -65,7 +65,7 @@ impl FileError {
     }
 
     /// What the system says of this file.
-    pub fn system(path: &Path, error: &io::Error) -> Self {
+    pub fn from_io_error(path: &Path, error: &io::Error) -> Self {
         let fault = match error.kind() {
             io::ErrorKind::NotFound => FileFault::Missing,
             io::ErrorKind::IsADirectory => FileFault::Folder,

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::{FileError, FileFault, Files, Kind, Opened, tidy};
+use super::{FileError, FileFault, FileSource, PathKind, OpenFile, normalise_path};
 
 /// Files in memory by their paths; folders are there as far as files are in them.
 ///
@@ -16,14 +16,14 @@ use super::{FileError, FileFault, Files, Kind, Opened, tidy};
 /// # Ok::<(), modelmill_boundary::files::FileError>(())
 /// ```
 #[derive(Clone, Debug, Default)]
-pub struct Memory {
+pub struct MemoryFiles {
     files: BTreeMap<PathBuf, Arc<Vec<u8>>>,
 }
 
-impl Memory {
+impl MemoryFiles {
     /// These files and one more, which takes the place of one of its path.
     #[must_use]
-    pub fn with(mut self, path: impl AsRef<Path>, bytes: impl Into<Vec<u8>>) -> Self {
+    pub fn with_file(mut self, path: impl AsRef<Path>, bytes: impl Into<Vec<u8>>) -> Self {
         self.insert(path, bytes);
         self
     }
@@ -31,38 +31,38 @@ impl Memory {
     /// Adds a file, which takes the place of one of its path.
     pub fn insert(&mut self, path: impl AsRef<Path>, bytes: impl Into<Vec<u8>>) {
         self.files
-            .insert(tidy(path.as_ref()), Arc::new(bytes.into()));
+            .insert(normalise_path(path.as_ref()), Arc::new(bytes.into()));
     }
 
     fn find(&self, path: &Path, most: u64) -> Result<&Arc<Vec<u8>>, FileError> {
         let fail = |fault| Err(FileError::new(path, fault));
-        match self.files.get(&tidy(path)) {
+        match self.files.get(&normalise_path(path)) {
             Some(bytes) if bytes.len() as u64 > most => fail(FileFault::TooLarge { most }),
             Some(bytes) => Ok(bytes),
-            None if self.kind(path) == Kind::Folder => fail(FileFault::Folder),
+            None if self.kind(path) == PathKind::Folder => fail(FileFault::Folder),
             None => fail(FileFault::Missing),
         }
     }
 }
 
-impl Files for Memory {
+impl FileSource for MemoryFiles {
     fn read(&self, path: &Path, most: u64) -> Result<Vec<u8>, FileError> {
         self.find(path, most).map(|bytes| bytes.to_vec())
     }
 
-    fn kind(&self, path: &Path) -> Kind {
-        let path = tidy(path);
+    fn kind(&self, path: &Path) -> PathKind {
+        let path = normalise_path(path);
         if self.files.contains_key(&path) {
-            Kind::File
+            PathKind::File
         } else if self.files.keys().any(|other| other.starts_with(&path)) {
-            Kind::Folder
+            PathKind::Folder
         } else {
-            Kind::Missing
+            PathKind::Missing
         }
     }
 
     fn list(&self, folder: &Path) -> Result<Vec<PathBuf>, FileError> {
-        let folder = tidy(folder);
+        let folder = normalise_path(folder);
         let mut found: Vec<PathBuf> = self
             .files
             .keys()
@@ -77,9 +77,9 @@ impl Files for Memory {
         Ok(found)
     }
 
-    fn open(&self, path: &Path, _: u64) -> Result<Opened, FileError> {
+    fn open(&self, path: &Path, _: u64) -> Result<OpenFile, FileError> {
         // What is in memory already needs no cap.
-        self.find(path, u64::MAX).cloned().map(Opened::Memory)
+        self.find(path, u64::MAX).cloned().map(OpenFile::Memory)
     }
 }
 
@@ -89,12 +89,12 @@ mod tests {
 
     #[test]
     fn files_and_folders_are_found_by_any_of_their_names() {
-        let files = Memory::default()
-            .with("a/one.toml", "1")
-            .with("a/b/two.toml", "22");
+        let files = MemoryFiles::default()
+            .with_file("a/one.toml", "1")
+            .with_file("a/b/two.toml", "22");
         assert_eq!(files.read(Path::new("a/b/../one.toml"), 1).unwrap(), b"1");
-        assert_eq!(files.kind(Path::new("./a")), Kind::Folder);
-        assert_eq!(files.kind(Path::new("b")), Kind::Missing);
+        assert_eq!(files.kind(Path::new("./a")), PathKind::Folder);
+        assert_eq!(files.kind(Path::new("b")), PathKind::Missing);
         let listed = files.list(Path::new("a")).unwrap();
         assert_eq!(listed, [PathBuf::from("a/b"), PathBuf::from("a/one.toml")]);
         let fault = |path: &str| files.read(Path::new(path), 1).unwrap_err().fault;

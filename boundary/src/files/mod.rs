@@ -11,18 +11,18 @@ mod write;
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
-pub use disk::Disk;
+pub use disk::DiskFiles;
 pub use error::{FileError, FileFault};
-pub use memory::Memory;
+pub use memory::MemoryFiles;
 pub use write::write;
 
 /// Where files come from.
-pub trait Files: Send + Sync {
+pub trait FileSource: Send + Sync {
     /// All bytes of a file; fails when there are more than `most`, or the path leads to no file.
     fn read(&self, path: &Path, most: u64) -> Result<Vec<u8>, FileError>;
 
     /// What a path leads to.
-    fn kind(&self, path: &Path) -> Kind;
+    fn kind(&self, path: &Path) -> PathKind;
 
     /// The paths of what is in a folder, sorted; fails where folders cannot be listed.
     fn list(&self, folder: &Path) -> Result<Vec<PathBuf>, FileError> {
@@ -31,8 +31,8 @@ pub trait Files: Send + Sync {
 
     /// A file that may be longer than memory, to be read from any place; what can be read only once, such as a pipe, is
     /// read up to `most` bytes. Fails as [`Files::read`] does.
-    fn open(&self, path: &Path, most: u64) -> Result<Opened, FileError> {
-        Ok(Opened::Memory(self.read(path, most)?.into()))
+    fn open(&self, path: &Path, most: u64) -> Result<OpenFile, FileError> {
+        Ok(OpenFile::Memory(self.read(path, most)?.into()))
     }
 
     /// All text of a file; fails as [`Files::read`] does, and when its bytes are no UTF-8.
@@ -46,7 +46,7 @@ pub trait Files: Send + Sync {
 
 /// What a path leads to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
+pub enum PathKind {
     /// An ordinary file, which can be read more than once and from any place.
     File,
     /// A folder.
@@ -61,7 +61,7 @@ pub enum Kind {
 
 /// A file that was opened, at its beginning.
 #[derive(Debug)]
-pub enum Opened {
+pub enum OpenFile {
     /// An ordinary file on a disk.
     File(std::fs::File),
     /// Bytes in memory.
@@ -69,7 +69,7 @@ pub enum Opened {
 }
 
 /// Drops `.` and resolves `..` by name, so that one file has one path.
-pub fn tidy(path: &Path) -> PathBuf {
+pub fn normalise_path(path: &Path) -> PathBuf {
     let mut parts: Vec<Component<'_>> = Vec::new();
     for part in path.components() {
         match part {

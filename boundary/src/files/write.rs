@@ -20,7 +20,7 @@ const MOST_LINKS: usize = 40;
 /// `/dev/stdout`, is written to as it is. Fails with the file as it was, and without a trace, when there is no room or no
 /// permission; who stops the program on the way leaves a file `.NAME.….part` beside it.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
-    let fail = |error: io::Error| FileError::system(path, &error);
+    let fail = |error: io::Error| FileError::from_io_error(path, &error);
     let old = match path.metadata() {
         Ok(found) if found.is_dir() => return Err(FileError::new(path, FileFault::Folder)),
         Ok(found) if !found.is_file() => {
@@ -34,17 +34,17 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
         }
         Err(_) => None,
     };
-    let target = followed(path).map_err(fail)?;
-    let part = Part::beside(&target).map_err(fail)?;
+    let target = resolve_links(path).map_err(fail)?;
+    let part = PartialFile::create_next_to(&target).map_err(fail)?;
     part.fill(bytes, old.as_ref()).map_err(fail)?;
     std::fs::rename(&part.path, &target).map_err(fail)?;
     part.keep();
-    to_disk(&target);
+    sync_folder(&target);
     Ok(())
 }
 
 /// Where the links end that a path leads to, whether something is there or not.
-fn followed(path: &Path) -> io::Result<PathBuf> {
+fn resolve_links(path: &Path) -> io::Result<PathBuf> {
     let mut path = path.to_owned();
     for _ in 0..MOST_LINKS {
         match path.read_link() {
@@ -56,15 +56,15 @@ fn followed(path: &Path) -> io::Result<PathBuf> {
 }
 
 /// A file that is gone again unless it is kept.
-struct Part {
+struct PartialFile {
     file: File,
     path: PathBuf,
     is_kept: bool,
 }
 
-impl Part {
+impl PartialFile {
     /// A new file in the folder of another one.
-    fn beside(target: &Path) -> io::Result<Self> {
+    fn create_next_to(target: &Path) -> io::Result<Self> {
         static COUNT: AtomicU32 = AtomicU32::new(0);
         let name = target.file_name().unwrap_or_default().to_string_lossy();
         // A name may be as long as the system allows, so only its start comes in.
@@ -108,7 +108,7 @@ impl Part {
     }
 }
 
-impl Drop for Part {
+impl Drop for PartialFile {
     fn drop(&mut self) {
         if !self.is_kept {
             let _ = std::fs::remove_file(&self.path);
@@ -117,7 +117,7 @@ impl Drop for Part {
 }
 
 /// That a file has another name now goes to the disk as well, where the system allows it.
-fn to_disk(target: &Path) {
+fn sync_folder(target: &Path) {
     let folder = target.parent().filter(|folder| *folder != Path::new(""));
     if let Ok(folder) = File::open(folder.unwrap_or(Path::new("."))) {
         let _ = folder.sync_all();

@@ -7,7 +7,7 @@ use std::borrow::Cow;
 
 /// What a text advises.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Advised<'a> {
+pub enum AdviceItem<'a> {
     /// An option, with its value where the text gives one.
     Option(&'a str, Option<&'a str>),
     /// A verb.
@@ -25,10 +25,10 @@ pub enum Advised<'a> {
 /// };
 /// assert_eq!(spelled(text, flags), "check the unit: --columns 'q=q [deg]'");
 /// ```
-pub fn spelled(text: &str, mut spell: impl FnMut(Advised) -> String) -> Cow<'_, str> {
+pub fn format_advice(text: &str, mut spell: impl FnMut(AdviceItem) -> String) -> Cow<'_, str> {
     let mut out = String::new();
     let mut rest = text;
-    while let Some((before, advised, behind)) = next(rest) {
+    while let Some((before, advised, behind)) = next_advice(rest) {
         out.push_str(before);
         out.push_str(&spell(advised));
         rest = behind;
@@ -41,12 +41,12 @@ pub fn spelled(text: &str, mut spell: impl FnMut(Advised) -> String) -> Cow<'_, 
 }
 
 /// The first thing that a text advises, with the text before and behind it.
-fn next(text: &str) -> Option<(&str, Advised<'_>, &str)> {
+fn next_advice(text: &str) -> Option<(&str, AdviceItem<'_>, &str)> {
     let mut from = 0;
     while let Some(found) = text[from..].find(['o', 'v']) {
         let at = from + found;
         let begins_a_word = !text[..at].ends_with(char::is_alphanumeric);
-        if begins_a_word && let Some((advised, behind)) = advised(&text[at..]) {
+        if begins_a_word && let Some((advised, behind)) = leading_advice(&text[at..]) {
             return Some((&text[..at], advised, behind));
         }
         from = at + 1;
@@ -55,21 +55,21 @@ fn next(text: &str) -> Option<(&str, Advised<'_>, &str)> {
 }
 
 /// What a text begins with, if it is advice, and the text behind it.
-fn advised(text: &str) -> Option<(Advised<'_>, &str)> {
+fn leading_advice(text: &str) -> Option<(AdviceItem<'_>, &str)> {
     if let Some(rest) = text.strip_prefix("verb") {
-        let (name, behind) = quoted(rest)?;
-        return Some((Advised::Verb(name), behind));
+        let (name, behind) = backquoted_word(rest)?;
+        return Some((AdviceItem::Verb(name), behind));
     }
-    let (name, behind) = quoted(text.strip_prefix("option")?)?;
-    let value = behind.trim_start().strip_prefix('=').and_then(quoted);
+    let (name, behind) = backquoted_word(text.strip_prefix("option")?)?;
+    let value = behind.trim_start().strip_prefix('=').and_then(backquoted_word);
     Some(match value {
-        Some((value, behind)) => (Advised::Option(name, Some(value)), behind),
-        None => (Advised::Option(name, None), behind),
+        Some((value, behind)) => (AdviceItem::Option(name, Some(value)), behind),
+        None => (AdviceItem::Option(name, None), behind),
     })
 }
 
 /// A word between grave accents behind white space, which may hold a line's end where the text was wrapped.
-fn quoted(text: &str) -> Option<(&str, &str)> {
+fn backquoted_word(text: &str) -> Option<(&str, &str)> {
     let word = text.trim_start();
     let is_apart = word.len() < text.len();
     word.strip_prefix('`').filter(|_| is_apart)?.split_once('`')
@@ -79,11 +79,11 @@ fn quoted(text: &str) -> Option<(&str, &str)> {
 mod tests {
     use super::*;
 
-    fn upper(advised: Advised) -> String {
+    fn upper(advised: AdviceItem) -> String {
         match advised {
-            Advised::Option(name, None) => name.to_uppercase(),
-            Advised::Option(name, Some(value)) => format!("{}({value})", name.to_uppercase()),
-            Advised::Verb(name) => format!("<{name}>"),
+            AdviceItem::Option(name, None) => name.to_uppercase(),
+            AdviceItem::Option(name, Some(value)) => format!("{}({value})", name.to_uppercase()),
+            AdviceItem::Verb(name) => format!("<{name}>"),
         }
     }
 
@@ -91,19 +91,19 @@ mod tests {
     fn all_that_is_advised_is_spelled_and_the_rest_stays() {
         let text = "Give verb `identify` with option `between` = `1,2`, or leave out option `prior`; verb `compare` reads it.";
         assert_eq!(
-            spelled(text, upper),
+            format_advice(text, upper),
             "Give <identify> with BETWEEN(1,2), or leave out PRIOR; <compare> reads it."
         );
         assert!(matches!(
-            spelled("an option without a name", upper),
+            format_advice("an option without a name", upper),
             Cow::Borrowed(_)
         ));
         assert_eq!(
-            spelled("with option\n  `noise` =\n  `0.1`", upper),
+            format_advice("with option\n  `noise` =\n  `0.1`", upper),
             "with NOISE(0.1)"
         );
-        assert!(matches!(spelled("adoption `x`", upper), Cow::Borrowed(_)));
+        assert!(matches!(format_advice("adoption `x`", upper), Cow::Borrowed(_)));
         // A mark that is cut off is text like any other.
-        assert_eq!(spelled("option `pri", upper), "option `pri");
+        assert_eq!(format_advice("option `pri", upper), "option `pri");
     }
 }

@@ -7,7 +7,7 @@ use super::plain;
 
 /// Text of an HTML page, in an element or in an attribute between double quotes; lines stay lines.
 pub fn html(text: &str) -> Cow<'_, str> {
-    escaped(super::lines(text), |c, out| match c {
+    escape_characters(super::lines(text), |c, out| match c {
         '&' => out.push_str("&amp;"),
         '<' => out.push_str("&lt;"),
         '>' => out.push_str("&gt;"),
@@ -23,7 +23,7 @@ pub fn html(text: &str) -> Cow<'_, str> {
 /// assert_eq!(markdown("[a](javascript:b)"), r"\[a\](javascript:b)");
 /// ```
 pub fn markdown(text: &str) -> Cow<'_, str> {
-    escaped(plain(text), |c, out| {
+    escape_characters(plain(text), |c, out| {
         if matches!(
             c,
             '\\' | '`' | '*' | '_' | '|' | '<' | '$' | '[' | ']' | '&' | '~'
@@ -50,7 +50,7 @@ pub fn code_in_markdown(text: &str) -> String {
 
 /// Text of a LaTeX document; characters that the plain fonts lack become question marks.
 pub fn latex(text: &str) -> Cow<'_, str> {
-    escaped(plain(text), |c, out| match c {
+    escape_characters(plain(text), |c, out| match c {
         '\\' => out.push_str("\\textbackslash{}"),
         '^' => out.push_str("\\textasciicircum{}"),
         '~' => out.push_str("\\textasciitilde{}"),
@@ -76,7 +76,7 @@ pub fn latex(text: &str) -> Cow<'_, str> {
 /// ```
 pub fn comment(text: &str) -> Cow<'_, str> {
     let mut before = '\0';
-    escaped(plain(text), |c, out| {
+    escape_characters(plain(text), |c, out| {
         let c = if c == '\\' { '/' } else { c };
         let joins = match before {
             '*' => c == '/',
@@ -104,7 +104,7 @@ pub fn comment(text: &str) -> Cow<'_, str> {
 /// ```
 pub fn csv_field(text: &str) -> Cow<'_, str> {
     let text = plain(text);
-    let is_formula = begins_formula(&text) && text.parse::<f64>().is_err();
+    let is_formula = is_spreadsheet_formula(&text) && text.parse::<f64>().is_err();
     if !is_formula && !text.contains(['"', ',', ';']) && text.trim() == text {
         return text;
     }
@@ -116,12 +116,12 @@ pub fn csv_field(text: &str) -> Cow<'_, str> {
 pub fn csv_name(field: &str) -> &str {
     let unmarked = field.strip_prefix('\'');
     unmarked
-        .filter(|text| begins_formula(text))
+        .filter(|text| is_spreadsheet_formula(text))
         .unwrap_or(field)
 }
 
 /// Whether a spreadsheet would take a text for a formula, or such a text is marked already.
-fn begins_formula(text: &str) -> bool {
+fn is_spreadsheet_formula(text: &str) -> bool {
     text.trim_start_matches('\'')
         .starts_with(['=', '+', '-', '@'])
 }
@@ -129,8 +129,8 @@ fn begins_formula(text: &str) -> bool {
 /// JSON as a terminal may show it: what does harm within its strings is written as `\u` and four digits, which means the
 /// same.
 pub fn json(text: &str) -> Cow<'_, str> {
-    escaped(Cow::Borrowed(text), |c, out| {
-        if c == '\n' || !super::does_harm(c) {
+    escape_characters(Cow::Borrowed(text), |c, out| {
+        if c == '\n' || !super::is_harmful(c) {
             return out.push(c);
         }
         let mut units = [0; 2];
@@ -141,7 +141,7 @@ pub fn json(text: &str) -> Cow<'_, str> {
 }
 
 /// The text with each character written as `write` does; not copied where that changes nothing.
-fn escaped(text: Cow<'_, str>, mut write: impl FnMut(char, &mut String)) -> Cow<'_, str> {
+fn escape_characters(text: Cow<'_, str>, mut write: impl FnMut(char, &mut String)) -> Cow<'_, str> {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
         write(c, &mut out);

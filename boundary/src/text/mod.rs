@@ -9,7 +9,7 @@ mod escape;
 
 use std::borrow::Cow;
 
-pub use advice::{Advised, spelled};
+pub use advice::{AdviceItem, format_advice};
 pub use escape::{code_in_markdown, comment, csv_field, csv_name, html, json, latex, markdown};
 
 /// Text on one line: line ends and tabs become blanks, and what steers a terminal or the direction of writing becomes
@@ -21,12 +21,12 @@ pub use escape::{code_in_markdown, comment, csv_field, csv_name, html, json, lat
 /// assert_eq!(plain("two\r\nlines\u{1b}[2J"), "two lines\u{fffd}[2J");
 /// ```
 pub fn plain(text: &str) -> Cow<'_, str> {
-    filtered(text, &[])
+    filter_characters(text, &[])
 }
 
 /// As [`plain`], but lines stay lines and tabs stay tabs; line ends of other systems become line feeds.
 pub fn lines(text: &str) -> Cow<'_, str> {
-    filtered(text, &['\n', '\t'])
+    filter_characters(text, &['\n', '\t'])
 }
 
 /// Text for a terminal or standard output: as [`lines`], and where it is `coloured`, what marks text as bold, dim or
@@ -39,7 +39,7 @@ pub fn terminal(text: &str, coloured: bool) -> Cow<'_, str> {
     let mut rest = text;
     while let Some(at) = rest.find('\u{1b}') {
         out.push_str(&lines(&rest[..at]));
-        let mark = colour(&rest[at..]).unwrap_or(0);
+        let mark = colour_mark_length(&rest[at..]).unwrap_or(0);
         if mark == 0 {
             out.push(char::REPLACEMENT_CHARACTER);
         }
@@ -51,7 +51,7 @@ pub fn terminal(text: &str, coloured: bool) -> Cow<'_, str> {
 }
 
 /// Length of the mark of bold, dim or coloured text that a text begins with: `ESC [ numbers m`, none of them hiding text.
-fn colour(text: &str) -> Option<usize> {
+fn colour_mark_length(text: &str) -> Option<usize> {
     let numbers = text.strip_prefix("\u{1b}[")?;
     let end = numbers.find(|c: char| !c.is_ascii_digit() && c != ';')?;
     let is_shown = numbers[..end].split(';').all(|n| {
@@ -61,15 +61,15 @@ fn colour(text: &str) -> Option<usize> {
 }
 
 /// The text without what does harm, but for the characters to be kept.
-fn filtered<'a>(text: &'a str, kept: &[char]) -> Cow<'a, str> {
-    if text.chars().all(|c| kept.contains(&c) || !does_harm(c)) {
+fn filter_characters<'a>(text: &'a str, kept: &[char]) -> Cow<'a, str> {
+    if text.chars().all(|c| kept.contains(&c) || !is_harmful(c)) {
         return Cow::Borrowed(text);
     }
     let mut out = String::with_capacity(text.len());
     let mut chars = text.chars().peekable();
     while let Some(c) = chars.next() {
         out.push(match c {
-            c if kept.contains(&c) || !does_harm(c) => c,
+            c if kept.contains(&c) || !is_harmful(c) => c,
             '\r' if chars.peek() == Some(&'\n') => continue,
             '\r' | '\n' | '\t' | '\u{b}' | '\u{c}' | '\u{85}' | '\u{2028}' | '\u{2029}' => ' ',
             _ => char::REPLACEMENT_CHARACTER,
@@ -79,12 +79,12 @@ fn filtered<'a>(text: &'a str, kept: &[char]) -> Cow<'a, str> {
 }
 
 /// Whether a character moves a cursor, begins a line, turns the direction of writing, or speaks to programs only.
-fn does_harm(c: char) -> bool {
-    c.is_control() || steers_writing(c) || matches!(c, '\u{2028}' | '\u{2029}')
+fn is_harmful(c: char) -> bool {
+    c.is_control() || is_direction_control(c) || matches!(c, '\u{2028}' | '\u{2029}')
 }
 
 /// Whether a character turns the direction of writing, or is not to be seen and says something to programs only.
-fn steers_writing(c: char) -> bool {
+fn is_direction_control(c: char) -> bool {
     matches!(
         c,
         '\u{61c}'
@@ -122,7 +122,7 @@ mod tests {
             csv_field(HOSTILE),
             json(HOSTILE),
         ] {
-            let left = one.chars().find(|c| does_harm(*c));
+            let left = one.chars().find(|c| is_harmful(*c));
             assert_eq!(left, None, "{one:?}");
         }
     }

@@ -1,7 +1,7 @@
 //! Cases drawn from a seed: the forty kinds of `spidermill-harsh` with other sizes, sides, motions and noise. What is hidden and
 //! what is wrong with the recordings come out, with the entry of `truth.json` by which an answer is judged.
 
-use modelmill_rig::Effect;
+use modelmill_rig::RigEffect;
 use serde_json::{Value, json};
 
 use super::course::{Course, Repeats};
@@ -102,12 +102,12 @@ impl Hidden {
         self.kind == "time_delay"
     }
 
-    fn effect(&self, plant: &Plant) -> Result<Effect, String> {
+    fn effect(&self, plant: &Plant) -> Result<RigEffect, String> {
         effect(plant, self.kind, &self.at, &self.values)
     }
 }
 
-fn effect(plant: &Plant, kind: &str, at: &str, values: &[(&str, f64)]) -> Result<Effect, String> {
+fn effect(plant: &Plant, kind: &str, at: &str, values: &[(&str, f64)]) -> Result<RigEffect, String> {
     let made = plant.rig.effect(kind, &[at], values);
     made.map_err(|faults| faults.iter().map(ToString::to_string).collect())
 }
@@ -249,7 +249,7 @@ impl Drawn {
     }
 
     /// Effects of the rig: those that are hidden, and with `known` friction times a factor.
-    pub(crate) fn effects(&self, plant: &Plant, friction: f64) -> Result<Vec<Effect>, String> {
+    pub(crate) fn effects(&self, plant: &Plant, friction: f64) -> Result<Vec<RigEffect>, String> {
         let there = self.hidden.iter().filter(|one| !one.is_of_recording());
         let mut effects = there
             .map(|one| one.effect(plant))
@@ -261,7 +261,7 @@ impl Drawn {
     }
 
     /// The friction that the model knows.
-    pub(crate) fn friction(&self, plant: &Plant, factor: f64) -> Result<Vec<Effect>, String> {
+    pub(crate) fn friction(&self, plant: &Plant, factor: f64) -> Result<Vec<RigEffect>, String> {
         let mut effects = Vec::new();
         for (at, [viscous, coulomb]) in DRIVES.iter().zip(self.known.unwrap_or_default()) {
             let one = |kind, symbol, x| effect(plant, kind, at, &[(symbol, factor * x)]);

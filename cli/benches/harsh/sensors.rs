@@ -3,7 +3,7 @@
 use std::f64::consts::{PI, TAU};
 use std::fmt::Write as _;
 
-use modelmill_rig::{State, Tracker};
+use modelmill_rig::{RigState, RigTracker};
 
 use super::drawn::Drawn;
 use super::plant::{Along, DRIVES, Plant};
@@ -436,7 +436,7 @@ fn forces(
     Ok(rows)
 }
 
-fn payload(plant: &Plant, mass: f64) -> Result<modelmill_rig::Effect, String> {
+fn payload(plant: &Plant, mass: f64) -> Result<modelmill_rig::RigEffect, String> {
     let made = plant
         .rig
         .effect("point_mass", &["R3m_right"], &[("m", mass)]);
@@ -445,12 +445,12 @@ fn payload(plant: &Plant, mass: f64) -> Result<modelmill_rig::Effect, String> {
 
 /// What each N down on the platform adds to the forces, by the weight of a mass there.
 fn weight(plant: &Plant, q: &[f64]) -> Result<Vec<f64>, String> {
-    let still = State {
+    let still = RigState {
         q: q.to_vec(),
         qd: vec![0.0; q.len()],
         qdd: vec![0.0; q.len()],
     };
-    let mut tracker = Tracker::new(&plant.rig).map_err(|error| error.to_string())?;
+    let mut tracker = RigTracker::new(&plant.rig).map_err(|error| error.to_string())?;
     let motion = tracker.follow(&still).map_err(|error| error.to_string())?;
     let mut rig = plant.rig.clone();
     let of = |rig: &modelmill_rig::Rig| {

@@ -1,6 +1,6 @@
 //! Cases: seed and number go in; motion, noise and what is hidden come out, with sizes that show.
 
-use modelmill_rig::{Effect, Rig};
+use modelmill_rig::{RigEffect, Rig};
 use serde_json::{Value, json};
 
 use super::columns::{columns, delay_column, library};
@@ -385,7 +385,7 @@ impl Case {
     }
 
     /// Hidden effects with mass, which friction by load feels.
-    pub(crate) fn masses_hidden(&self) -> Result<Vec<Effect>, String> {
+    pub(crate) fn masses_hidden(&self) -> Result<Vec<RigEffect>, String> {
         let massive = |one: &&Hidden| {
             ["point_mass", "rod_inertia", "gravity_tilt"].contains(&one.placed.kind.as_str())
         };

@@ -1,6 +1,6 @@
 //! Columns of the library along a motion: what each kind could say at a place, whatever its values.
 
-use modelmill_rig::Effect;
+use modelmill_rig::RigEffect;
 
 use super::course::Course;
 use super::hidden::effect;
@@ -16,7 +16,7 @@ pub(crate) fn columns(
     along: &Along,
     placed: &Placed,
     constant: f64,
-    beside: &[Effect],
+    beside: &[RigEffect],
 ) -> Option<Vec<Vec<f64>>> {
     let of = |kind: &str, at: &[String], values: &[(&str, f64)]| {
         let placed = Placed {

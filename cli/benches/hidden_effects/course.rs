@@ -2,8 +2,8 @@
 
 use std::f64::consts::PI;
 
-use modelmill_rig::State;
-use modelmill_spec::Limits;
+use modelmill_rig::RigState;
+use modelmill_spec::MotionLimits;
 
 use super::random::Random;
 
@@ -78,7 +78,7 @@ impl Sum {
 
 impl Course {
     /// Draws a motion that fills most of the limits of positions and keeps those of rates and accelerations.
-    pub(crate) fn draw(random: &mut Random, limits: &Limits, repeats: Repeats) -> Self {
+    pub(crate) fn draw(random: &mut Random, limits: &MotionLimits, repeats: Repeats) -> Self {
         let duration = match repeats {
             Repeats::Thrice => 3.0 * PERIOD,
             Repeats::Twice => 2.0 * PERIOD,
@@ -148,8 +148,8 @@ impl Course {
     }
 
     /// Coordinates with derivatives at a time in s.
-    pub(crate) fn at(&self, t: f64) -> State {
-        let mut state = State::default();
+    pub(crate) fn at(&self, t: f64) -> RigState {
+        let mut state = RigState::default();
         for sum in &self.sums {
             let [q, qd, qdd] = sum.at(t);
             state.q.push(q);

@@ -1,6 +1,6 @@
 //! Effects of the library that can be hidden: kinds at their places, with values of a sensible size.
 
-use modelmill_rig::{Effect, Rig};
+use modelmill_rig::{RigEffect, Rig};
 
 use super::placed::Placed;
 use super::random::{Random, three_digits};
@@ -45,7 +45,7 @@ impl Hidden {
     }
 
     /// As an effect of the rig.
-    pub(crate) fn effect(&self, rig: &Rig) -> Result<Effect, String> {
+    pub(crate) fn effect(&self, rig: &Rig) -> Result<RigEffect, String> {
         effect(rig, &self.placed, &self.values)
     }
 
@@ -82,7 +82,7 @@ impl std::fmt::Display for Hidden {
 }
 
 /// An effect of the rig by names.
-pub(crate) fn effect(rig: &Rig, placed: &Placed, values: &[(&str, f64)]) -> Result<Effect, String> {
+pub(crate) fn effect(rig: &Rig, placed: &Placed, values: &[(&str, f64)]) -> Result<RigEffect, String> {
     let at: Vec<&str> = placed.at.iter().map(String::as_str).collect();
     rig.effect(&placed.kind, &at, values).map_err(|faults| {
         let says: Vec<String> = faults.iter().map(ToString::to_string).collect();

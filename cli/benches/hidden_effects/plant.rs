@@ -2,10 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use modelmill_boundary::files::Disk;
-use modelmill_codegen::{Derivation, Evaluator, States};
-use modelmill_rig::{Effect, Measured, Motion, Place, Rig, State, Tracker};
-use modelmill_spec::Limits;
+use modelmill_boundary::files::DiskFiles;
+use modelmill_codegen::{Derivation, ModelEvaluator, MotionStates};
+use modelmill_rig::{RigEffect, ScalarMotion, RigMotion, RigPlace, Rig, RigState, RigTracker};
+use modelmill_spec::MotionLimits;
 
 use super::course::Course;
 
@@ -61,7 +61,7 @@ impl Plant {
     /// Reads both; `specs` is the folder of the bundled models and rigs.
     pub(crate) fn load(specs: &Path) -> Result<Self, String> {
         let path = specs.join("rigs").join("hidden.toml");
-        let rig = modelmill_rig::load(&path.to_string_lossy(), RIG, &Disk::default())
+        let rig = modelmill_rig::load(&path.to_string_lossy(), RIG, &DiskFiles::default())
             .map_err(|failure| failure.render(false))?
             .rig;
         let model = specs.join("models").join("spidermill.toml");
@@ -80,7 +80,7 @@ impl Plant {
         })
     }
 
-    pub(crate) fn limits(&self) -> &Limits {
+    pub(crate) fn limits(&self) -> &MotionLimits {
         &self.derivation.mechanism.limits
     }
 }
@@ -92,8 +92,8 @@ pub(crate) struct Along {
     /// s
     pub(crate) times: Vec<f64>,
     /// Coordinates as prescribed.
-    pub(crate) states: Vec<State>,
-    motions: Vec<Motion>,
+    pub(crate) states: Vec<RigState>,
+    motions: Vec<RigMotion>,
     /// Forces without effects, N.
     pub(crate) plain: Vec<f64>,
 }
@@ -101,12 +101,12 @@ pub(crate) struct Along {
 impl Along {
     /// Follows a course at the given times; fails where the rig cannot.
     pub(crate) fn new(rig: &Rig, course: &Course, times: Vec<f64>) -> Result<Self, String> {
-        let states: Vec<State> = times.iter().map(|t| course.at(*t)).collect();
-        let mut tracker = Tracker::new(rig).map_err(|error| error.to_string())?;
+        let states: Vec<RigState> = times.iter().map(|t| course.at(*t)).collect();
+        let mut tracker = RigTracker::new(rig).map_err(|error| error.to_string())?;
         let motions = states
             .iter()
             .map(|state| tracker.follow(state))
-            .collect::<Result<Vec<Motion>, _>>()
+            .collect::<Result<Vec<RigMotion>, _>>()
             .map_err(|error| error.to_string())?;
         let mut along = Self {
             rig: rig.clone(),
@@ -124,7 +124,7 @@ impl Along {
     }
 
     /// Forces with effects, N.
-    pub(crate) fn forces(&self, effects: &[Effect]) -> Result<Vec<f64>, String> {
+    pub(crate) fn forces(&self, effects: &[RigEffect]) -> Result<Vec<f64>, String> {
         let mut rig = self.rig.clone();
         rig.effects = effects.to_vec();
         let mut rows = Vec::with_capacity(DRIVES.len() * self.motions.len());
@@ -135,7 +135,7 @@ impl Along {
     }
 
     /// What effects add to the forces, N.
-    pub(crate) fn added(&self, effects: &[Effect]) -> Result<Vec<f64>, String> {
+    pub(crate) fn added(&self, effects: &[RigEffect]) -> Result<Vec<f64>, String> {
         let with = self.forces(effects)?;
         Ok(with.iter().zip(&self.plain).map(|(a, b)| a - b).collect())
     }
@@ -143,8 +143,8 @@ impl Along {
     /// What an effect adds to the forces that others need already, N.
     pub(crate) fn added_beside(
         &self,
-        others: &[Effect],
-        effect: Effect,
+        others: &[RigEffect],
+        effect: RigEffect,
     ) -> Result<Vec<f64>, String> {
         let without = self.forces(others)?;
         let with = self.forces(&[others, &[effect]].concat())?;
@@ -152,32 +152,32 @@ impl Along {
     }
 
     /// Length, rate and acceleration of a drive at each time.
-    pub(crate) fn of_drive(&self, drive: usize) -> Vec<Measured> {
-        self.of_place(Place::Drive(drive)).unwrap_or_default()
+    pub(crate) fn of_drive(&self, drive: usize) -> Vec<ScalarMotion> {
+        self.of_place(RigPlace::Drive(drive)).unwrap_or_default()
     }
 
     /// The same of any place that moves.
-    pub(crate) fn of_place(&self, place: Place) -> Option<Vec<Measured>> {
-        let at = |motion| modelmill_rig::measured(&self.rig, place, motion);
+    pub(crate) fn of_place(&self, place: RigPlace) -> Option<Vec<ScalarMotion>> {
+        let at = |motion| modelmill_rig::place_motion(&self.rig, place, motion);
         self.motions.iter().map(at).collect()
     }
 
     /// Columns of the model's base parameters.
     pub(crate) fn base(&self, derivation: &Derivation) -> Result<Vec<Vec<f64>>, String> {
-        let column = |of: fn(&State) -> &Vec<f64>, k: usize| -> Vec<f64> {
+        let column = |of: fn(&RigState) -> &Vec<f64>, k: usize| -> Vec<f64> {
             self.states.iter().map(|state| of(state)[k]).collect()
         };
-        let all = |of: fn(&State) -> &Vec<f64>| -> Vec<Vec<f64>> {
+        let all = |of: fn(&RigState) -> &Vec<f64>| -> Vec<Vec<f64>> {
             (0..DRIVES.len()).map(|k| column(of, k)).collect()
         };
         let [q, qd, qdd] = [all(|s| &s.q), all(|s| &s.qd), all(|s| &s.qdd)];
-        let states = States {
+        let states = MotionStates {
             q: slices(&q),
             qd: slices(&qd),
             qdd: slices(&qdd),
             load: Vec::new(),
         };
-        let matrix = Evaluator::new(derivation)
+        let matrix = ModelEvaluator::new(derivation)
             .regressor(&states)
             .map_err(|fault| format!("{fault:?}"))?;
         Ok((0..matrix.ncols())

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 use std::fmt::Write as _;
 
-use modelmill_rig::State;
+use modelmill_rig::RigState;
 
 use super::case::{Case, RATE};
 use super::plant::{Along, DRIVES};
@@ -48,10 +48,10 @@ impl Samples {
         mut random: impl FnMut(usize) -> Random,
         full: bool,
     ) -> Self {
-        let column = |of: fn(&State) -> &Vec<f64>, k: usize| -> Vec<f64> {
+        let column = |of: fn(&RigState) -> &Vec<f64>, k: usize| -> Vec<f64> {
             along.states.iter().map(|state| of(state)[k]).collect()
         };
-        let all = |of: fn(&State) -> &Vec<f64>| (0..DRIVES.len()).map(move |k| column(of, k));
+        let all = |of: fn(&RigState) -> &Vec<f64>| (0..DRIVES.len()).map(move |k| column(of, k));
         let with_noise = |(k, exact): (usize, Vec<f64>)| {
             let mut random = random(k);
             let read = exact.iter().map(|q| q + ENCODER_NOISE * random.normal());

@@ -5,8 +5,8 @@ use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 
 use modelmill::Model;
-use modelmill_codegen::{Evaluator, States};
-use modelmill_spec::{CoordinateIdx, CoordinateLimits, Limits};
+use modelmill_codegen::{ModelEvaluator, MotionStates};
+use modelmill_spec::{CoordinateIdx, CoordinateBounds, MotionLimits};
 
 use crate::parts::columns::{columns, library};
 use crate::parts::course::Course;
@@ -88,20 +88,20 @@ impl Machine {
     }
 
     /// What its motions keep.
-    pub(crate) fn limits(&self) -> Limits {
+    pub(crate) fn limits(&self) -> MotionLimits {
         match self {
             Self::SpiderMill(plant) => plant.limits().clone(),
             Self::Arm(model, _) => {
                 let [position, rate, acceleration] = REACH.map(|reach| Some([-reach, reach]));
-                let of_one = CoordinateLimits {
+                let of_one = CoordinateBounds {
                     position,
                     rate,
                     acceleration,
                 };
-                let all = (0..model.active().len()).map(|i| (CoordinateIdx(i), of_one));
-                Limits {
+                let all = (0..model.active_coordinates().len()).map(|i| (CoordinateIdx(i), of_one));
+                MotionLimits {
                     coordinates: all.collect(),
-                    ..Limits::default()
+                    ..MotionLimits::default()
                 }
             }
         }
@@ -157,7 +157,7 @@ fn spidermill(plant: &Plant, course: &Course, rate: f64) -> Result<Scene, String
     }
     let mut states = Vec::new();
     for (k, name) in JOINTS[..2].iter().enumerate() {
-        let of = |pick: fn(&modelmill_rig::State) -> &Vec<f64>| -> Vec<f64> {
+        let of = |pick: fn(&modelmill_rig::RigState) -> &Vec<f64>| -> Vec<f64> {
             along.states.iter().map(|state| pick(state)[k]).collect()
         };
         states.push(((*name).to_owned(), of(|s| &s.q)));
@@ -195,20 +195,20 @@ fn spidermill(plant: &Plant, course: &Course, rate: f64) -> Result<Scene, String
 
 fn arm(model: &Model, course: &Course, rate: f64) -> Result<Scene, String> {
     let times = course.times(rate);
-    let all: Vec<modelmill_rig::State> = times.iter().map(|t| course.at(*t)).collect();
-    let names = model.active();
-    let track = |pick: fn(&modelmill_rig::State) -> &Vec<f64>| -> Vec<Vec<f64>> {
+    let all: Vec<modelmill_rig::RigState> = times.iter().map(|t| course.at(*t)).collect();
+    let names = model.active_coordinates();
+    let track = |pick: fn(&modelmill_rig::RigState) -> &Vec<f64>| -> Vec<Vec<f64>> {
         let of = |k: usize| all.iter().map(|state| pick(state)[k]).collect();
         (0..names.len()).map(of).collect()
     };
     let [q, qd, qdd] = [track(|s| &s.q), track(|s| &s.qd), track(|s| &s.qdd)];
-    let states = States {
+    let states = MotionStates {
         q: q.iter().map(Vec::as_slice).collect(),
         qd: qd.iter().map(Vec::as_slice).collect(),
         qdd: qdd.iter().map(Vec::as_slice).collect(),
         load: Vec::new(),
     };
-    let evaluator = Evaluator::new(&model.derivation);
+    let evaluator = ModelEvaluator::new(&model.derivation);
     let fault = |fault| format!("{fault:?}");
     let plain = evaluator
         .inverse_dynamics(&states, &model.nominal)

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
-use modelmill::generate::{Language, LanguageForm};
+use modelmill::generate::{CodeLanguage, LanguageForm};
 
 /// How equations are printed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -56,20 +56,20 @@ pub(crate) struct GenerateArgs {
     pub(crate) self_test: bool,
     /// What to make: a Rust module, sources of plain C99, or a crate that builds a C library with its header or a Python module
     #[arg(long, value_parser = languages(), default_value = Language::default().name())]
-    pub(crate) language: Language,
+    pub(crate) language: CodeLanguage,
 }
 
 /// The languages by their names.
-fn languages() -> impl TypedValueParser<Value = Language> {
-    let all = Language::all();
+fn languages() -> impl TypedValueParser<Value = CodeLanguage> {
+    let all = CodeLanguage::all();
     let values = all.map(|language| PossibleValue::new(language.name()).help(language.about()));
     let parser = PossibleValuesParser::new(values);
-    parser.map(|name| Language::named(&name).expect("the parser knows these names alone"))
+    parser.map(|name| CodeLanguage::from_name(&name).expect("the parser knows these names alone"))
 }
 
 /// Languages whose files need a folder.
-fn in_folders() -> Vec<(&'static str, &'static str)> {
-    let others = Language::all().filter(|language| language.form() != LanguageForm::Module);
+fn languages_in_folders() -> Vec<(&'static str, &'static str)> {
+    let others = CodeLanguage::all().filter(|language| language.form() != LanguageForm::Module);
     others
         .map(|language| ("language", language.name()))
         .collect()

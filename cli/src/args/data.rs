@@ -3,12 +3,12 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use modelmill::model::Values;
+use modelmill::model::BaseParameterValues;
 use modelmill::{Host, Model};
 
 use crate::args::estimation::{EstimatorArgs, StandstillArgs};
 use crate::args::preparation::PreparationArgs;
-use crate::failure::Outcome;
+use crate::failure::CommandOutcome;
 use crate::terminal;
 
 /// Where the values of the base parameters come from.
@@ -39,11 +39,11 @@ impl ParameterSource {
     }
 
     /// The values of the base parameters of a model, with remarks.
-    pub(crate) fn values(&self, host: &Host, model: &Model) -> Outcome<Vec<f64>> {
-        Ok(self.told(host, model)?.values)
+    pub(crate) fn values(&self, host: &Host, model: &Model) -> CommandOutcome<Vec<f64>> {
+        Ok(self.load_values(host, model)?.values)
     }
 
-    fn told(&self, host: &Host, model: &Model) -> Outcome<Values> {
+    fn load_values(&self, host: &Host, model: &Model) -> CommandOutcome<BaseParameterValues> {
         let values = match self {
             Self::Nominal => model.nominal_values(),
             Self::Fit(path) => {
@@ -58,10 +58,10 @@ impl ParameterSource {
     }
 
     /// The model with these values in the place of the file's.
-    pub(crate) fn in_model(&self, host: &Host, model: Model) -> Outcome<Model> {
+    pub(crate) fn apply_to(&self, host: &Host, model: Model) -> CommandOutcome<Model> {
         Ok(match self {
             Self::Nominal => model,
-            Self::Fit(_) => model.with_fit(&self.told(host, &model)?),
+            Self::Fit(_) => model.with_fit(&self.load_values(host, &model)?),
         })
     }
 
@@ -171,7 +171,7 @@ pub(crate) struct CompareArgs {
 
 /// What is diagnosed, for the commands that do.
 #[derive(Debug, Args)]
-pub(crate) struct AskArgs {
+pub(crate) struct DiagnosisArgs {
     /// Model file (TOML)
     pub(crate) model: PathBuf,
     /// Recordings to find it in (CSV, Parquet, MATLAB, HDF5, MCAP, rosbag2); may be repeated
@@ -194,7 +194,7 @@ pub(crate) struct AskArgs {
 #[derive(Debug, Args)]
 pub(crate) struct DiagnoseArgs {
     #[command(flatten)]
-    pub(crate) ask: AskArgs,
+    pub(crate) diagnosis: DiagnosisArgs,
     /// Print one JSON object on standard output
     #[arg(long, help_heading = None)]
     pub(crate) json: bool,
@@ -204,7 +204,7 @@ pub(crate) struct DiagnoseArgs {
 #[derive(Debug, Args)]
 pub(crate) struct ReportArgs {
     #[command(flatten)]
-    pub(crate) ask: AskArgs,
+    pub(crate) diagnosis: DiagnosisArgs,
     /// Write the page `report.html` into this folder
     #[arg(long, value_name = "DIR", help_heading = None)]
     pub(crate) out: PathBuf,

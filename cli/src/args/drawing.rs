@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use modelmill::Model;
-use modelmill::picture::{Drawing, Style};
+use modelmill::picture::{PictureOptions, DrawingStyle};
 
-use crate::failure::Outcome;
-use crate::output::Target;
+use crate::failure::CommandOutcome;
+use crate::output::OutputFile;
 
 /// What is drawn, and where to.
 #[derive(Debug, Args)]
@@ -34,24 +34,24 @@ impl DrawingArgs {
     pub(crate) fn target<'a>(
         &self,
         inputs: impl IntoIterator<Item = &'a Path>,
-    ) -> Outcome<Option<Target>> {
+    ) -> CommandOutcome<Option<OutputFile>> {
         let path = self.picture.as_ref();
-        path.map(|path| Target::of("--picture", path, inputs))
+        path.map(|path| OutputFile::for_flag("--picture", path, inputs))
             .transpose()
     }
 
     /// Draws a model, over another one if there is one.
-    pub(crate) fn draw(&self, target: &Target, model: &Model, before: Option<&Model>) -> Outcome {
-        let drawing = Drawing {
+    pub(crate) fn draw(&self, target: &OutputFile, model: &Model, before: Option<&Model>) -> CommandOutcome {
+        let drawing = PictureOptions {
             at: self.at.clone(),
             from: self
                 .view
                 .map(|[azimuth, elevation]| [azimuth.to_radians(), elevation.to_radians()]),
-            style: Style {
+            style: DrawingStyle {
                 frames: self.frames,
-                ..Style::default()
+                ..DrawingStyle::default()
             },
-            ..Drawing::default()
+            ..PictureOptions::default()
         };
         target.write(&model.picture(&drawing, before)?)
     }

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use modelmill::add::{Said, Setting};
+use modelmill::add::{SettingValue, EffectSetting};
 
 /// `effects`.
 #[derive(Debug, Args)]
@@ -32,7 +32,7 @@ pub(crate) struct AddArgs {
     /// Nominal value of a parameter (`Fc=25.9`) or its name (`Fc.name=Fc_left`), or the value of a constant (`vs=0.02`),
     /// in SI units; may be repeated
     #[arg(long, value_name = "NAME=VALUE", value_parser = parse_setting, allow_hyphen_values = true)]
-    pub(crate) set: Vec<Setting>,
+    pub(crate) set: Vec<EffectSetting>,
     /// A remark that stands above the effect
     #[arg(long, value_name = "TEXT")]
     pub(crate) comment: Option<String>,
@@ -48,21 +48,21 @@ pub(crate) struct AddArgs {
 }
 
 /// Reads `NAME=VALUE` or `NAME.name=NAME`.
-fn parse_setting(text: &str) -> Result<Setting, String> {
+fn parse_setting(text: &str) -> Result<EffectSetting, String> {
     let (left, right) = text
         .split_once('=')
         .ok_or("expected NAME=VALUE, such as Fc=25.9 or Fc.name=Fc_left")?;
     let (left, right) = (left.trim(), right.trim());
     if let Some(symbol) = left.strip_suffix(".name") {
-        return Ok(Setting {
+        return Ok(EffectSetting {
             symbol: symbol.to_owned(),
-            said: Said::Name(right.to_owned()),
+            value: SettingValue::Name(right.to_owned()),
         });
     }
     match right.parse::<f64>() {
-        Ok(value) if value.is_finite() => Ok(Setting {
+        Ok(value) if value.is_finite() => Ok(EffectSetting {
             symbol: left.to_owned(),
-            said: Said::Value(value),
+            value: SettingValue::Value(value),
         }),
         _ => Err(format!(
             "`{right}` is no finite number; to name a parameter write {left}.name={right}"

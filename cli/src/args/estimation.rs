@@ -1,7 +1,7 @@
 //! Options that say how parameters are estimated.
 
 use clap::{Args, ValueEnum};
-use modelmill::identify::{Estimation, HUBER_BOUND, Refinement, Weights};
+use modelmill::identify::{EstimatorOptions, HUBER_BOUND, EstimateRefinement, EquationWeights};
 
 use super::preparation::parse_map;
 
@@ -63,27 +63,27 @@ pub(crate) struct StandstillArgs {
 
 impl EstimatorArgs {
     /// As the library wants it.
-    pub(crate) fn options(&self, standstill: &StandstillArgs) -> Estimation {
-        Estimation {
+    pub(crate) fn options(&self, standstill: &StandstillArgs) -> EstimatorOptions {
+        EstimatorOptions {
             weights: match self.weights {
-                WeightsArg::Auto => Weights::Automatic,
-                WeightsArg::None => Weights::None,
-                WeightsArg::Channels => Weights::Channels,
-                WeightsArg::Variance => Weights::Variance,
+                WeightsArg::Auto => EquationWeights::Automatic,
+                WeightsArg::None => EquationWeights::None,
+                WeightsArg::Channels => EquationWeights::Channels,
+                WeightsArg::Variance => EquationWeights::Variance,
             },
             robust: self.robust,
             refinement: match self.prior {
-                Some(sigma) => Refinement::Prior(sigma),
-                None if self.physical => Refinement::Physical,
-                None if self.essential => Refinement::Essential,
-                None => Refinement::None,
+                Some(sigma) => EstimateRefinement::Prior(sigma),
+                None if self.physical => EstimateRefinement::Physical,
+                None if self.essential => EstimateRefinement::Essential,
+                None => EstimateRefinement::None,
             },
             standstill: standstill.standstill,
         }
     }
 }
 
-fn parse_part(text: &str) -> Result<f64, String> {
+fn parse_fraction(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(part) if part > 0.0 && part < 1.0 => Ok(part),
         _ => Err("expected a number between 0 and 1, such as 0.01".to_owned()),

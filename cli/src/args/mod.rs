@@ -24,7 +24,7 @@ use work::WorkArgs;
 
 pub(crate) use code::{AtlasArgs, EquationsArgs, EquationsFormat, GenerateArgs};
 pub(crate) use data::{
-    AdoptArgs, AskArgs, CompareArgs, DiagnoseArgs, EvaluateArgs, IdentifyArgs, InterpretArgs,
+    AdoptArgs, DiagnosisArgs, CompareArgs, DiagnoseArgs, EvaluateArgs, IdentifyArgs, InterpretArgs,
     ParameterSource, RecordingsArgs, ReportArgs,
 };
 pub(crate) use motion::{CriterionArg, ExciteArgs, ExperimentArgs, SimulateArgs};
@@ -41,10 +41,10 @@ pub(crate) use rig::{ExportArgs, ImportArgs, ReduceArgs};
         modelmill help COMMAND                       options and examples of one command\n\n\
         Exit status: 0 done, 1 the input is at fault (with the place and what to do), 2 wrong usage."
 )]
-pub(crate) struct Cli {
+pub(crate) struct CommandLine {
     /// What to do.
     #[command(subcommand)]
-    pub(crate) command: Command,
+    pub(crate) command: ProgramCommand,
     /// A library of further kinds of effects (TOML), for every model that is read; may be repeated
     #[arg(long, global = true, value_name = "FILE")]
     pub(crate) library: Vec<PathBuf>,
@@ -56,7 +56,7 @@ pub(crate) struct Cli {
 
 /// The commands.
 #[derive(Debug, Subcommand)]
-pub(crate) enum Command {
+pub(crate) enum ProgramCommand {
     /// Validate a model file and print a summary
     #[command(
         after_help = "The numeric rank, eq. (9), is that of the regressor at random states with the file's values. Its gap is the \

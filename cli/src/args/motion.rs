@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use modelmill::excite::Limit;
+use modelmill::excite::TrajectoryLimit;
 
 use crate::args::data::ParameterSource;
 use crate::args::preparation;
@@ -55,7 +55,7 @@ pub(crate) struct ExciteArgs {
     /// (`theta1_d=1.2`) or acceleration (`theta1_dd=4`), the force of a drive (`spindle_left=1500`), a point
     /// (`R3m.x=0.2:0.7`), or `singularity=0.3`; may be repeated
     #[arg(long, value_name = "NAME=RANGE", value_delimiter = ',', value_parser = Limit::parse, allow_hyphen_values = true)]
-    pub(crate) limits: Vec<Limit>,
+    pub(crate) limits: Vec<TrajectoryLimit>,
     /// What is made small
     #[arg(long, value_enum, default_value = "condition")]
     pub(crate) criterion: CriterionArg,

@@ -3,9 +3,9 @@
 use std::fmt::Write as _;
 
 use clap::{Args, ValueEnum};
-use modelmill::recording::{DerivativeSource, MAX_FILTER_ORDER, Preparation, Reading, Smoothing};
+use modelmill::recording::{DerivativeSource, MAX_FILTER_ORDER, StatePreparation, RecordingOptions, SmoothingMethod};
 
-use crate::flags::quoted;
+use crate::flags::quote_word;
 
 /// Order of the low-pass where none is asked for.
 const USUAL_ORDER: usize = 4;
@@ -84,8 +84,8 @@ pub(crate) enum SmoothingArg {
 
 impl PreparationArgs {
     /// As the library wants it.
-    pub(crate) fn reading(&self) -> Reading {
-        Reading {
+    pub(crate) fn reading(&self) -> RecordingOptions {
+        RecordingOptions {
             columns: self.map.clone(),
             preparation: self.preparation(),
             skip_bad_samples: self.skip_bad_samples,
@@ -95,11 +95,11 @@ impl PreparationArgs {
     }
 
     /// The options that were given, as the command line has them, each with a space before it.
-    pub(crate) fn spelled(&self) -> String {
+    pub(crate) fn to_flags(&self) -> String {
         let mut all = String::new();
         let mut option = |name: &str, value: Option<String>| {
             if let Some(value) = value {
-                let _ = write!(all, " --{name} {}", quoted(&value));
+                let _ = write!(all, " --{name} {}", quote_word(&value));
             }
         };
         for (ours, theirs) in &self.map {
@@ -143,8 +143,8 @@ impl PreparationArgs {
         all
     }
 
-    fn preparation(&self) -> Preparation {
-        Preparation {
+    fn preparation(&self) -> StatePreparation {
+        StatePreparation {
             cutoff_hz: self.cutoff,
             order: self.order.unwrap_or(USUAL_ORDER),
             trim: self.trim,
@@ -156,16 +156,16 @@ impl PreparationArgs {
             },
             smoothing: match self.smoothing {
                 SmoothingArg::Auto => match self.period {
-                    None => Smoothing::Automatic,
-                    period => Smoothing::Fourier { period },
+                    None => SmoothingMethod::Automatic,
+                    period => SmoothingMethod::Fourier { period },
                 },
-                SmoothingArg::Butterworth => Smoothing::Butterworth,
-                SmoothingArg::SavitzkyGolay => Smoothing::SavitzkyGolay,
-                SmoothingArg::Fourier => Smoothing::Fourier {
+                SmoothingArg::Butterworth => SmoothingMethod::Butterworth,
+                SmoothingArg::SavitzkyGolay => SmoothingMethod::SavitzkyGolay,
+                SmoothingArg::Fourier => SmoothingMethod::Fourier {
                     period: self.period,
                 },
             },
-            ..Preparation::default()
+            ..StatePreparation::default()
         }
     }
 }

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use modelmill::export::Format;
+use modelmill::export::DescriptionFormat;
 
 use super::drawing::parse_value;
 
@@ -56,14 +56,14 @@ pub(crate) struct ExportArgs {
     pub(crate) parameters: Option<PathBuf>,
     /// Format; by the ending of --out if not given (.urdf, .xml)
     #[arg(long, value_name = "urdf|mjcf", value_parser = parse_format)]
-    pub(crate) format: Option<Format>,
+    pub(crate) format: Option<DescriptionFormat>,
     /// Write the description to this file
     #[arg(long, value_name = "FILE.urdf|FILE.xml")]
     pub(crate) out: PathBuf,
 }
 
-fn parse_format(text: &str) -> Result<Format, String> {
-    let named = |one: &Format| one.name() == text;
-    let found = Format::ALL.into_iter().find(named);
+fn parse_format(text: &str) -> Result<DescriptionFormat, String> {
+    let named = |one: &DescriptionFormat| one.name() == text;
+    let found = DescriptionFormat::ALL.into_iter().find(named);
     found.ok_or_else(|| "expected `urdf` or `mjcf`".to_owned())
 }

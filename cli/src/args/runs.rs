@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use modelmill::runs::{Asked, KnownLoad, PerRun};
+use modelmill::runs::{RunsOptions, KnownLoad, PerRunSelection};
 
 use crate::args::preparation::PreparationArgs;
 
@@ -33,7 +33,7 @@ pub(crate) struct RunsArgs {
     pub(crate) data: Vec<PathBuf>,
     /// Fit all runs at once, in which these are each run's own, separated by commas, e.g. `payload@flange,friction`
     #[arg(long, value_name = "WHAT", value_delimiter = ',', value_parser = PerRun::parse)]
-    per_run: Vec<PerRun>,
+    per_run: Vec<PerRunSelection>,
     /// A run carried a load of known mass, in kg, from which the scales of all measured forces follow; may be repeated
     #[arg(long, value_name = "RUN=MASS@BODY", value_parser = KnownLoad::parse)]
     load: Vec<KnownLoad>,
@@ -49,8 +49,8 @@ pub(crate) struct RunsArgs {
 
 impl RunsArgs {
     /// What is asked beside what changed.
-    pub(crate) fn asked(&self) -> Asked {
-        Asked {
+    pub(crate) fn runs_options(&self) -> RunsOptions {
+        RunsOptions {
             per_run: self.per_run.clone(),
             loads: self.load.clone(),
         }

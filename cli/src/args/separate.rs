@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use modelmill::diagnose::Named;
-use modelmill::excite::Separate;
-use modelmill::recording::Reading;
+use modelmill::diagnose::NamedEffect;
+use modelmill::excite::SeparationRequest;
+use modelmill::recording::RecordingOptions;
 
 /// Which effects are to be told apart.
 #[derive(Debug, Args)]
@@ -15,13 +15,13 @@ pub(crate) struct SeparateArgs {
     /// parameters and constants in SI units follow the places: `coulomb_friction@motor:Fc=25.9`
     #[arg(long, value_name = "KIND@PLACE,...[:NAME=VALUE]", value_parser = Named::parse, requires = "from",
           conflicts_with = "criterion")]
-    pub(crate) separate: Option<Named>,
+    pub(crate) separate: Option<NamedEffect>,
     /// What it may be taken for; may be repeated. Constants without a value are fitted like parameters
     #[arg(long, value_name = "KIND@PLACE,...", value_parser = Named::parse, requires = "separate")]
-    pub(crate) from: Vec<Named>,
+    pub(crate) from: Vec<NamedEffect>,
     /// An effect that is there in either case and that the model file lacks; may be repeated
     #[arg(long, value_name = "KIND@PLACE,...[:NAME=VALUE]", value_parser = Named::parse, requires = "separate")]
-    pub(crate) beside: Vec<Named>,
+    pub(crate) beside: Vec<NamedEffect>,
     /// Standard deviation of the noise in the forces, in N or N m, against which the difference is held
     #[arg(long, value_name = "SIZE", value_parser = parse_noise, requires = "separate", allow_negative_numbers = true)]
     pub(crate) noise: Option<f64>,
@@ -36,20 +36,20 @@ pub(crate) struct SeparateArgs {
 
 impl SeparateArgs {
     /// What is to be told apart, if anything is.
-    pub(crate) fn asked(&self) -> Option<Separate> {
-        Some(Separate {
+    pub(crate) fn separation_request(&self) -> Option<SeparationRequest> {
+        Some(SeparationRequest {
             effect: self.separate.clone()?,
             from: self.from.clone(),
-            beside: self.beside.clone(),
+            common_effects: self.beside.clone(),
             noise: self.noise,
         })
     }
 
     /// How the recordings are read.
-    pub(crate) fn reading(&self) -> Reading {
-        Reading {
+    pub(crate) fn reading(&self) -> RecordingOptions {
+        RecordingOptions {
             columns: self.map.clone(),
-            ..Reading::default()
+            ..RecordingOptions::default()
         }
     }
 }

@@ -2,22 +2,22 @@
 
 use modelmill::Host;
 use modelmill::add::new_effect;
-use modelmill::edit::Edited;
+use modelmill::edit::EditedModel;
 use modelmill::print::edit;
 use serde_json::json;
 
 use crate::args::effects::AddArgs;
-use crate::failure::Outcome;
-use crate::output::{self, Target};
+use crate::failure::CommandOutcome;
+use crate::output::{self, OutputFile};
 use crate::{commands, terminal};
 
 /// Edits the model file, prints the difference, and writes the result where the user asks for it.
-pub(crate) fn run(host: &Host, args: &AddArgs) -> Outcome {
+pub(crate) fn run(host: &Host, args: &AddArgs) -> CommandOutcome {
     let before = commands::load_quietly(host, &args.model)?;
     let target = args
         .out
         .as_ref()
-        .map(|path| Target::new(path, before.sources.paths()))
+        .map(|path| OutputFile::new(path, before.sources.paths()))
         .transpose()?;
     let old = before.sources.files.first();
     let old = old.map_or("", |file| &file.text);
@@ -25,13 +25,13 @@ pub(crate) fn run(host: &Host, args: &AddArgs) -> Outcome {
     effect.comment.clone_from(&args.comment);
     let path = args.model.display().to_string();
     let edited = host.edit(&path, old, &effect)?;
-    let edited = elsewhere(host, edited, target.as_ref())?;
+    let edited = reload_at_target(host, edited, target.as_ref())?;
     if !edited.loaded.warnings.is_empty() {
-        let warnings = edited.loaded.render(terminal::errors_in_colour());
-        terminal::say(warnings.trim_end());
+        let warnings = edited.loaded.render(terminal::is_stderr_coloured());
+        terminal::print_to_stderr(warnings.trim_end());
     }
     // What `check` would say beyond the file itself: whether the model can be derived.
-    let derived = commands::derived(host, &path, edited.loaded)?;
+    let derived = commands::derive_model(host, &path, edited.loaded)?;
     let written = match (&target, args.in_place) {
         (Some(target), _) => {
             target.write(&edited.text)?;
@@ -48,12 +48,12 @@ pub(crate) fn run(host: &Host, args: &AddArgs) -> Outcome {
     if args.json {
         return terminal::print_json(&json!({
             "model": derived.name,
-            "effect": edit::described(&edited.effect),
+            "effect": edit::effect_json(&edited.effect),
             "diff": difference,
             "written": written,
         }));
     }
-    terminal::print(&edit::coloured(&difference, terminal::style()))?;
+    terminal::print(&edit::colour_diff(&difference, terminal::style()))?;
     match written {
         Some(name) => terminal::note(&format!(
             "{name} is written; `modelmill diff` says what the effect changes"
@@ -66,10 +66,10 @@ pub(crate) fn run(host: &Host, args: &AddArgs) -> Outcome {
 }
 
 /// The model as it would be read from where it is written: paths in it start from its folder.
-fn elsewhere(host: &Host, edited: Edited, target: Option<&Target>) -> Outcome<Edited> {
+fn reload_at_target(host: &Host, edited: EditedModel, target: Option<&OutputFile>) -> CommandOutcome<EditedModel> {
     let Some(target) = target else {
         return Ok(edited);
     };
     let loaded = host.load_text(target.path(), &edited.text)?;
-    Ok(Edited { loaded, ..edited })
+    Ok(EditedModel { loaded, ..edited })
 }

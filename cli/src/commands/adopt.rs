@@ -7,12 +7,12 @@ use modelmill::print::edit;
 use serde_json::json;
 
 use crate::args::AdoptArgs;
-use crate::failure::Outcome;
-use crate::output::{self, Target};
+use crate::failure::CommandOutcome;
+use crate::output::{self, OutputFile};
 use crate::{commands, terminal};
 
 /// Edits the model file, prints the difference, and writes the result where the user asks for it.
-pub(crate) fn run(host: &Host, args: &AdoptArgs) -> Outcome {
+pub(crate) fn run(host: &Host, args: &AdoptArgs) -> CommandOutcome {
     let model = commands::model(host, &args.model)?;
     let inputs = model
         .files()
@@ -20,7 +20,7 @@ pub(crate) fn run(host: &Host, args: &AdoptArgs) -> Outcome {
     let target = args
         .out
         .as_ref()
-        .map(|path| Target::new(path, inputs))
+        .map(|path| OutputFile::new(path, inputs))
         .transpose()?;
     let fit = host.fit(&args.fit)?;
     let adoption = model.adopt(&fit, &args.fit.display().to_string())?;
@@ -33,7 +33,7 @@ pub(crate) fn run(host: &Host, args: &AdoptArgs) -> Outcome {
         Some(target) => host.load_text(target.path(), &adoption.text)?,
         None => adoption.loaded,
     };
-    commands::derived(host, &path, loaded)?;
+    commands::derive_model(host, &path, loaded)?;
     let written = match (&target, args.in_place) {
         (Some(target), _) => {
             target.write(&adoption.text)?;
@@ -56,7 +56,7 @@ pub(crate) fn run(host: &Host, args: &AdoptArgs) -> Outcome {
             "written": written,
         }));
     }
-    terminal::print(&edit::coloured(&difference, terminal::style()))?;
+    terminal::print(&edit::colour_diff(&difference, terminal::style()))?;
     terminal::note(&match written {
         Some(name) => format!("{name} is written; its nominal values are those of the fit now"),
         None => "nothing is written; add --in-place to change the model file, or --out FILE to write another one".to_owned(),

@@ -5,16 +5,16 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use modelmill::Host;
-use modelmill::atlas::{self, Entry};
+use modelmill::atlas::{self, AtlasEntry};
 use modelmill::import::Options;
-use modelmill::model::Loaded;
-use modelmill::picture::Drawing;
-use modelmill::report::{self, Pictured};
+use modelmill::model::LoadedModel;
+use modelmill::picture::PictureOptions;
+use modelmill::report::{self, AtlasMechanism};
 
 use crate::args::AtlasArgs;
 use crate::commands::{self, import};
-use crate::failure::{Failure, Outcome};
-use crate::output::{self, Target};
+use crate::failure::{CommandFailure, CommandOutcome};
+use crate::output::{self, OutputFile};
 use crate::terminal;
 
 /// Name of the table in its folder, of all in one page, and of the folder of what the table links to.
@@ -23,7 +23,7 @@ const PAGE: &str = "atlas.html";
 const PAGES: &str = "atlas";
 
 /// Derives all models and writes the atlas.
-pub(crate) fn run(host: &Host, args: &AtlasArgs) -> Outcome {
+pub(crate) fn run(host: &Host, args: &AtlasArgs) -> CommandOutcome {
     let folder = args.out.join(PAGES);
     output::make_folder(&folder)?;
     let mut names = BTreeSet::new();
@@ -32,42 +32,42 @@ pub(crate) fn run(host: &Host, args: &AtlasArgs) -> Outcome {
     for path in &args.models {
         let is_imported = import::is_description(path);
         let loaded = if is_imported {
-            described(host, path)?
+            load_description(host, path)?
         } else {
             commands::load(host, path)?
         };
         let start = Instant::now();
-        let model = commands::derived(host, &path.display().to_string(), loaded)?;
+        let model = commands::derive_model(host, &path.display().to_string(), loaded)?;
         let seconds = start.elapsed().as_secs_f64();
         if !names.insert(model.name.clone()) {
-            return Err(Failure::Input(format!(
+            return Err(CommandFailure::Input(format!(
                 "{}: another model of the atlas is called `{}` too; give one of the files another name",
                 path.display(),
                 model.name
             )));
         }
-        let entry = Entry {
+        let entry = AtlasEntry {
             is_imported,
             ..model.atlas(Some(seconds))?
         };
         let file = |ending: &str| {
             let file = folder.join(format!("{}.{ending}", model.name));
-            Target::new(&file, args.models.iter().map(PathBuf::as_path))
+            OutputFile::new(&file, args.models.iter().map(PathBuf::as_path))
         };
-        let picture = model.picture(&Drawing::default(), None)?;
+        let picture = model.picture(&PictureOptions::default(), None)?;
         file("svg")?.write(&picture)?;
         if !is_imported {
             file("md")?.write(&model.atlas_page(&entry))?;
         }
         entries.push(entry.clone());
-        mechanisms.push(Pictured {
+        mechanisms.push(AtlasMechanism {
             entry,
             model,
             picture: picture.replacen(" xmlns=\"http://www.w3.org/2000/svg\"", "", 1),
         });
     }
     let write = |name: &str, text: &str| {
-        let target = Target::new(
+        let target = OutputFile::new(
             &args.out.join(name),
             args.models.iter().map(PathBuf::as_path),
         )?;
@@ -85,8 +85,8 @@ pub(crate) fn run(host: &Host, args: &AtlasArgs) -> Outcome {
 }
 
 /// The model of a robot description, as `import` makes it of the file alone.
-fn described(host: &Host, path: &Path) -> Outcome<Loaded> {
+fn load_description(host: &Host, path: &Path) -> CommandOutcome<LoadedModel> {
     let closures = import::closures_of(path, None);
-    let imported = import::imported(host, path, closures.as_deref(), Options::default())?;
+    let imported = import::import_description(host, path, closures.as_deref(), Options::default())?;
     Ok(host.load_text(path, &imported.model)?)
 }

@@ -3,20 +3,20 @@
 use modelmill::{Error, Host, print};
 
 use crate::args::CheckArgs;
-use crate::failure::{Failure, Outcome};
+use crate::failure::{CommandFailure, CommandOutcome};
 use crate::{commands, terminal};
 
 /// Validates and derives the model, and prints a summary.
-pub(crate) fn run(host: &Host, args: &CheckArgs) -> Outcome {
+pub(crate) fn run(host: &Host, args: &CheckArgs) -> CommandOutcome {
     let model = match commands::model(host, &args.model) {
-        Err(Failure::Library(fault)) if args.json && !matches!(fault, Error::Cancelled) => {
+        Err(CommandFailure::Library(fault)) if args.json && !matches!(fault, Error::Cancelled) => {
             // What is wrong goes to standard output as well, for editors.
             let told = match &fault {
                 Error::Model(faults) => print::faults(faults),
                 fault => print::refusal(&fault.to_string(), &args.model.display().to_string()),
             };
             terminal::print_json(&told)?;
-            return Err(Failure::Library(fault));
+            return Err(CommandFailure::Library(fault));
         }
         model => model?,
     };

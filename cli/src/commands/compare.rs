@@ -3,11 +3,11 @@
 use modelmill::Host;
 
 use crate::args::CompareArgs;
-use crate::failure::Outcome;
+use crate::failure::CommandOutcome;
 use crate::{commands, terminal};
 
 /// Prints error figures and the regions where the error lives.
-pub(crate) fn run(host: &Host, args: &CompareArgs) -> Outcome {
+pub(crate) fn run(host: &Host, args: &CompareArgs) -> CommandOutcome {
     let model = commands::model(host, &args.model)?;
     let values = args.parameters.values(host, &model)?;
     let data = commands::recordings(&model, &args.data, &args.preparation.reading())?;

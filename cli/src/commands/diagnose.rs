@@ -1,22 +1,22 @@
 //! `diagnose`: which effect is missing, and what speaks for it.
 
 use modelmill::Host;
-use modelmill::diagnose::Question;
+use modelmill::diagnose::DiagnosisOptions;
 
 use crate::args::DiagnoseArgs;
 use crate::commands;
-use crate::failure::Outcome;
-use crate::flags::Flags;
+use crate::failure::CommandOutcome;
+use crate::flags::CommandLineAdvice;
 use crate::terminal;
 
 /// Prints what is missing, or that nothing is, or that nothing known explains it.
-pub(crate) fn run(host: &Host, args: &DiagnoseArgs) -> Outcome {
-    let flags = Flags::from_args(&args.ask);
-    let question = Question {
-        held: args.ask.held(),
-        ..Question::default()
+pub(crate) fn run(host: &Host, args: &DiagnoseArgs) -> CommandOutcome {
+    let flags = CommandLineAdvice::from_args(&args.diagnosis);
+    let question = DiagnosisOptions {
+        fixed: args.diagnosis.fixed_parameters(),
+        ..DiagnosisOptions::default()
     };
-    let findings = commands::diagnose(host, &args.ask, question)?;
+    let findings = commands::diagnose(host, &args.diagnosis, question)?;
     if args.json {
         return terminal::print_json(&findings.json(&flags));
     }

@@ -6,14 +6,14 @@ use modelmill::Host;
 use modelmill::text::table::count;
 
 use crate::args::{EvaluateArgs, ParameterSource};
-use crate::failure::{Failure, Outcome};
-use crate::output::Target;
+use crate::failure::{CommandFailure, CommandOutcome};
+use crate::output::OutputFile;
 use crate::{commands, terminal};
 
 /// Writes `t` and one column per drive, or per component of a reaction.
-pub(crate) fn run(host: &Host, args: &EvaluateArgs) -> Outcome {
+pub(crate) fn run(host: &Host, args: &EvaluateArgs) -> CommandOutcome {
     if args.reactions && args.parameters != ParameterSource::Nominal {
-        return Err(Failure::Usage(
+        return Err(CommandFailure::Usage(
             "--reactions takes the model file's parameters: a fit holds base parameters, and joints are loaded by what no \
              drive feels; write identified masses and inertias into the model file (`interpret`, `identify --physical`)"
                 .to_owned(),
@@ -26,7 +26,7 @@ pub(crate) fn run(host: &Host, args: &EvaluateArgs) -> Outcome {
     let target = args
         .out
         .as_ref()
-        .map(|path| Target::new(path, inputs))
+        .map(|path| OutputFile::new(path, inputs))
         .transpose()?;
     let values = args.parameters.values(host, &model)?;
     let reading = args.preparation.reading();

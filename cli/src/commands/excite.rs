@@ -4,23 +4,23 @@
 use std::path::PathBuf;
 
 use modelmill::Host;
-use modelmill::excite::{Criterion, Options, Request};
+use modelmill::excite::{ExcitationCriterion, Options, ExcitationRequest};
 use modelmill::text::table::count;
 
 use crate::args::{CriterionArg, ExciteArgs};
-use crate::failure::{Failure, Outcome};
-use crate::output::Target;
+use crate::failure::{CommandFailure, CommandOutcome};
+use crate::output::OutputFile;
 use crate::{commands, terminal};
 
 /// Searches, and writes the trajectory and its picture.
-pub(crate) fn run(host: &Host, args: &ExciteArgs) -> Outcome {
+pub(crate) fn run(host: &Host, args: &ExciteArgs) -> CommandOutcome {
     let model = args
         .parameters
-        .in_model(host, commands::model(host, &args.model)?)?;
-    let target = Target::new(&args.out, model.files())?;
-    let figure = Target::new(&figure_path(args), model.files())?;
+        .apply_to(host, commands::model(host, &args.model)?)?;
+    let target = OutputFile::new(&args.out, model.files())?;
+    let figure = OutputFile::new(&figure_path(args), model.files())?;
     if figure.path() == target.path() {
-        return Err(Failure::Usage(
+        return Err(CommandFailure::Usage(
             "--out and --figure name the same file; the trajectory is CSV, the picture SVG"
                 .to_owned(),
         ));
@@ -51,14 +51,14 @@ fn figure_path(args: &ExciteArgs) -> PathBuf {
 }
 
 impl ExciteArgs {
-    fn request(&self) -> Request {
-        Request {
+    fn request(&self) -> ExcitationRequest {
+        ExcitationRequest {
             options: Options {
                 harmonics: self.harmonics,
                 period: self.period,
                 criterion: match self.criterion {
-                    CriterionArg::Condition => Criterion::Condition,
-                    CriterionArg::LogDet => Criterion::LogDet,
+                    CriterionArg::Condition => ExcitationCriterion::Condition,
+                    CriterionArg::LogDet => ExcitationCriterion::LogDet,
                 },
                 random: self.random,
                 starts: self.starts,
@@ -67,7 +67,7 @@ impl ExciteArgs {
             },
             rate: self.rate,
             limits: self.limits.clone(),
-            separate: self.separate.asked(),
+            separate: self.separate.separation_request(),
         }
     }
 }

@@ -3,17 +3,17 @@
 use std::path::Path;
 
 use modelmill::Host;
-use modelmill::files::{Disk, Files};
-use modelmill::generate::{Code, EmittedFile, Language, LanguageForm};
+use modelmill::files::{DiskFiles, FileSource};
+use modelmill::generate::{CodeOptions, EmittedFile, CodeLanguage, LanguageForm};
 use modelmill::text::table::count;
 
 use crate::args::GenerateArgs;
-use crate::failure::{Failure, Outcome};
-use crate::output::{Target, refuse_dash, write};
+use crate::failure::{CommandFailure, CommandOutcome};
+use crate::output::{OutputFile, refuse_dash, write};
 use crate::{commands, terminal};
 
 /// Writes the source that `cargo build` makes of the model, or the folder of a crate.
-pub(crate) fn run(host: &Host, args: &GenerateArgs) -> Outcome {
+pub(crate) fn run(host: &Host, args: &GenerateArgs) -> CommandOutcome {
     let more = [
         ("--reactions", args.reactions),
         ("--self-test", args.self_test),
@@ -21,9 +21,9 @@ pub(crate) fn run(host: &Host, args: &GenerateArgs) -> Outcome {
     if let Some((flag, _)) = more.iter().find(|(_, asked)| *asked)
         && !args.language.has_all()
     {
-        let able = Language::all().filter(|language| language.has_all());
-        let able: Vec<&str> = able.map(Language::name).collect();
-        return Err(Failure::Usage(format!(
+        let able = CodeLanguage::all().filter(|language| language.has_all());
+        let able: Vec<&str> = able.map(CodeLanguage::name).collect();
+        return Err(CommandFailure::Usage(format!(
             "{flag} goes with --language {} only; leave it out, or leave --language out",
             able.join(" and ")
         )));
@@ -31,24 +31,24 @@ pub(crate) fn run(host: &Host, args: &GenerateArgs) -> Outcome {
     let model = commands::model(host, &args.model)?;
     let form = args.language.form();
     let target = match (&args.out, form) {
-        (Some(path), LanguageForm::Module) => Some(Target::new(path, model.files())?),
+        (Some(path), LanguageForm::Module) => Some(OutputFile::new(path, model.files())?),
         _ => None,
     };
-    let files = model.generate(&Code {
+    let files = model.generate(&CodeOptions {
         language: args.language,
         dynamics: args.dynamics,
         reactions: args.reactions,
         self_test: args.self_test,
     })?;
     let makes = match form {
-        LanguageForm::Module => return module(target.as_ref(), &files),
+        LanguageForm::Module => return write_module(target.as_ref(), &files),
         LanguageForm::Sources => {
-            return sources(args, &model.files().collect::<Vec<&Path>>(), &files);
+            return write_sources(args, &model.files().collect::<Vec<&Path>>(), &files);
         }
         LanguageForm::Crate { makes } => makes,
     };
     let Some(folder) = &args.out else {
-        return Err(Failure::Usage(
+        return Err(CommandFailure::Usage(
             "--out names the folder of the crate".to_owned(),
         ));
     };
@@ -58,7 +58,7 @@ pub(crate) fn run(host: &Host, args: &GenerateArgs) -> Outcome {
 }
 
 /// Writes or prints the one module.
-fn module(target: Option<&Target>, files: &[EmittedFile]) -> Outcome {
+fn write_module(target: Option<&OutputFile>, files: &[EmittedFile]) -> CommandOutcome {
     for file in files {
         let Some(target) = target else {
             return terminal::print_as_is(&file.text);
@@ -75,21 +75,21 @@ fn module(target: Option<&Target>, files: &[EmittedFile]) -> Outcome {
 }
 
 /// Writes source files into a folder.
-fn sources(args: &GenerateArgs, inputs: &[&Path], files: &[EmittedFile]) -> Outcome {
+fn write_sources(args: &GenerateArgs, inputs: &[&Path], files: &[EmittedFile]) -> CommandOutcome {
     let Some(folder) = &args.out else {
-        return Err(Failure::Usage(
+        return Err(CommandFailure::Usage(
             "--out names the folder of the sources".to_owned(),
         ));
     };
     refuse_dash("--out", folder)?;
     std::fs::create_dir_all(folder).map_err(|error| {
-        Failure::Input(format!(
+        CommandFailure::Input(format!(
             "folder {} cannot be made: {error}",
             folder.display()
         ))
     })?;
     for file in files {
-        Target::new(&folder.join(&file.path), inputs.iter().copied())?.write(&file.text)?;
+        OutputFile::new(&folder.join(&file.path), inputs.iter().copied())?.write(&file.text)?;
     }
     let names = files.iter().map(|file| file.path.as_str());
     terminal::note(&format!(
@@ -101,19 +101,19 @@ fn sources(args: &GenerateArgs, inputs: &[&Path], files: &[EmittedFile]) -> Outc
 }
 
 /// The first line of a manifest that this program wrote.
-const OURS: &str = "# Written by modelmill.";
+const MANIFEST_HEADER: &str = "# Written by modelmill.";
 
 /// Writes a crate; only over a crate of the same kind.
-fn write_crate(folder: &Path, files: &[EmittedFile]) -> Outcome {
+fn write_crate(folder: &Path, files: &[EmittedFile]) -> CommandOutcome {
     refuse_dash("--out", folder)?;
     let manifest = folder.join("Cargo.toml");
-    let ours = Disk::default()
+    let ours = DiskFiles::default()
         .read_text(&manifest, 1 << 20)
-        .is_ok_and(|text| text.starts_with(OURS));
+        .is_ok_and(|text| text.starts_with(MANIFEST_HEADER));
     let occupied = folder.is_file()
         || std::fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some());
     if occupied && !ours {
-        return Err(Failure::Usage(format!(
+        return Err(CommandFailure::Usage(format!(
             "--out {}: something else is there; give the name of a new folder",
             folder.display()
         )));
@@ -122,7 +122,7 @@ fn write_crate(folder: &Path, files: &[EmittedFile]) -> Outcome {
         let path = folder.join(&file.path);
         let parent = path.parent().unwrap_or(folder);
         std::fs::create_dir_all(parent).map_err(|error| {
-            Failure::Input(format!(
+            CommandFailure::Input(format!(
                 "folder {} cannot be made: {error}",
                 parent.display()
             ))

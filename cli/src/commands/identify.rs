@@ -4,16 +4,16 @@ use std::path::{Path, PathBuf};
 
 use modelmill::Host;
 use modelmill::identify::Instruments;
-use modelmill::recording::{Reading, Recording};
+use modelmill::recording::{RecordingOptions, PreparedRecording};
 
 use crate::args::IdentifyArgs;
-use crate::failure::{Failure, Outcome};
-use crate::flags::spelled_in;
-use crate::output::Target;
+use crate::failure::{CommandFailure, CommandOutcome};
+use crate::flags::format_advice_in_json;
+use crate::output::OutputFile;
 use crate::{commands, terminal};
 
 /// Identifies, prints and perhaps writes the fit.
-pub(crate) fn run(host: &Host, args: &IdentifyArgs) -> Outcome {
+pub(crate) fn run(host: &Host, args: &IdentifyArgs) -> CommandOutcome {
     let model = commands::model(host, &args.model)?;
     let files = args.estimators.instruments.iter().map(PathBuf::from);
     let instruments: Vec<PathBuf> = files.filter(|file| file.exists()).collect();
@@ -23,13 +23,13 @@ pub(crate) fn run(host: &Host, args: &IdentifyArgs) -> Outcome {
     let target = args
         .out
         .as_ref()
-        .map(|path| Target::new(path, inputs))
+        .map(|path| OutputFile::new(path, inputs))
         .transpose()?;
     let reading = args.preparation.reading();
     let data = commands::recordings(&model, &args.data, &reading)?;
     let check = commands::recordings(&model, &args.check, &reading)?;
     let options = args.estimators.options(&args.standstill);
-    let reading = Reading {
+    let reading = RecordingOptions {
         columns: args.estimators.instrument_map.clone(),
         ..reading
     };
@@ -46,7 +46,7 @@ pub(crate) fn run(host: &Host, args: &IdentifyArgs) -> Outcome {
             commands::recordings(&model, &files, &reading)?
         }
     };
-    let recorded: Vec<&Recording> = recorded.iter().collect();
+    let recorded: Vec<&PreparedRecording> = recorded.iter().collect();
     let instruments = match period {
         Some(period) => Instruments::Period(period),
         None if recorded.is_empty() => Instruments::None,
@@ -56,7 +56,7 @@ pub(crate) fn run(host: &Host, args: &IdentifyArgs) -> Outcome {
     let found = model.identify_with(&data, &instruments, &check, &options)?;
     let object = found.json(&model)?;
     if let Some(target) = &target {
-        target.write(&format!("{:#}\n", spelled_in(&object)))?;
+        target.write(&format!("{:#}\n", format_advice_in_json(&object)))?;
     }
     if args.json {
         return terminal::print_json(&object);
@@ -72,7 +72,7 @@ pub(crate) fn run(host: &Host, args: &IdentifyArgs) -> Outcome {
 }
 
 /// The period of `period=SECONDS`, if that is what instruments are.
-fn period(instruments: &[String]) -> Outcome<Option<f64>> {
+fn period(instruments: &[String]) -> CommandOutcome<Option<f64>> {
     let [one] = instruments else {
         return Ok(None);
     };
@@ -81,7 +81,7 @@ fn period(instruments: &[String]) -> Outcome<Option<f64>> {
     };
     match seconds.parse::<f64>() {
         Ok(period) if period > 0.0 && period.is_finite() => Ok(Some(period)),
-        _ => Err(Failure::Usage(format!(
+        _ => Err(CommandFailure::Usage(format!(
             "--instruments {one}: expected seconds, as in period=7.29"
         ))),
     }

@@ -3,29 +3,29 @@
 use std::path::{Path, PathBuf};
 
 use modelmill::Host;
-use modelmill::import::{Imported, Options};
+use modelmill::import::{ImportedRobot, Options};
 use modelmill::text::table::count;
 
 use crate::args::ImportArgs;
-use crate::failure::{Failure, Outcome};
-use crate::output::Target;
+use crate::failure::{CommandFailure, CommandOutcome};
+use crate::output::OutputFile;
 use crate::terminal;
 
 /// No robot description is longer, bytes.
 const LARGEST_DESCRIPTION: u64 = 16 << 20;
 
 /// Writes the model file and says what was left out or rounded.
-pub(crate) fn run(host: &Host, args: &ImportArgs) -> Outcome {
+pub(crate) fn run(host: &Host, args: &ImportArgs) -> CommandOutcome {
     let file = args.description.as_path();
     let closures = closures_of(file, args.closures.as_deref());
-    let target = Target::new(&args.out, [file].into_iter().chain(closures.as_deref()))?;
+    let target = OutputFile::new(&args.out, [file].into_iter().chain(closures.as_deref()))?;
     let options = Options {
         floating: args.floating,
         round_angles: args.round_angles,
         closures: None,
         pose: &args.at,
     };
-    let imported = imported(host, file, closures.as_deref(), options)?;
+    let imported = import_description(host, file, closures.as_deref(), options)?;
     if let (None, Some(path)) = (&args.closures, closures) {
         terminal::note(&format!(
             "closures and drives are those of {}, which lies beside the description",
@@ -59,12 +59,12 @@ pub(crate) fn closures_of(file: &Path, given: Option<&Path>) -> Option<PathBuf> 
 }
 
 /// The model file of a robot description.
-pub(crate) fn imported(
+pub(crate) fn import_description(
     host: &Host,
     file: &Path,
     closures: Option<&Path>,
     options: Options<'_>,
-) -> Outcome<Imported> {
+) -> CommandOutcome<ImportedRobot> {
     let text = read(
         host,
         file,
@@ -80,11 +80,11 @@ pub(crate) fn imported(
     Ok(host.import(&file.display().to_string(), &text, &options)?)
 }
 
-fn read(host: &Host, path: &Path, expected: &str) -> Result<String, Failure> {
+fn read(host: &Host, path: &Path, expected: &str) -> Result<String, CommandFailure> {
     host.files()
         .read_text(path, LARGEST_DESCRIPTION)
         .map_err(|error| {
-            Failure::Input(format!(
+            CommandFailure::Input(format!(
                 "{} cannot be read: {}; {expected} is expected",
                 path.display(),
                 error.fault

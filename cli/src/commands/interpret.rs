@@ -3,11 +3,11 @@
 use modelmill::Host;
 
 use crate::args::InterpretArgs;
-use crate::failure::Outcome;
+use crate::failure::CommandOutcome;
 use crate::{commands, terminal};
 
 /// Solves, and prints the solutions or what is not determined.
-pub(crate) fn run(host: &Host, args: &InterpretArgs) -> Outcome {
+pub(crate) fn run(host: &Host, args: &InterpretArgs) -> CommandOutcome {
     let model = commands::model(host, &args.model)?;
     let fit = host.fit(&args.fit)?;
     let found = model.interpret(&fit, &args.fit.display().to_string(), &args.unknown)?;

@@ -28,23 +28,23 @@ pub(crate) mod work;
 
 use std::path::{Path, PathBuf};
 
-use modelmill::diagnose::{Findings, Held, Question};
-use modelmill::files::{Disk, Files, Kind};
-use modelmill::model::Loaded;
-use modelmill::recording::{Reading, Recording};
+use modelmill::diagnose::{DiagnosisFindings, FixedParameters, DiagnosisOptions};
+use modelmill::files::{DiskFiles, FileSource, PathKind};
+use modelmill::model::LoadedModel;
+use modelmill::recording::{RecordingOptions, PreparedRecording};
 use modelmill::{Host, Model};
 
-use crate::args::{AskArgs, ParameterSource};
-use crate::failure::{Failure, Outcome};
+use crate::args::{DiagnosisArgs, ParameterSource};
+use crate::failure::{CommandFailure, CommandOutcome};
 use crate::terminal;
 
 /// Reads and derives a model file; warnings go to standard error.
-pub(crate) fn model(host: &Host, path: &Path) -> Outcome<Model> {
-    derived(host, &path.display().to_string(), load(host, path)?)
+pub(crate) fn model(host: &Host, path: &Path) -> CommandOutcome<Model> {
+    derive_model(host, &path.display().to_string(), load(host, path)?)
 }
 
 /// Derives a model that was read from `path`; warnings go to standard error.
-pub(crate) fn derived(host: &Host, path: &str, loaded: Loaded) -> Outcome<Model> {
+pub(crate) fn derive_model(host: &Host, path: &str, loaded: LoadedModel) -> CommandOutcome<Model> {
     let model = host.derive(path, loaded)?;
     for note in &model.notes {
         terminal::remark(note);
@@ -53,25 +53,25 @@ pub(crate) fn derived(host: &Host, path: &str, loaded: Loaded) -> Outcome<Model>
 }
 
 /// Reads a model file; warnings go to standard error.
-pub(crate) fn load(host: &Host, path: &Path) -> Outcome<Loaded> {
+pub(crate) fn load(host: &Host, path: &Path) -> CommandOutcome<LoadedModel> {
     let loaded = load_quietly(host, path)?;
     if !loaded.warnings.is_empty() {
-        terminal::say(loaded.render(terminal::errors_in_colour()).trim_end());
+        terminal::print_to_stderr(loaded.render(terminal::is_stderr_coloured()).trim_end());
     }
     Ok(loaded)
 }
 
 /// Reads a model file and keeps its warnings.
-pub(crate) fn load_quietly(host: &Host, path: &Path) -> Outcome<Loaded> {
+pub(crate) fn load_quietly(host: &Host, path: &Path) -> CommandOutcome<LoadedModel> {
     if path.is_dir() {
-        return Err(Failure::Input(format!(
+        return Err(CommandFailure::Input(format!(
             "{} is a folder; a model file is expected{}",
             path.display(),
-            nearby(path)
+            nearby_models_hint(path)
         )));
     }
     if !path.exists() {
-        return Err(Failure::Input(format!(
+        return Err(CommandFailure::Input(format!(
             "there is no file {}; the path of a model file (TOML) is expected{}{}",
             path.display(),
             if path == Path::new("-") {
@@ -79,7 +79,7 @@ pub(crate) fn load_quietly(host: &Host, path: &Path) -> Outcome<Loaded> {
             } else {
                 ""
             },
-            nearby(path)
+            nearby_models_hint(path)
         )));
     }
     Ok(host.load(path)?)
@@ -99,25 +99,25 @@ pub(crate) fn files_of(path: &Path) -> Vec<PathBuf> {
 pub(crate) fn recordings(
     model: &Model,
     paths: &[PathBuf],
-    reading: &Reading,
-) -> Outcome<Vec<Recording>> {
+    reading: &RecordingOptions,
+) -> CommandOutcome<Vec<PreparedRecording>> {
     let each = paths.iter();
     each.map(|path| recording(model, path, reading)).collect()
 }
 
-fn recording(model: &Model, path: &Path, reading: &Reading) -> Outcome<Recording> {
+fn recording(model: &Model, path: &Path, reading: &RecordingOptions) -> CommandOutcome<PreparedRecording> {
     let files = files_of(path);
     let files: Vec<&Path> = files.iter().map(PathBuf::as_path).collect();
     Ok(model.recording_of(&files, reading)?)
 }
 
 /// Diagnoses what the command line names.
-pub(crate) fn diagnose(host: &Host, args: &AskArgs, question: Question) -> Outcome<Findings> {
+pub(crate) fn diagnose(host: &Host, args: &DiagnosisArgs, question: DiagnosisOptions) -> CommandOutcome<DiagnosisFindings> {
     let model = args
         .parameters
-        .in_model(host, self::model(host, &args.model)?)?;
+        .apply_to(host, self::model(host, &args.model)?)?;
     let reading = args.preparation.reading();
-    let read = |paths: &[PathBuf]| -> Outcome<Vec<Recording>> {
+    let read = |paths: &[PathBuf]| -> CommandOutcome<Vec<PreparedRecording>> {
         let each = paths.iter().map(|path| {
             let read = recording(&model, path, &reading)?;
             Ok(read.for_diagnosis(&model)?)
@@ -129,20 +129,20 @@ pub(crate) fn diagnose(host: &Host, args: &AskArgs, question: Question) -> Outco
     Ok(model.diagnose(&fit, &check, &question)?)
 }
 
-impl AskArgs {
+impl DiagnosisArgs {
     /// Which parameters are held: with those of a fit, what is different from then is asked for, and free ones would take it up.
-    pub(crate) fn held(&self) -> Held {
+    pub(crate) fn fixed_parameters(&self) -> FixedParameters {
         let is_fit = matches!(self.parameters, ParameterSource::Fit(_));
         if self.held || is_fit {
-            Held::All
+            FixedParameters::All
         } else {
-            Held::Known
+            FixedParameters::Known
         }
     }
 }
 
 /// Model files around a path that led nowhere, as a sentence for the end of a message.
-fn nearby(path: &Path) -> String {
+fn nearby_models_hint(path: &Path) -> String {
     let own = if path.is_dir() {
         path
     } else {
@@ -186,9 +186,9 @@ fn nearby(path: &Path) -> String {
 
 /// Whether a file looks like a model: TOML with a line that gives the version of the schema.
 fn is_model(path: &Path) -> bool {
-    let disk = Disk::default();
+    let disk = DiskFiles::default();
     path.extension().is_some_and(|e| e == "toml")
-        && disk.kind(path) == Kind::File
+        && disk.kind(path) == PathKind::File
         && disk.read_text(path, 1 << 20).is_ok_and(|text| {
             text.lines()
                 .filter_map(|line| line.split_once('='))

@@ -5,16 +5,16 @@ use std::path::Path;
 use modelmill::Host;
 
 use crate::args::ReduceArgs;
-use crate::failure::Outcome;
-use crate::output::Target;
+use crate::failure::CommandOutcome;
+use crate::output::OutputFile;
 use crate::terminal;
 
 /// Writes the model file and prints the report.
-pub(crate) fn run(host: &Host, args: &ReduceArgs) -> Outcome {
+pub(crate) fn run(host: &Host, args: &ReduceArgs) -> CommandOutcome {
     let loaded = host.rig(&args.rig)?;
     let mut inputs: Vec<&Path> = loaded.sources.paths().collect();
     inputs.extend(args.plan.as_deref());
-    let target = Target::new(&args.out, inputs)?;
+    let target = OutputFile::new(&args.out, inputs)?;
     let reduced = host.reduce(&args.rig, args.plan.as_deref())?;
     target.write(&reduced.reduction.model)?;
     if args.json {

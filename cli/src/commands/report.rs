@@ -3,33 +3,33 @@
 use std::path::PathBuf;
 
 use modelmill::Host;
-use modelmill::diagnose::{Question, words};
+use modelmill::diagnose::{DiagnosisOptions, words};
 use modelmill::report::page;
 
 use crate::args::ReportArgs;
 use crate::commands;
-use crate::failure::Outcome;
-use crate::flags::Flags;
-use crate::output::{self, Target};
+use crate::failure::CommandOutcome;
+use crate::flags::CommandLineAdvice;
+use crate::output::{self, OutputFile};
 use crate::terminal;
 
 /// Name of the page in its folder.
 pub(crate) const PAGE: &str = "report.html";
 
 /// Diagnoses and writes the page.
-pub(crate) fn run(host: &Host, args: &ReportArgs) -> Outcome {
+pub(crate) fn run(host: &Host, args: &ReportArgs) -> CommandOutcome {
     output::make_folder(&args.out)?;
     let path = args.out.join(PAGE);
-    let ask = &args.ask;
+    let ask = &args.diagnosis;
     let inputs = [&ask.model].into_iter().chain(&ask.data).chain(&ask.check);
-    let target = Target::new(&path, inputs.map(PathBuf::as_path))?;
-    let question = Question {
-        held: args.ask.held(),
-        again_with_nominal: false,
+    let target = OutputFile::new(&path, inputs.map(PathBuf::as_path))?;
+    let question = DiagnosisOptions {
+        fixed: args.diagnosis.fixed_parameters(),
+        repeat_with_nominal: false,
     };
-    let findings = commands::diagnose(host, &args.ask, question)?;
-    target.write(&page(&findings, &Flags::from_args(&args.ask))?)?;
-    let says = words::verdict(&findings.diagnosis, findings.channels(), findings.judged);
+    let findings = commands::diagnose(host, &args.diagnosis, question)?;
+    target.write(&page(&findings, &CommandLineAdvice::from_args(&args.diagnosis))?)?;
+    let says = words::verdict(&findings.diagnosis, findings.channels(), findings.validation);
     terminal::print(&format!(
         "{}\n\nThe page is {}.",
         words::lines(&says, 100).join("\n"),

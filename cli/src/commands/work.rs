@@ -5,22 +5,22 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use modelmill::diagnose::Separation;
+use modelmill::diagnose::SeparationProposal;
 use modelmill::edit::NewEffect;
-use modelmill::files::Kind;
-use modelmill::print::Spelling;
+use modelmill::files::PathKind;
+use modelmill::print::AdviceFormatter;
 use modelmill::{Host, Model};
-use modelmill_workbench::{Commands, Excitation, Options, Step, serve};
+use modelmill_workbench::{WorkbenchCommands, ExcitationSettings, Options, WorkbenchStep, serve};
 use serde_json::json;
 
 use crate::args::work::WorkArgs;
 use crate::commands;
-use crate::failure::{Failure, Outcome};
-use crate::flags::{Flags, libraries, quoted};
+use crate::failure::{CommandFailure, CommandOutcome};
+use crate::flags::{CommandLineAdvice, library_flags, quote_word};
 use crate::terminal;
 
 /// Serves the page until the program is stopped.
-pub(crate) fn run(host: &Host, args: &WorkArgs) -> Outcome {
+pub(crate) fn run(host: &Host, args: &WorkArgs) -> CommandOutcome {
     if !args.model.is_file() {
         // This says what is wrong with the path, and which models are near.
         commands::load_quietly(host, &args.model)?;
@@ -28,17 +28,17 @@ pub(crate) fn run(host: &Host, args: &WorkArgs) -> Outcome {
     if let Some(beside) = &args.beside {
         commands::load_quietly(host, beside)?;
     }
-    let files = |paths: &[PathBuf]| -> Outcome<Vec<Vec<PathBuf>>> {
+    let files = |paths: &[PathBuf]| -> CommandOutcome<Vec<Vec<PathBuf>>> {
         let runs = paths.iter().map(|path| commands::files_of(path));
         let is_there = |file: &PathBuf| {
             let says = match host.files().kind(file) {
-                Kind::File | Kind::Folder => return Ok(()),
-                Kind::Missing => "there is no such file; the path of a recording is expected",
-                Kind::Stream | Kind::Device => {
+                PathKind::File | PathKind::Folder => return Ok(()),
+                PathKind::Missing => "there is no such file; the path of a recording is expected",
+                PathKind::Stream | PathKind::Device => {
                     "this is no file on a disk; recordings are read again after each edit, so write it to a file first"
                 }
             };
-            Err(Failure::Input(format!("{}: {says}", file.display())))
+            Err(CommandFailure::Input(format!("{}: {says}", file.display())))
         };
         runs.map(|files| files.iter().try_for_each(is_there).map(|()| files))
             .collect()
@@ -52,7 +52,7 @@ pub(crate) fn run(host: &Host, args: &WorkArgs) -> Outcome {
         port: args.port,
         first: 0,
     };
-    let spelled = Spelled::new(host, args);
+    let spelled = WorkbenchAdvice::new(host, args);
     serve(host, options, Arc::new(spelled), |link| {
         // Who does not read standard output has the link from nowhere else, but may still ask for it by port and token.
         let _ = if args.json {
@@ -67,8 +67,8 @@ pub(crate) fn run(host: &Host, args: &WorkArgs) -> Outcome {
 }
 
 /// The workbench's steps as command lines.
-struct Spelled {
-    flags: Flags,
+struct WorkbenchAdvice {
+    flags: CommandLineAdvice,
     model: String,
     data: String,
     check: String,
@@ -80,30 +80,30 @@ struct Spelled {
     libraries: String,
 }
 
-impl Spelled {
+impl WorkbenchAdvice {
     fn new(host: &Host, args: &WorkArgs) -> Self {
         let named = |option: &str, paths: &[PathBuf]| -> String {
-            let path = |path: &PathBuf| format!(" --{option} {}", name(path));
+            let path = |path: &PathBuf| format!(" --{option} {}", quoted_path(path));
             paths.iter().map(path).collect()
         };
         Self {
-            flags: Flags::new(&args.data, &args.check, &args.preparation.reading()),
-            model: name(&args.model),
+            flags: CommandLineAdvice::new(&args.data, &args.check, &args.preparation.reading()),
+            model: quoted_path(&args.model),
             data: named("data", &args.data),
             check: named("check", &args.check),
             all: named("data", &[&*args.data, &*args.check].concat()),
-            reading: args.preparation.spelled(),
-            libraries: libraries(host),
+            reading: args.preparation.to_flags(),
+            libraries: library_flags(host),
         }
     }
 }
 
-fn name(path: &Path) -> String {
-    quoted(&path.display().to_string())
+fn quoted_path(path: &Path) -> String {
+    quote_word(&path.display().to_string())
 }
 
-impl Commands for Spelled {
-    fn same(&self, step: Step) -> Option<String> {
+impl WorkbenchCommands for WorkbenchAdvice {
+    fn step_command(&self, step: WorkbenchStep) -> Option<String> {
         let Self {
             model,
             data,
@@ -113,21 +113,21 @@ impl Commands for Spelled {
             ..
         } = self;
         Some(match step {
-            Step::Picture => format!("modelmill check {model} --picture picture.svg{libraries}"),
-            Step::Equations => {
+            WorkbenchStep::Picture => format!("modelmill check {model} --picture picture.svg{libraries}"),
+            WorkbenchStep::Equations => {
                 format!("modelmill equations {model} --format html --out equations.html{libraries}")
             }
-            Step::Compare => format!("modelmill compare {model}{data}{reading}{libraries}"),
-            Step::Identify => {
+            WorkbenchStep::Compare => format!("modelmill compare {model}{data}{reading}{libraries}"),
+            WorkbenchStep::Identify => {
                 format!("modelmill identify {model}{data}{check}{reading}{libraries}")
             }
-            Step::Diagnose => {
+            WorkbenchStep::Diagnose => {
                 format!("modelmill diagnose {model}{data}{check}{reading}{libraries}")
             }
         })
     }
 
-    fn variant(&self, before: &Path) -> Option<String> {
+    fn variant_command(&self, before: &Path) -> Option<String> {
         let Self {
             model,
             all,
@@ -135,14 +135,14 @@ impl Commands for Spelled {
             libraries,
             ..
         } = self;
-        let before = name(before);
+        let before = quoted_path(before);
         Some(format!(
             "modelmill diff {before} {model}{all}{reading}{libraries}"
         ))
     }
 
-    fn excite(&self, asked: &Excitation) -> Option<String> {
-        let usual = Excitation::default();
+    fn excite_command(&self, asked: &ExcitationSettings) -> Option<String> {
+        let usual = ExcitationSettings::default();
         let mut words = format!("modelmill excite {}", self.model);
         let options = [
             (
@@ -162,7 +162,7 @@ impl Commands for Spelled {
             }
         }
         if !asked.limits.is_empty() {
-            let _ = write!(words, " --limits {}", quoted(&asked.limits.join(",")));
+            let _ = write!(words, " --limits {}", quote_word(&asked.limits.join(",")));
         }
         let _ = write!(words, " --out {TRAJECTORY}{}", self.libraries);
         Some(words)
@@ -172,29 +172,29 @@ impl Commands for Spelled {
 /// Where the commands of the page let a trajectory go.
 const TRAJECTORY: &str = "excitation.csv";
 
-impl Spelling for Spelled {
-    fn add(&self, model: &Model, effect: &NewEffect) -> String {
-        self.flags.add(model, effect)
+impl AdviceFormatter for WorkbenchAdvice {
+    fn add_effect(&self, model: &Model, effect: &NewEffect) -> String {
+        self.flags.add_effect(model, effect)
     }
 
-    fn add_from(&self, model: &Model, effect: &NewEffect, library: &str) -> String {
-        self.flags.add_from(model, effect, library)
+    fn add_effect_from_library(&self, model: &Model, effect: &NewEffect, library: &str) -> String {
+        self.flags.add_effect_from_library(model, effect, library)
     }
 
     fn identify(&self, model: &Model) -> String {
         self.flags.identify(model)
     }
 
-    fn separate(&self, model: &Model, separation: &Separation) -> Option<String> {
-        self.flags.separate(model, separation)
+    fn separate_effects(&self, model: &Model, separation: &SeparationProposal) -> Option<String> {
+        self.flags.separate_effects(model, separation)
     }
 
-    fn held(&self) -> String {
-        self.flags.held()
+    fn fix_parameters(&self) -> String {
+        self.flags.fix_parameters()
     }
 
-    fn text<'a>(&self, text: &'a str) -> Cow<'a, str> {
-        self.flags.text(text)
+    fn format_text<'a>(&self, text: &'a str) -> Cow<'a, str> {
+        self.flags.format_text(text)
     }
 }
 
@@ -203,7 +203,7 @@ mod tests {
     use clap::Parser;
 
     use super::*;
-    use crate::args::{Cli, Command};
+    use crate::args::{CommandLine, ProgramCommand};
 
     /// What the page shows is understood, and asks for the same recordings read in the same way.
     #[test]
@@ -223,21 +223,21 @@ mod tests {
             words.retain(|word| !word.is_empty());
             words
         };
-        let cli = Cli::try_parse_from(words(line)).unwrap();
+        let cli = CommandLine::try_parse_from(words(line)).unwrap();
         let host = Host::new().with_libraries(cli.library);
-        let Command::Work(args) = &cli.command else {
+        let ProgramCommand::Work(args) = &cli.command else {
             panic!("another command");
         };
-        let spelled = Spelled::new(&host, args);
-        let asked = Excitation {
+        let spelled = WorkbenchAdvice::new(&host, args);
+        let asked = ExcitationSettings {
             harmonics: 3,
             period: 2.5,
             limits: vec!["q=-1:2".to_owned(), "q_d=3".to_owned()],
-            ..Excitation::default()
+            ..ExcitationSettings::default()
         };
-        let command = spelled.excite(&asked).unwrap();
-        let excite = Cli::try_parse_from(words(&command)).unwrap();
-        let Command::Excite(excite) = &excite.command else {
+        let command = spelled.excite_command(&asked).unwrap();
+        let excite = CommandLine::try_parse_from(words(&command)).unwrap();
+        let ProgramCommand::Excite(excite) = &excite.command else {
             panic!("another command");
         };
         let told = (
@@ -248,28 +248,28 @@ mod tests {
         );
         assert_eq!(told, (3, 2.5, 2, asked.starts), "{command}");
         for step in [
-            Step::Picture,
-            Step::Equations,
-            Step::Compare,
-            Step::Identify,
-            Step::Diagnose,
+            WorkbenchStep::Picture,
+            WorkbenchStep::Equations,
+            WorkbenchStep::Compare,
+            WorkbenchStep::Identify,
+            WorkbenchStep::Diagnose,
         ] {
-            let command = spelled.same(step).unwrap();
-            let cli = Cli::try_parse_from(words(&command));
+            let command = spelled.step_command(step).unwrap();
+            let cli = CommandLine::try_parse_from(words(&command));
             let cli = cli.unwrap_or_else(|error| panic!("{command}: {error}"));
             assert_eq!(cli.library, [PathBuf::from("my.toml")]);
             let (data, preparation) = match &cli.command {
-                Command::Compare(other) => (&other.data, &other.preparation),
-                Command::Identify(other) => (&other.data, &other.preparation),
-                Command::Diagnose(other) => (&other.ask.data, &other.ask.preparation),
+                ProgramCommand::Compare(other) => (&other.data, &other.preparation),
+                ProgramCommand::Identify(other) => (&other.data, &other.preparation),
+                ProgramCommand::Diagnose(other) => (&other.diagnosis.data, &other.diagnosis.preparation),
                 _ => continue,
             };
             assert_eq!((data, preparation), (&args.data, &args.preparation));
         }
-        let command = spelled.variant(Path::new("before this.toml")).unwrap();
-        let cli = Cli::try_parse_from(words(&command));
+        let command = spelled.variant_command(Path::new("before this.toml")).unwrap();
+        let cli = CommandLine::try_parse_from(words(&command));
         let cli = cli.unwrap_or_else(|error| panic!("{command}: {error}"));
-        let Command::Diff(other) = &cli.command else {
+        let ProgramCommand::Diff(other) = &cli.command else {
             panic!("{command}");
         };
         assert_eq!(

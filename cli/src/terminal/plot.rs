@@ -1,7 +1,7 @@
 //! Figures in the terminal: curves in Braille dots (two by four to a character) and bars.
 
 /// One curve with a scale at its left and a range of its own or given.
-pub(crate) struct Curve<'a> {
+pub(crate) struct TerminalCurve<'a> {
     /// Values over the common axis.
     pub(crate) values: &'a [f64],
     /// Height in lines of text.
@@ -18,7 +18,7 @@ const SCALE: usize = 9;
 /// The two columns of dots in a Braille character, from the top.
 const DOTS: [[u8; 4]; 2] = [[0x01, 0x02, 0x04, 0x40], [0x08, 0x10, 0x20, 0x80]];
 
-impl Curve<'_> {
+impl TerminalCurve<'_> {
     /// The curve with its scale, line by line: each column of dots spans the least and the
     /// largest value that fall into it.
     pub(crate) fn lines(&self) -> Vec<String> {
@@ -119,7 +119,7 @@ mod tests {
     #[test]
     fn a_ramp_goes_from_bottom_left_to_top_right() {
         let values: Vec<f64> = (0..1000).map(|i| f64::from(i) / 499.5 - 1.0).collect();
-        let curve = Curve {
+        let curve = TerminalCurve {
             values: &values,
             height: 4,
             limit: None,
@@ -138,7 +138,7 @@ mod tests {
     #[test]
     fn odd_values_do_no_harm() {
         for values in [vec![], vec![0.0], vec![f64::NAN; 9], vec![1e300, -1e300]] {
-            let curve = Curve {
+            let curve = TerminalCurve {
                 values: &values,
                 height: 3,
                 limit: None,

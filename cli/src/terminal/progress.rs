@@ -7,8 +7,8 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use modelmill::Note;
-use modelmill::progress::{Job, Progress};
+use modelmill::RecordingNote;
+use modelmill::progress::{JobHandle, ProgressListener};
 use modelmill_boundary::text;
 
 use crate::terminal;
@@ -21,19 +21,19 @@ const TICK: Duration = Duration::from_millis(100);
 
 /// Watches the library's jobs: once the program has been busy for a second on a terminal, a line says what is going on, with
 /// a bar if the job counts its steps and a spinner if it does not.
-pub(crate) struct Terminal {
+pub(crate) struct TerminalProgress {
     start: Instant,
-    watchers: Mutex<Vec<Option<Watcher>>>,
+    watchers: Mutex<Vec<Option<JobWatcher>>>,
 }
 
 /// A thread that looks at a job until it is told to stop.
-struct Watcher {
+struct JobWatcher {
     /// Dropped when the job ends.
-    going_on: Sender<()>,
+    keep_alive: Sender<()>,
     thread: JoinHandle<()>,
 }
 
-impl Terminal {
+impl TerminalProgress {
     pub(crate) fn new() -> Self {
         Self {
             start: Instant::now(),
@@ -42,8 +42,8 @@ impl Terminal {
     }
 }
 
-impl Progress for Terminal {
-    fn begins(&self, what: &str, total: usize, job: &Arc<Job>) {
+impl ProgressListener for TerminalProgress {
+    fn on_job_start(&self, what: &str, total: usize, job: &Arc<JobHandle>) {
         let mut watchers = self.watchers.lock().unwrap_or_else(PoisonError::into_inner);
         // Of jobs within jobs the outer one has its line.
         let is_watched = watchers.iter().any(Option::is_some);
@@ -73,39 +73,39 @@ impl Progress for Terminal {
                 bar.finish_and_clear();
             }
         });
-        watchers.push(Some(Watcher { going_on, thread }));
+        watchers.push(Some(JobWatcher { keep_alive: going_on, thread }));
     }
 
-    fn ends(&self) {
+    fn on_job_end(&self) {
         let mut watchers = self.watchers.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(Some(Watcher { going_on, thread })) = watchers.pop() {
+        if let Some(Some(JobWatcher { keep_alive: going_on, thread })) = watchers.pop() {
             drop(going_on);
             // A watcher that panicked has shown nothing that is missed.
             let _ = thread.join();
         }
     }
 
-    fn notes(&self, note: &Note) {
+    fn on_note(&self, note: &RecordingNote) {
         terminal::remark(note);
     }
 }
 
 /// As [`Terminal`], for whoever tells remarks at another time.
-pub(crate) struct WithoutRemarks(Terminal);
+pub(crate) struct ProgressWithoutRemarks(TerminalProgress);
 
-impl WithoutRemarks {
+impl ProgressWithoutRemarks {
     pub(crate) fn new() -> Self {
-        Self(Terminal::new())
+        Self(TerminalProgress::new())
     }
 }
 
-impl Progress for WithoutRemarks {
-    fn begins(&self, what: &str, total: usize, job: &Arc<Job>) {
-        self.0.begins(what, total, job);
+impl ProgressListener for ProgressWithoutRemarks {
+    fn on_job_start(&self, what: &str, total: usize, job: &Arc<JobHandle>) {
+        self.0.on_job_start(what, total, job);
     }
 
-    fn ends(&self) {
-        self.0.ends();
+    fn on_job_end(&self) {
+        self.0.on_job_end();
     }
 }
 

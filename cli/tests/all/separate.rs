@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use std::fmt::Write as _;
 
 use crate::common::{json, model, number, printed, refused, run, scratch, workspace};
-use modelmill_codegen::{Evaluator, States};
+use modelmill_codegen::{ModelEvaluator, MotionStates};
 use nalgebra::{DMatrix, DVector};
 use serde_json::Value;
 
@@ -65,13 +65,13 @@ fn the_difference_is_what_least_squares_leaves() {
     let loaded = modelmill_spec::load_file(&path).expect("the model");
     let derivation = modelmill_codegen::derive(&loaded.mechanism).expect("derived");
     let slices = |from: usize| columns[from..from + 2].iter().map(Vec::as_slice).collect();
-    let along = States {
+    let along = MotionStates {
         q: slices(0),
         qd: slices(2),
         qdd: slices(4),
         load: Vec::new(),
     };
-    let evaluator = Evaluator::new(&derivation);
+    let evaluator = ModelEvaluator::new(&derivation);
     let base = evaluator.regressor(&along).expect("poses");
     let load = evaluator
         .inverse_dynamics(&along, &derivation.nominal_base_values())

@@ -14,7 +14,7 @@ fn page() -> Option<String> {
     if let Some(own) = std::env::var_os("MODELMILL_PAGE") {
         return Some(own.into_string().expect("a path of plain text"));
     }
-    if let Some(why) = make::lacks() {
+    if let Some(why) = make::missing_target() {
         assert!(
             std::env::var_os("MODELMILL_WASM_REQUIRED").is_none(),
             "{why}"
@@ -24,7 +24,7 @@ fn page() -> Option<String> {
     }
     let program = PathBuf::from(env!("CARGO_BIN_EXE_modelmill"));
     let builds = program.ancestors().nth(2).expect("a folder of builds");
-    let made = make::module("dev", builds).and_then(|module| make::page(&module));
+    let made = make::build_module("dev", builds).and_then(|module| make::build_page(&module));
     let path = scratch("try.html");
     std::fs::write(&path, made.unwrap_or_else(|says| panic!("{says}"))).expect("the page");
     Some(path)

@@ -5,13 +5,13 @@ use num_traits::One;
 
 use crate::Derivation;
 use crate::expr::Rational;
-use crate::expr::print::Formula;
+use crate::expr::print::PrintedFormula;
 use crate::reduce::base;
-use crate::tree::expressions::Monomial;
+use crate::tree::expressions::ParameterMonomial;
 
 /// One base parameter, for people and programs.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct BaseParameter {
+pub struct BaseParameterEntry {
     /// `p1_min`, `p2_min`, ...
     pub name: String,
     /// The product whose column is retained.
@@ -32,16 +32,16 @@ impl Derivation {
     }
 
     /// The base parameters in the order of p_min.
-    pub fn base_parameters(&self) -> Vec<BaseParameter> {
+    pub fn base_parameters(&self) -> Vec<BaseParameterEntry> {
         let reduction = &self.reduction;
         (0..reduction.retained.len())
             .map(|k| {
                 let product = &reduction.products[reduction.retained[k]];
-                BaseParameter {
-                    name: base::name(k),
+                BaseParameterEntry {
+                    name: base::base_parameter_name(k),
                     retained: product.text(&self.mechanism),
-                    expression: base::written_out(&self.mechanism, reduction, k).text(),
-                    unit: base::unit(&self.mechanism, product),
+                    expression: base::expanded_formula(&self.mechanism, reduction, k).text(),
+                    unit: base::product_unit(&self.mechanism, product),
                 }
             })
             .collect()
@@ -50,7 +50,7 @@ impl Derivation {
     /// Sums that base parameters refer to, with their expressions, each after those that it needs; none unless base
     /// parameters that are written out would be too long to read.
     pub fn base_sums(&self) -> Vec<(String, String)> {
-        let sums = base::sums(&self.mechanism, &self.reduction).into_iter();
+        let sums = base::dependent_sums(&self.mechanism, &self.reduction).into_iter();
         sums.map(|(name, formula)| (name, formula.text())).collect()
     }
 
@@ -67,10 +67,10 @@ impl Derivation {
             let retained = retained.map(|(k, factor)| (self.reduction.retained[*k], factor));
             let via = line.via.iter().map(|(product, factor)| (*product, factor));
             let terms = retained.chain(via).map(|(product, factor)| {
-                let column = Formula::name(column(product));
-                Formula::product(Rational::ONE, [factor.formula(&self.mechanism), column])
+                let column = PrintedFormula::name(column(product));
+                PrintedFormula::product(Rational::ONE, [factor.formula(&self.mechanism), column])
             });
-            format!("{} = {}", column(line.product), Formula::sum(terms).text())
+            format!("{} = {}", column(line.product), PrintedFormula::sum(terms).text())
         });
         lines.collect()
     }
@@ -95,11 +95,11 @@ impl Derivation {
     /// Eq. (7) for given values of the constants, in the order of the model file: each base parameter as a sum of
     /// products of dynamic parameters with exact factors. Sines, cosines and roots of constants are those of floating
     /// point.
-    pub fn base_polynomials(&self, constants: &[BigRational]) -> Vec<Vec<(Monomial, BigRational)>> {
+    pub fn base_polynomials(&self, constants: &[BigRational]) -> Vec<Vec<(ParameterMonomial, BigRational)>> {
         let reduction = &self.reduction;
         let product = |k: usize| reduction.products[k].clone();
         let retained = reduction.retained.iter();
-        let mut polynomials: Vec<Vec<(Monomial, BigRational)>> = retained
+        let mut polynomials: Vec<Vec<(ParameterMonomial, BigRational)>> = retained
             .map(|k| vec![(product(*k), BigRational::one())])
             .collect();
         let factors = reduction.factors_by(&|factor| Some(factor.value_exact(constants)));

@@ -1,7 +1,7 @@
 //! Numbers that a derivation must not have: values of the model file that are none, factors beyond floating point, base
 //! parameters that the file's own constants divide by zero.
 
-use crate::lower::{Op, Program};
+use crate::lower::{ProgramOp, StraightLineProgram};
 use crate::programs::PassivePosition;
 use crate::{Derivation, DeriveError};
 
@@ -19,7 +19,7 @@ pub(crate) fn check_results(derivation: &Derivation) -> Result<(), DeriveError> 
     if let PassivePosition::Newton(loops) = &programs.passive_position {
         all.extend([&loops.residual, &loops.scales]);
     }
-    if let Some(number) = all.into_iter().find_map(too_large) {
+    if let Some(number) = all.into_iter().find_map(oversized_number) {
         return Err(DeriveError::NotFinite {
             what: format!("the factor {number} of the equations"),
             todo: "write the mechanism with factors of reasonable size",
@@ -40,9 +40,9 @@ pub(crate) fn check_results(derivation: &Derivation) -> Result<(), DeriveError> 
 }
 
 /// A number of a program that no floating-point number comes near.
-fn too_large(program: &Program) -> Option<String> {
+fn oversized_number(program: &StraightLineProgram) -> Option<String> {
     program.ops.iter().find_map(|op| match op {
-        Op::Number(number) if !number.to_f64().is_finite() => Some(number.to_big().to_string()),
+        ProgramOp::Number(number) if !number.to_f64().is_finite() => Some(number.to_big().to_string()),
         _ => None,
     })
 }

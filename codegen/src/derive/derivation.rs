@@ -3,10 +3,10 @@
 use modelmill_spec::Mechanism;
 
 use crate::expr::Graph;
-use crate::programs::Programs;
-use crate::programs::closing::Closing;
-use crate::reduce::Reduction;
-use crate::regressor::Equations;
+use crate::programs::ModelPrograms;
+use crate::programs::closing::PassiveClosure;
+use crate::reduce::BaseReduction;
+use crate::regressor::UnreducedEquations;
 
 /// Everything that the mill knows about a mechanism.
 pub struct Derivation {
@@ -15,10 +15,10 @@ pub struct Derivation {
     /// The arena of all expressions.
     pub graph: Graph,
     /// Which products are retained and how the others follow.
-    pub reduction: Reduction,
+    pub reduction: BaseReduction,
     /// Straight-line programs, ready to be emitted or evaluated.
-    pub programs: Programs,
-    pub(crate) equations: Equations,
+    pub programs: ModelPrograms,
+    pub(crate) equations: UnreducedEquations,
     /// How loops are closed: in which order they are solved, and what stands for the passive coordinates.
-    pub(crate) closing: Closing,
+    pub(crate) closing: PassiveClosure,
 }

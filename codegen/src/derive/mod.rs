@@ -12,17 +12,17 @@ pub use derivation::Derivation;
 use crate::DeriveError;
 use crate::expr::Graph;
 use crate::programs::cheapest::PASSES;
-use crate::programs::closing::Closing;
+use crate::programs::closing::PassiveClosure;
 use crate::programs::programs;
-use crate::reduce::{Reduction, reduce, unreduced};
-use crate::regressor::{Equations, equations};
+use crate::reduce::{BaseReduction, reduce, without_reduction};
+use crate::regressor::{UnreducedEquations, unreduced_equations};
 use crate::tree::checks::check_values;
-use crate::tree::expressions::Monomial;
+use crate::tree::expressions::ParameterMonomial;
 
 /// Derives the inverse dynamics of a mechanism and reduces it to base parameters, whatever these are worth at the file's
 /// values.
 pub(crate) fn derive(mechanism: &Mechanism) -> Result<Derivation, DeriveError> {
-    let derivation = derive_by(mechanism, PASSES.len(), |graph, equations| {
+    let derivation = derive_with(mechanism, PASSES.len(), |graph, equations| {
         reduce(graph, mechanism, equations)
     })?;
     checks::check_results(&derivation)?;
@@ -33,25 +33,25 @@ pub(crate) fn derive(mechanism: &Mechanism) -> Result<Derivation, DeriveError> {
 /// that a model may never have.
 pub fn derive_columns(
     mechanism: &Mechanism,
-    wanted: &dyn Fn(&Monomial) -> bool,
+    wanted: &dyn Fn(&ParameterMonomial) -> bool,
 ) -> Result<Derivation, DeriveError> {
     // Columns are made once along each recording: that takes less time than to look for cheaper forms.
-    derive_by(mechanism, 0, |_, equations| {
-        Ok(unreduced(equations, wanted))
+    derive_with(mechanism, 0, |_, equations| {
+        Ok(without_reduction(equations, wanted))
     })
 }
 
 /// The stages in their order, with `reduce` for the way from p_g to p_min and `passes` that look for cheaper forms.
-fn derive_by(
+fn derive_with(
     mechanism: &Mechanism,
     passes: usize,
-    reduce: impl FnOnce(&mut Graph, &Equations) -> Result<Reduction, DeriveError>,
+    reduce: impl FnOnce(&mut Graph, &UnreducedEquations) -> Result<BaseReduction, DeriveError>,
 ) -> Result<Derivation, DeriveError> {
     check_values(mechanism)?;
     let mut graph = Graph::new();
-    let equations = equations(&mut graph, mechanism)?;
+    let equations = unreduced_equations(&mut graph, mechanism)?;
     let reduction = reduce(&mut graph, &equations)?;
-    let closing = Closing::new(&mut graph, mechanism, &equations)?;
+    let closing = PassiveClosure::new(&mut graph, mechanism, &equations)?;
     let programs = programs(
         &mut graph, mechanism, &equations, &reduction, &closing, passes,
     )?;

@@ -4,11 +4,11 @@ use crate::Derivation;
 use crate::loops::magnitude;
 
 /// Reach of every independent coordinate, rad or m: everywhere for open chains, where loops stay closed for others.
-pub(crate) fn reaches(derivation: &Derivation) -> Vec<f64> {
+pub(crate) fn self_test_reach(derivation: &Derivation) -> Vec<f64> {
     let mechanism = &derivation.mechanism;
     let residual = &derivation.equations.projection.loops.residual;
     let mut graph = derivation.graph.clone();
-    let size = magnitude::at_nominal(&mut graph, mechanism, residual);
+    let size = magnitude::nominal_magnitude(&mut graph, mechanism, residual);
     let (active, _) = derivation.coordinates();
     let is_open = residual.is_empty();
     let reach = |i: &usize| match (mechanism.coordinates[*i].motion.is_angle(), is_open) {

@@ -6,7 +6,7 @@ use proc_macro2::{Ident, Span};
 
 /// Keywords that `r#` does not make identifiers, and names of the prelude and of emitted modules that a pattern takes for
 /// what they are instead of binding them.
-const NEVER: [&str; 41] = [
+const UNBINDABLE_NAMES: [&str; 41] = [
     "self",
     "Self",
     "super",
@@ -51,7 +51,7 @@ const NEVER: [&str; 41] = [
 ];
 
 /// Keywords that the parser takes for identifiers, because an older edition does.
-const NEWER: [&str; 1] = ["gen"];
+const NEWER_KEYWORDS: [&str; 1] = ["gen"];
 
 /// Names in scope everywhere that a module of the same name would hide from its neighbours.
 const IN_SCOPE: [&str; 20] = [
@@ -63,14 +63,14 @@ const IN_SCOPE: [&str; 20] = [
 ///
 /// What cannot be written so starts with `_`, which no name of a model file does; characters that an identifier cannot
 /// hold are spelled by their code, so that no two names meet.
-pub(super) fn of_field(name: &str) -> Ident {
+pub(super) fn field_identifier(name: &str) -> Ident {
     let plain = name.starts_with(|c: char| c.is_ascii_alphabetic())
         && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
-        && !NEVER.contains(&name);
+        && !UNBINDABLE_NAMES.contains(&name);
     if !plain {
-        return Ident::new(&spelled(name), Span::call_site());
+        return Ident::new(&valid_spelling(name), Span::call_site());
     }
-    if NEWER.contains(&name) || syn::parse_str::<syn::Ident>(name).is_err() {
+    if NEWER_KEYWORDS.contains(&name) || syn::parse_str::<syn::Ident>(name).is_err() {
         Ident::new_raw(name, Span::call_site())
     } else {
         Ident::new(name, Span::call_site())
@@ -78,15 +78,15 @@ pub(super) fn of_field(name: &str) -> Ident {
 }
 
 /// The name of a module, which also keeps clear of what is in scope around it.
-pub(super) fn of_module(name: &str) -> Ident {
+pub(super) fn module_identifier(name: &str) -> Ident {
     if IN_SCOPE.contains(&name) {
-        Ident::new(&spelled(name), Span::call_site())
+        Ident::new(&valid_spelling(name), Span::call_site())
     } else {
-        of_field(name)
+        field_identifier(name)
     }
 }
 
-fn spelled(name: &str) -> String {
+fn valid_spelling(name: &str) -> String {
     let mut spelled = "_".to_owned();
     for c in name.chars() {
         if c.is_ascii_alphanumeric() {
@@ -112,7 +112,7 @@ mod tests {
             "__", "_x", "_x_", "a-b", "a_b", "a_2d_b", "_a_2d_b", "\u{e4}", "_e4_", "1", "_1",
             "f64", "_f64", "T", "Model",
         ];
-        for of in [of_field, of_module] {
+        for of in [field_identifier, module_identifier] {
             let mut seen = BTreeMap::new();
             for name in names {
                 let identifier = of(name).to_string();
@@ -126,11 +126,11 @@ mod tests {
 
     #[test]
     fn names_stay_readable() {
-        let field = |name: &str| of_field(name).to_string();
+        let field = |name: &str| field_identifier(name).to_string();
         assert_eq!(field("dc1"), "dc1");
         assert_eq!(field("type"), "r#type");
         assert_eq!(field("self"), "_self");
-        assert_eq!(of_module("f64").to_string(), "_f64");
-        assert_eq!(of_module("arm").to_string(), "arm");
+        assert_eq!(module_identifier("f64").to_string(), "_f64");
+        assert_eq!(module_identifier("arm").to_string(), "arm");
     }
 }

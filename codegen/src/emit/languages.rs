@@ -1,34 +1,34 @@
 //! The list of languages, those of crates around the Rust module included.
 
-use super::language::{C99, EmittedFile, Form, Language, RustModule, Source};
+use super::language::{C99Sources, EmittedFile, OutputForm, OutputLanguage, RustModule, EmissionRequest};
 use super::wrap::{emit_c, emit_python};
 
 /// All languages; the first is taken where none is named.
-pub const LANGUAGES: [&dyn Language; 4] = [&RustModule, &C99, &CCrate, &PythonCrate];
+pub const LANGUAGES: [&dyn OutputLanguage; 4] = [&RustModule, &C99Sources, &CCrate, &PythonCrate];
 
 /// A crate around the Rust module that makes a C library.
 struct CCrate;
 
-impl Language for CCrate {
+impl OutputLanguage for CCrate {
     fn name(&self) -> &'static str {
         "c"
     }
 
-    fn about(&self) -> &'static str {
+    fn description(&self) -> &'static str {
         "A static and a shared library, and a header"
     }
 
-    fn form(&self) -> Form {
-        Form::Crate {
+    fn output_form(&self) -> OutputForm {
+        OutputForm::Crate {
             makes: "a C library and its header: build it there with `cargo build --release`",
         }
     }
 
-    fn has_all(&self) -> bool {
+    fn has_reactions_and_self_test(&self) -> bool {
         false
     }
 
-    fn write(&self, source: &Source<'_>) -> Vec<EmittedFile> {
+    fn emit_files(&self, source: &EmissionRequest<'_>) -> Vec<EmittedFile> {
         emit_c(source)
     }
 }
@@ -36,26 +36,26 @@ impl Language for CCrate {
 /// A crate around the Rust module that makes a Python module.
 struct PythonCrate;
 
-impl Language for PythonCrate {
+impl OutputLanguage for PythonCrate {
     fn name(&self) -> &'static str {
         "python"
     }
 
-    fn about(&self) -> &'static str {
+    fn description(&self) -> &'static str {
         "A module for numpy arrays"
     }
 
-    fn form(&self) -> Form {
-        Form::Crate {
+    fn output_form(&self) -> OutputForm {
+        OutputForm::Crate {
             makes: "a Python module: build it there with `maturin build --release`, or `cargo build --release`",
         }
     }
 
-    fn has_all(&self) -> bool {
+    fn has_reactions_and_self_test(&self) -> bool {
         false
     }
 
-    fn write(&self, source: &Source<'_>) -> Vec<EmittedFile> {
+    fn emit_files(&self, source: &EmissionRequest<'_>) -> Vec<EmittedFile> {
         emit_python(source)
     }
 }

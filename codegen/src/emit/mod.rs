@@ -10,7 +10,7 @@ pub(crate) mod tree;
 mod vectors;
 mod wrap;
 
-pub use language::rust::{Emitted, emit, emit_with_dynamics, module_name};
-pub use language::{EmittedFile, Form, Language, Source};
+pub use language::rust::{EmittedModule, emit, emit_with_dynamics, module_name};
+pub use language::{EmittedFile, OutputForm, OutputLanguage, EmissionRequest};
 pub use languages::LANGUAGES;
 pub use vectors::vectors_c;

@@ -11,7 +11,7 @@ use modelmill_spec::Mechanism;
 
 use super::tree::in_order;
 use crate::expr::{Atom, Unary};
-use crate::lower::{Guard, Op, Program, SINGULAR, Stage};
+use crate::lower::{PoseGuard, ProgramOp, StraightLineProgram, SINGULAR, ProgramStage};
 use crate::{Derivation, ValueId};
 
 /// What does not depend on the program: vectors, sines and cosines.
@@ -26,7 +26,7 @@ const SUPPORT: &str = include_str!("vectors.c");
 /// rows; its statements stand in the order in which the emitted Rust has them.
 ///
 /// The program is one of the derivation's; passive coordinates must have a closed form.
-pub fn vectors_c(derivation: &Derivation, program: &Program, width: usize) -> String {
+pub fn vectors_c(derivation: &Derivation, program: &StraightLineProgram, width: usize) -> String {
     let mechanism = &derivation.mechanism;
     let active = &derivation.equations.projection.loops.active;
     let n_active = active.len();
@@ -42,9 +42,9 @@ pub fn vectors_c(derivation: &Derivation, program: &Program, width: usize) -> St
         Atom::Load(d) => Some((3, 3 * n_active + d)),
         _ => None,
     };
-    let is_fixed = |value: ValueId| program.stages[value.index()] == Stage::Fixed;
+    let is_fixed = |value: ValueId| program.stages[value.index()] == ProgramStage::Fixed;
     let read = program.ops.iter().filter_map(|op| match op {
-        Op::Input(atom) => input(*atom),
+        ProgramOp::Input(atom) => input(*atom),
         _ => None,
     });
     let (parts, places): (BTreeSet<usize>, Vec<usize>) = read.unzip();
@@ -56,27 +56,27 @@ pub fn vectors_c(derivation: &Derivation, program: &Program, width: usize) -> St
     for i in in_order(program, &vec![false; n], &vec![false; n], &vec![0; n]) {
         let op = &program.ops[i];
         let _ = match program.stages[i] {
-            Stage::Fixed => writeln!(fixed, "    const double x{i} = {};", scalar(op, mechanism)),
-            Stage::State => {
-                let statement = vector(i, op, &|atom| input(atom).map(|(_, k)| k), &is_fixed);
+            ProgramStage::Fixed => writeln!(fixed, "    const double x{i} = {};", scalar_operation(op, mechanism)),
+            ProgramStage::State => {
+                let statement = vector_statement(i, op, &|atom| input(atom).map(|(_, k)| k), &is_fixed);
                 writeln!(of_state, "            {statement}")
             }
         };
     }
     for guard in &program.guards {
-        let value = wide(guard.value(), &is_fixed);
+        let value = vector_operand(guard.value(), &is_fixed);
         let _ = match guard {
-            Guard::Reachable(_) => writeln!(of_state, "            bad |= ~({value} >= 0.0);"),
-            Guard::Regular(_, size) => {
-                let size = wide(*size, &is_fixed);
+            PoseGuard::Reachable(_) => writeln!(of_state, "            bad |= ~({value} >= 0.0);"),
+            PoseGuard::Regular(_, size) => {
+                let size = vector_operand(*size, &is_fixed);
                 let holds = format!("absolute({value}) > {SINGULAR:e} * {size}");
                 writeln!(of_state, "            bad |= ~({holds});")
             }
-            Guard::Finite(_) => writeln!(of_state, "            look_at({value}, &none);"),
+            PoseGuard::Finite(_) => writeln!(of_state, "            look_at({value}, &none);"),
         };
     }
     for (k, output) in program.outputs.iter().take(width).enumerate() {
-        let value = wide(*output, &is_fixed);
+        let value = vector_operand(*output, &is_fixed);
         let _ = writeln!(of_state, "            found[{k} * LINES] = {value};");
     }
     let [mut given, mut reads, mut fetches] = [const { String::new() }; 3];
@@ -130,7 +130,7 @@ int run(long n, const double *const *arrays, const long *by_state, const long *b
 }
 
 /// A value as a vector.
-fn wide(value: ValueId, is_fixed: &dyn Fn(ValueId) -> bool) -> String {
+fn vector_operand(value: ValueId, is_fixed: &dyn Fn(ValueId) -> bool) -> String {
     let i = value.index();
     if is_fixed(value) {
         format!("all(x{i})")
@@ -139,21 +139,21 @@ fn wide(value: ValueId, is_fixed: &dyn Fn(ValueId) -> bool) -> String {
     }
 }
 
-fn number(value: f64) -> String {
+fn number_literal(value: f64) -> String {
     format!("{value:e}")
 }
 
-fn binary(op: &Op) -> Option<(usize, char, usize)> {
+fn binary_operator(op: &ProgramOp) -> Option<(usize, char, usize)> {
     Some(match op {
-        Op::Add(a, b) => (a.index(), '+', b.index()),
-        Op::Sub(a, b) => (a.index(), '-', b.index()),
-        Op::Mul(a, b) => (a.index(), '*', b.index()),
-        Op::Div(a, b) => (a.index(), '/', b.index()),
+        ProgramOp::Add(a, b) => (a.index(), '+', b.index()),
+        ProgramOp::Sub(a, b) => (a.index(), '-', b.index()),
+        ProgramOp::Mul(a, b) => (a.index(), '*', b.index()),
+        ProgramOp::Div(a, b) => (a.index(), '/', b.index()),
         _ => return None,
     })
 }
 
-fn function(unary: Unary) -> &'static str {
+fn function_name(unary: Unary) -> &'static str {
     match unary {
         Unary::Sqrt => "sqrt",
         Unary::Sign => "sign",
@@ -166,49 +166,49 @@ fn function(unary: Unary) -> &'static str {
 }
 
 /// An operation whose value is the same for all states.
-fn scalar(op: &Op, mechanism: &Mechanism) -> String {
-    if let Some((a, sign, b)) = binary(op) {
+fn scalar_operation(op: &ProgramOp, mechanism: &Mechanism) -> String {
+    if let Some((a, sign, b)) = binary_operator(op) {
         return format!("x{a} {sign} x{b}");
     }
     match op {
-        Op::Number(value) => number(value.to_f64()),
-        Op::Input(Atom::Pi) => number(std::f64::consts::PI),
-        Op::Input(Atom::Constant(i)) => number(mechanism.constants[*i].value),
-        Op::Input(Atom::Parameter(i)) => number(mechanism.parameters[*i].nominal),
-        Op::Input(Atom::Base(k)) => format!("base[{k}]"),
-        Op::Neg(a) => format!("-x{}", a.index()),
-        Op::Sin(a) => format!("sin(x{})", a.index()),
-        Op::Cos(a) => format!("cos(x{})", a.index()),
-        Op::Atan2(y, x) => format!("atan2(x{}, x{})", y.index(), x.index()),
-        Op::Unary(unary, a) => format!("{}(x{})", function(*unary), a.index()),
+        ProgramOp::Number(value) => number_literal(value.to_f64()),
+        ProgramOp::Input(Atom::Pi) => number_literal(std::f64::consts::PI),
+        ProgramOp::Input(Atom::Constant(i)) => number_literal(mechanism.constants[*i].value),
+        ProgramOp::Input(Atom::Parameter(i)) => number_literal(mechanism.parameters[*i].nominal),
+        ProgramOp::Input(Atom::Base(k)) => format!("base[{k}]"),
+        ProgramOp::Neg(a) => format!("-x{}", a.index()),
+        ProgramOp::Sin(a) => format!("sin(x{})", a.index()),
+        ProgramOp::Cos(a) => format!("cos(x{})", a.index()),
+        ProgramOp::Atan2(y, x) => format!("atan2(x{}, x{})", y.index(), x.index()),
+        ProgramOp::Unary(unary, a) => format!("{}(x{})", function_name(*unary), a.index()),
         other => unreachable!("{other:?} is an operation of a state"),
     }
 }
 
 /// The statement of an operation on the states of a line.
-fn vector(
+fn vector_statement(
     i: usize,
-    op: &Op,
+    op: &ProgramOp,
     line: &dyn Fn(Atom) -> Option<usize>,
     is_fixed: &dyn Fn(ValueId) -> bool,
 ) -> String {
-    if let Some((a, sign, b)) = binary(op) {
+    if let Some((a, sign, b)) = binary_operator(op) {
         return format!("const V x{i} = x{a} {sign} x{b};");
     }
-    let wide = |value: &ValueId| self::wide(*value, is_fixed);
-    if let Op::Input(atom) = op
+    let wide = |value: &ValueId| self::vector_operand(*value, is_fixed);
+    if let ProgramOp::Input(atom) = op
         && let Some(k) = line(*atom)
     {
         return format!("const V x{i} = in[{k} * LINES];");
     }
     match op {
-        Op::Neg(a) => format!("const V x{i} = -x{};", a.index()),
-        Op::Sin(a) => format!("const V x{i} = sine({}, &bad);", wide(a)),
-        Op::Cos(a) => format!("const V x{i} = cosine({}, &bad);", wide(a)),
-        Op::Atan2(y, x) => format!("const V x{i} = angle({}, {});", wide(y), wide(x)),
-        Op::Unary(Unary::Abs, a) => format!("const V x{i} = absolute({});", wide(a)),
-        Op::Unary(unary, a) => {
-            format!("V x{i} = {}; EACH(x{i}, {});", wide(a), function(*unary))
+        ProgramOp::Neg(a) => format!("const V x{i} = -x{};", a.index()),
+        ProgramOp::Sin(a) => format!("const V x{i} = sine({}, &bad);", wide(a)),
+        ProgramOp::Cos(a) => format!("const V x{i} = cosine({}, &bad);", wide(a)),
+        ProgramOp::Atan2(y, x) => format!("const V x{i} = angle({}, {});", wide(y), wide(x)),
+        ProgramOp::Unary(Unary::Abs, a) => format!("const V x{i} = absolute({});", wide(a)),
+        ProgramOp::Unary(unary, a) => {
+            format!("V x{i} = {}; EACH(x{i}, {});", wide(a), function_name(*unary))
         }
         other => unreachable!("{other:?} is the same for all states"),
     }

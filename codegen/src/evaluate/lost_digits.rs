@@ -9,10 +9,10 @@
 use modelmill_spec::Mechanism;
 use nalgebra::DMatrix;
 
-use super::{Evaluator, States};
-use crate::loops::numeric_poses::symmetric;
+use super::{ModelEvaluator, MotionStates};
+use crate::loops::numeric_poses::uniform_symmetric;
 use crate::{Derivation, DeriveError};
-use modelmill_algebra::field::Stream;
+use modelmill_algebra::field::RandomStream;
 
 /// Error of a drive's force, relative to the sum of what its products add to it, beyond which a base is refused. Errors of a
 /// millionth count as rounding of a recording's numbers elsewhere; ten of sixteen digits may be lost up to there.
@@ -25,25 +25,25 @@ const TRIES: usize = 100;
 /// How far states lie from the nominal pose, in rad and relative to the nominal length; by what it shrinks where the
 /// mechanism cannot stand.
 const REACH: f64 = 0.5;
-const SHRINKING: f64 = 0.8;
+const SHRINK_FACTOR: f64 = 0.8;
 
 /// Dependent products whose factors are nearly as large as the largest ones are named as well.
-const NEARLY: f64 = 1e-3;
+const NEARLY_LARGEST: f64 = 1e-3;
 
 /// That forces from p_min agree with those from p_g. Where no state is found at which the mechanism can stand, nothing is
 /// refused.
-pub(crate) fn check(derivation: &Derivation) -> Result<(), DeriveError> {
-    match lost(derivation)? {
+pub(crate) fn check_lost_digits(derivation: &Derivation) -> Result<(), DeriveError> {
+    match largest_digit_loss(derivation)? {
         // What is no number has lost all digits.
         Some(lost) if lost.error.is_nan() || lost.error > MOST_LOST => {
-            Err(culprits(derivation, &lost))
+            Err(lost_digits_error(derivation, &lost))
         }
         _ => Ok(()),
     }
 }
 
 /// What the drive loses that loses most.
-struct Lost {
+struct DigitLoss {
     /// Error of its force, relative to the sum of what its products add to it.
     error: f64,
     /// Its row of H, state by state.
@@ -53,7 +53,7 @@ struct Lost {
 }
 
 /// Holds forces from p_min against those from p_g; `None` where nothing is regrouped or no state is found.
-fn lost(derivation: &Derivation) -> Result<Option<Lost>, DeriveError> {
+fn largest_digit_loss(derivation: &Derivation) -> Result<Option<DigitLoss>, DeriveError> {
     if derivation.reduction.dependencies.is_empty() {
         return Ok(None);
     }
@@ -62,19 +62,19 @@ fn lost(derivation: &Derivation) -> Result<Option<Lost>, DeriveError> {
     let constants: Vec<f64> = mechanism.constants.iter().map(|c| c.value).collect();
     let products = &derivation.reduction.products;
     let values: Vec<f64> = products.iter().map(|p| p.value(&parameters)).collect();
-    let evaluator = Evaluator::new(derivation).with_parameters(&mechanism);
+    let evaluator = ModelEvaluator::new(derivation).with_parameters(&mechanism);
     // Evaluator and emitted code add up eq. (7) in different orders.
     let both = [
         derivation.base_values(&parameters, &constants),
         evaluator.base_parameters(),
     ];
-    let Some(sampled) = Sampled::new(&mechanism, &evaluator, &both)? else {
+    let Some(sampled) = ForceSamples::new(&mechanism, &evaluator, &both)? else {
         return Ok(None);
     };
     let n_drives = mechanism.drives.len();
-    let errors = (0..n_drives).map(|d| (d, sampled.error(d, n_drives, &values)));
+    let errors = (0..n_drives).map(|d| (d, sampled.relative_force_error(d, n_drives, &values)));
     let worst = errors.max_by(|a, b| a.1.total_cmp(&b.1));
-    Ok(worst.map(|(drive, error)| Lost {
+    Ok(worst.map(|(drive, error)| DigitLoss {
         error,
         h: DMatrix::from_fn(sampled.n_states(), products.len(), |s, k| {
             sampled.full[(s * n_drives + drive, k)]
@@ -98,21 +98,21 @@ fn with_all_parameters(mechanism: &Mechanism) -> Mechanism {
 }
 
 /// H and forces at some states around the nominal pose.
-struct Sampled {
+struct ForceSamples {
     /// H, drives within states.
     full: DMatrix<f64>,
     /// Forces from p_min, `[way of adding up p_min][drive][state]`.
     forces: [Vec<Vec<f64>>; 2],
 }
 
-impl Sampled {
+impl ForceSamples {
     /// `None` where no state is found; an error where forces are no finite numbers at any.
     fn new(
         mechanism: &Mechanism,
-        evaluator: &Evaluator<'_>,
+        evaluator: &ModelEvaluator<'_>,
         base: &[Vec<f64>; 2],
     ) -> Result<Option<Self>, DeriveError> {
-        let mut stream = Stream::new(0x6C6F_7374);
+        let mut stream = RandomStream::new(0x6C6F_7374);
         let n_drives = mechanism.drives.len();
         let mut rows: Vec<f64> = Vec::new();
         let mut forces = [vec![Vec::new(); n_drives], vec![Vec::new(); n_drives]];
@@ -121,8 +121,8 @@ impl Sampled {
             if n_states == STATES {
                 break;
             }
-            let state = State::random(mechanism, reach, &mut stream);
-            let states = state.states();
+            let state = NearbyState::random_near_nominal(mechanism, reach, &mut stream);
+            let states = state.as_motion_states();
             let found = evaluator.full_regressor(&states).and_then(|h| {
                 let [a, b] = base;
                 let forces = [
@@ -132,7 +132,7 @@ impl Sampled {
                 Ok((h, forces))
             });
             let Ok((h, found)) = found else {
-                reach *= SHRINKING;
+                reach *= SHRINK_FACTOR;
                 continue;
             };
             if h.iter().any(|x| !x.is_finite()) {
@@ -170,7 +170,7 @@ impl Sampled {
     }
 
     /// Error of a drive's force, relative to the sum of what its products add to it.
-    fn error(&self, drive: usize, n_drives: usize, values: &[f64]) -> f64 {
+    fn relative_force_error(&self, drive: usize, n_drives: usize, values: &[f64]) -> f64 {
         let (mut errors, mut size) = ([0.0; 2], 0.0);
         for state in 0..self.n_states() {
             let row = self.full.row(state * n_drives + drive);
@@ -194,15 +194,15 @@ impl Sampled {
 }
 
 /// A state near the nominal pose.
-struct State {
+struct NearbyState {
     q: Vec<f64>,
     qd: Vec<f64>,
     qdd: Vec<f64>,
     load: Vec<f64>,
 }
 
-impl State {
-    fn random(mechanism: &Mechanism, reach: f64, stream: &mut Stream) -> Self {
+impl NearbyState {
+    fn random_near_nominal(mechanism: &Mechanism, reach: f64, stream: &mut RandomStream) -> Self {
         let active: Vec<_> = (mechanism.coordinates.iter())
             .filter(|c| !c.passive)
             .collect();
@@ -212,10 +212,10 @@ impl State {
             } else {
                 c.nominal.abs()
             };
-            c.nominal + reach * one * symmetric(stream)
+            c.nominal + reach * one * uniform_symmetric(stream)
         });
         let q = q.collect();
-        let mut moving = |n: usize, most: f64| (0..n).map(|_| most * symmetric(stream)).collect();
+        let mut moving = |n: usize, most: f64| (0..n).map(|_| most * uniform_symmetric(stream)).collect();
         Self {
             q,
             qd: moving(active.len(), 2.0),
@@ -224,8 +224,8 @@ impl State {
         }
     }
 
-    fn states(&self) -> States<'_> {
-        States {
+    fn as_motion_states(&self) -> MotionStates<'_> {
+        MotionStates {
             q: self.q.chunks(1).collect(),
             qd: self.qd.chunks(1).collect(),
             qdd: self.qdd.chunks(1).collect(),
@@ -235,7 +235,7 @@ impl State {
 }
 
 /// Which products lose the digits.
-fn culprits(derivation: &Derivation, found: &Lost) -> DeriveError {
+fn lost_digits_error(derivation: &Derivation, found: &DigitLoss) -> DeriveError {
     let constants = derivation.mechanism.constants.iter();
     let constants: Vec<f64> = constants.map(|c| c.value).collect();
     let reduction = &derivation.reduction;
@@ -270,11 +270,11 @@ fn culprits(derivation: &Derivation, found: &Lost) -> DeriveError {
         .fold(0.0, f64::max);
     let worst = lines
         .iter()
-        .filter(|(_, terms)| largest(terms) >= NEARLY * all);
+        .filter(|(_, terms)| largest(terms) >= NEARLY_LARGEST * all);
     let dependent: Vec<String> = worst.clone().map(|(product, _)| name(*product)).collect();
     let mut retained: Vec<usize> = worst
         .flat_map(|(_, terms)| terms)
-        .filter(|(_, term)| *term >= NEARLY * all)
+        .filter(|(_, term)| *term >= NEARLY_LARGEST * all)
         .map(|(retained, _)| *retained)
         .collect();
     retained.sort_unstable();
@@ -304,7 +304,7 @@ mod tests {
     }
 
     fn read(text: &str) -> Mechanism {
-        let files = modelmill_boundary::files::Memory::default();
+        let files = modelmill_boundary::files::MemoryFiles::default();
         let loaded = modelmill_spec::load("made.toml", text, &files);
         loaded
             .unwrap_or_else(|failure| panic!("{failure}"))
@@ -361,7 +361,7 @@ mod tests {
     /// and as emitted code adds it up.
     fn errors_by_hand(derivation: &Derivation) -> [f64; 2] {
         let [a, b] = [0, 1].map(|k| derivation.mechanism.constants[k].value);
-        let evaluator = Evaluator::new(derivation);
+        let evaluator = ModelEvaluator::new(derivation);
         [
             derivation.nominal_base_values(),
             evaluator.base_parameters(),
@@ -370,13 +370,13 @@ mod tests {
             let (mut error, mut size) = (0.0_f64, 0.0_f64);
             for k in 0..40 {
                 let (q, qdd) = (0.13 * f64::from(k), 3.0 - 0.4 * f64::from(k % 17));
-                let state = State {
+                let state = NearbyState {
                     q: vec![q],
                     qd: vec![0.7],
                     qdd: vec![qdd],
                     load: vec![0.0],
                 };
-                let found = evaluator.inverse_dynamics(&state.states(), &base).unwrap()[0][0];
+                let found = evaluator.inverse_dynamics(&state.as_motion_states(), &base).unwrap()[0][0];
                 let inertia = a * a + 2.0 * b * b + 0.35;
                 let moment = a + 2.0 * b + 1.05;
                 let expected = inertia * qdd + 9.81 * (moment * q.cos() - 0.2 * q.sin());
@@ -486,14 +486,14 @@ mod tests {
             let derivation = derive(&masses(&places)).unwrap_or_else(|e| panic!("{gap:e}: {e}"));
             assert_eq!(derivation.reduction.retained.len(), 2);
             let base = derivation.nominal_base_values();
-            let state = State {
+            let state = NearbyState {
                 q: vec![0.5],
                 qd: vec![0.7],
                 qdd: vec![2.0],
                 load: vec![0.0],
             };
-            let evaluator = Evaluator::new(&derivation);
-            let found = evaluator.inverse_dynamics(&state.states(), &base).unwrap()[0][0];
+            let evaluator = ModelEvaluator::new(&derivation);
+            let found = evaluator.inverse_dynamics(&state.as_motion_states(), &base).unwrap()[0][0];
             let terms = places.iter().zip([1.0, 2.0, 3.0, 4.0]);
             let expected: f64 = terms
                 .map(|(x, m)| m * x * (2.0 * x + 9.81 * 0.5_f64.cos()))
@@ -554,7 +554,7 @@ mod tests {
     fn a_body_is_not_written_by_its_rotors() {
         for z in [[0.05, -0.05, 0.1, 0.02], [0.05; 4]] {
             let derivation = derive(&drone(z)).unwrap_or_else(|error| panic!("{error}"));
-            let lost = lost(&derivation).unwrap().unwrap().error;
+            let lost = largest_digit_loss(&derivation).unwrap().unwrap().error;
             assert!(lost < 1e-13, "{z:?}: {lost:e}");
             let lines = derivation.reduction.dependencies.iter();
             let has_quotients = lines.flat_map(|line| &line.equals).any(|(_, factor)| {
@@ -589,7 +589,7 @@ mod tests {
             "tx40",
         ] {
             let derivation = derive(&model(name)).unwrap();
-            let lost = lost(&derivation).unwrap().unwrap().error;
+            let lost = largest_digit_loss(&derivation).unwrap().unwrap().error;
             assert!(lost < 1e-11, "{name}: {lost:e}");
         }
     }

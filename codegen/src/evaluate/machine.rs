@@ -9,20 +9,20 @@ use pulp::{Arch, Simd, WithSimd};
 use super::{PoseFault, PoseReason};
 use crate::ValueId;
 use crate::expr::{Atom, Unary};
-use crate::lower::{Guard, Op, Program, Stage};
+use crate::lower::{PoseGuard, ProgramOp, StraightLineProgram, ProgramStage};
 
 /// States per block: small enough for the cache, large enough to hide the interpretation.
 const BLOCK: usize = 64;
 
 /// A program for one state at a time, as Newton's method needs it.
-pub(super) struct Scalar<'a> {
-    program: &'a Program,
+pub(super) struct SingleStateProgram<'a> {
+    program: &'a StraightLineProgram,
     /// Values of all operations; those of the fixed stage stay.
     values: RefCell<Vec<f64>>,
 }
 
-impl<'a> Scalar<'a> {
-    pub(super) fn new(machine: Machine<'a>) -> Self {
+impl<'a> SingleStateProgram<'a> {
+    pub(super) fn new(machine: RegisterMachine<'a>) -> Self {
         Self {
             program: machine.program,
             values: RefCell::new(machine.fixed),
@@ -38,10 +38,10 @@ impl<'a> Scalar<'a> {
         let mut values = self.values.borrow_mut();
         let ops = self.program.ops.iter().zip(&self.program.stages);
         for (i, (op, stage)) in ops.enumerate() {
-            if *stage == Stage::State {
+            if *stage == ProgramStage::State {
                 values[i] = match op {
-                    Op::Input(atom) => input(*atom),
-                    _ => scalar(op, |v| values[v]),
+                    ProgramOp::Input(atom) => input(*atom),
+                    _ => evaluate_op(op, |v| values[v]),
                 };
             }
         }
@@ -50,14 +50,14 @@ impl<'a> Scalar<'a> {
 }
 
 /// A program with its fixed stage done and its values assigned to reusable slots.
-pub(super) struct Machine<'a> {
-    program: &'a Program,
+pub(super) struct RegisterMachine<'a> {
+    program: &'a StraightLineProgram,
     /// Values of the fixed stage.
     fixed: Vec<f64>,
     /// Those among them that the state stage needs, with their slots.
     kept: Vec<(usize, f64)>,
     /// What is done to every block, in order.
-    steps: Vec<Step>,
+    steps: Vec<SlotInstruction>,
     /// Slot of each operation of the state stage, and of fixed values that are needed there.
     slots: Vec<usize>,
     /// Slot of each output; of those that are not wanted one that stays zero.
@@ -67,7 +67,7 @@ pub(super) struct Machine<'a> {
 
 /// One operation on slots; the target stands first and is never an operand.
 #[derive(Clone, Copy, Debug)]
-enum Step {
+enum SlotInstruction {
     Input(usize, Atom),
     Add(usize, usize, usize),
     Sub(usize, usize, usize),
@@ -81,32 +81,32 @@ enum Step {
 }
 
 /// Outputs of a program for some states.
-pub(super) struct Block<'m> {
+pub(super) struct OutputBlock<'m> {
     /// How many states.
     pub(super) len: usize,
     /// One slice of that length per output.
     pub(super) columns: Vec<&'m [f64]>,
 }
 
-impl<'a> Machine<'a> {
+impl<'a> RegisterMachine<'a> {
     /// For all outputs.
-    pub(super) fn new(program: &'a Program, atom: impl Fn(Atom) -> f64) -> Self {
-        Self::of(program, &|_| true, atom)
+    pub(super) fn new(program: &'a StraightLineProgram, atom: impl Fn(Atom) -> f64) -> Self {
+        Self::for_outputs(program, &|_| true, atom)
     }
 
     /// For some outputs; the others are zero, and what only they need is not computed.
-    pub(super) fn of(
-        program: &'a Program,
+    pub(super) fn for_outputs(
+        program: &'a StraightLineProgram,
         wanted: &dyn Fn(usize) -> bool,
         atom: impl Fn(Atom) -> f64,
     ) -> Self {
-        let computed = program.needed(wanted);
+        let computed = program.needed_operations(wanted);
         let mut fixed = vec![0.0; program.ops.len()];
         for (i, op) in program.ops.iter().enumerate() {
-            if computed[i] && program.stages[i] == Stage::Fixed {
+            if computed[i] && program.stages[i] == ProgramStage::Fixed {
                 fixed[i] = match op {
-                    Op::Input(input) => atom(*input),
-                    _ => scalar(op, |v| fixed[v]),
+                    ProgramOp::Input(input) => atom(*input),
+                    _ => evaluate_op(op, |v| fixed[v]),
                 };
             }
         }
@@ -114,7 +114,7 @@ impl<'a> Machine<'a> {
         let mut needed = vec![false; program.ops.len()];
         let ops = program.ops.iter().enumerate();
         for (i, op) in ops.filter(|(i, _)| computed[*i]) {
-            let is_state = program.stages[i] == Stage::State;
+            let is_state = program.stages[i] == ProgramStage::State;
             op.for_each_operand(|v| {
                 last_use[v.index()] = i;
                 needed[v.index()] |= is_state;
@@ -129,7 +129,7 @@ impl<'a> Machine<'a> {
         let mut slots = vec![0; program.ops.len()];
         let (mut free, mut n_slots): (Vec<usize>, usize) = (Vec::new(), 0);
         // Fixed values keep their slots.
-        for i in (0..program.ops.len()).filter(|i| program.stages[*i] == Stage::Fixed) {
+        for i in (0..program.ops.len()).filter(|i| program.stages[*i] == ProgramStage::Fixed) {
             if needed[i] {
                 slots[i] = n_slots;
                 n_slots += 1;
@@ -137,7 +137,7 @@ impl<'a> Machine<'a> {
         }
         let mut ends: Vec<Vec<usize>> = vec![Vec::new(); program.ops.len() + 1];
         for i in 0..program.ops.len() {
-            if computed[i] && program.stages[i] == Stage::State {
+            if computed[i] && program.stages[i] == ProgramStage::State {
                 slots[i] = free.pop().unwrap_or_else(|| {
                     n_slots += 1;
                     n_slots - 1
@@ -147,12 +147,12 @@ impl<'a> Machine<'a> {
             free.append(&mut ends[i]);
         }
         let kept = (0..program.ops.len())
-            .filter(|i| needed[*i] && program.stages[*i] == Stage::Fixed)
+            .filter(|i| needed[*i] && program.stages[*i] == ProgramStage::Fixed)
             .map(|i| (slots[i], fixed[i]))
             .collect();
         // Where only one of sine and cosine is needed, the other goes here.
         let (spare, zero) = (n_slots, n_slots + 1);
-        let steps = steps(program, &computed, &slots, spare);
+        let steps = slot_instructions(program, &computed, &slots, spare);
         let outputs = program.outputs.iter().enumerate();
         let outputs = outputs.map(|(k, value)| {
             if wanted(k) {
@@ -177,13 +177,13 @@ impl<'a> Machine<'a> {
         &self,
         n: usize,
         input: impl Fn(Atom) -> &'s [f64],
-        mut visit: impl FnMut(&Block<'_>) -> Result<(), E>,
+        mut visit: impl FnMut(&OutputBlock<'_>) -> Result<(), E>,
     ) -> Result<(), E> {
         let inputs: Vec<&[f64]> = self
             .steps
             .iter()
             .map(|step| match step {
-                Step::Input(_, atom) => input(*atom),
+                SlotInstruction::Input(_, atom) => input(*atom),
                 _ => &[],
             })
             .collect();
@@ -195,7 +195,7 @@ impl<'a> Machine<'a> {
         let mut start = 0;
         while start < n {
             let len = BLOCK.min(n - start);
-            arch.dispatch(OneBlock {
+            arch.dispatch(BlockExecution {
                 steps: &self.steps,
                 inputs: &inputs,
                 states: start..start + len,
@@ -203,15 +203,15 @@ impl<'a> Machine<'a> {
             });
             if let Some((k, guard)) = self.first_fault(len, &memory) {
                 let reason = match guard {
-                    Guard::Reachable(_) => PoseReason::OutOfReach,
-                    Guard::Regular(..) => PoseReason::Singular,
-                    Guard::Finite(_) => PoseReason::Undefined,
+                    PoseGuard::Reachable(_) => PoseReason::OutOfReach,
+                    PoseGuard::Regular(..) => PoseReason::Singular,
+                    PoseGuard::Finite(_) => PoseReason::Undefined,
                 };
                 let sample = start + k;
                 return Err(PoseFault { sample, reason }.into());
             }
             let columns = self.outputs.iter().map(|slot| &memory[*slot][..len]);
-            visit(&Block {
+            visit(&OutputBlock {
                 len,
                 columns: columns.collect(),
             })?;
@@ -221,56 +221,56 @@ impl<'a> Machine<'a> {
     }
 
     /// The first state of a block at which a guard fails, and the guard: of several, the one that emitted code sees first.
-    fn first_fault(&self, len: usize, memory: &[[f64; BLOCK]]) -> Option<(usize, Guard)> {
+    fn first_fault(&self, len: usize, memory: &[[f64; BLOCK]]) -> Option<(usize, PoseGuard)> {
         let failing = self.program.guards.iter().filter_map(|guard| {
-            let values = self.values(guard.value(), memory);
+            let values = self.block_values(guard.value(), memory);
             let size = guard
-                .size()
-                .map_or(1.0, |size| self.values(size, memory)[0]);
-            let k = values[..len].iter().position(|v| !guard.passes(*v, size))?;
+                .reference_size()
+                .map_or(1.0, |size| self.block_values(size, memory)[0]);
+            let k = values[..len].iter().position(|v| !guard.is_satisfied(*v, size))?;
             Some((k, *guard))
         });
         // Fixed values come before those of a state there.
-        let stage = |guard: &Guard| self.program.stages[guard.value().index()];
+        let stage = |guard: &PoseGuard| self.program.stages[guard.value().index()];
         failing.min_by_key(|(k, guard)| (*k, stage(guard), guard.value()))
     }
 
-    fn values<'m>(&self, value: ValueId, memory: &'m [[f64; BLOCK]]) -> &'m [f64; BLOCK] {
+    fn block_values<'m>(&self, value: ValueId, memory: &'m [[f64; BLOCK]]) -> &'m [f64; BLOCK] {
         &memory[self.slots[value.index()]]
     }
 }
 
 /// The state stage on slots.
-fn steps(program: &Program, computed: &[bool], slots: &[usize], spare: usize) -> Vec<Step> {
+fn slot_instructions(program: &StraightLineProgram, computed: &[bool], slots: &[usize], spare: usize) -> Vec<SlotInstruction> {
     let slot = |v: &ValueId| slots[v.index()];
     let mut steps = Vec::with_capacity(program.ops.len());
     for (i, op) in program.ops.iter().enumerate() {
-        if program.stages[i] == Stage::Fixed || !computed[i] {
+        if program.stages[i] == ProgramStage::Fixed || !computed[i] {
             continue;
         }
         let to = slots[i];
         let step = match op {
-            Op::Input(atom) => Step::Input(to, *atom),
-            Op::Add(a, b) => Step::Add(to, slot(a), slot(b)),
-            Op::Sub(a, b) => Step::Sub(to, slot(a), slot(b)),
-            Op::Mul(a, b) => Step::Mul(to, slot(a), slot(b)),
-            Op::Div(a, b) => Step::Div(to, slot(a), slot(b)),
-            Op::Atan2(a, b) => Step::Atan2(to, slot(a), slot(b)),
-            Op::Neg(a) => Step::Neg(to, slot(a)),
-            Op::Cos(a) | Op::Unary(Unary::Cos, a) => Step::SinCos(spare, to, slot(a)),
+            ProgramOp::Input(atom) => SlotInstruction::Input(to, *atom),
+            ProgramOp::Add(a, b) => SlotInstruction::Add(to, slot(a), slot(b)),
+            ProgramOp::Sub(a, b) => SlotInstruction::Sub(to, slot(a), slot(b)),
+            ProgramOp::Mul(a, b) => SlotInstruction::Mul(to, slot(a), slot(b)),
+            ProgramOp::Div(a, b) => SlotInstruction::Div(to, slot(a), slot(b)),
+            ProgramOp::Atan2(a, b) => SlotInstruction::Atan2(to, slot(a), slot(b)),
+            ProgramOp::Neg(a) => SlotInstruction::Neg(to, slot(a)),
+            ProgramOp::Cos(a) | ProgramOp::Unary(Unary::Cos, a) => SlotInstruction::SinCos(spare, to, slot(a)),
             // The cosine of the same angle stands right before the sine if both are needed; the angle is still there.
-            Op::Sin(a) if i > 0 && computed[i - 1] && program.ops[i - 1] == Op::Cos(*a) => {
+            ProgramOp::Sin(a) if i > 0 && computed[i - 1] && program.ops[i - 1] == ProgramOp::Cos(*a) => {
                 steps.pop();
                 let cos = if slots[i - 1] == to {
                     spare
                 } else {
                     slots[i - 1]
                 };
-                Step::SinCos(to, cos, slot(a))
+                SlotInstruction::SinCos(to, cos, slot(a))
             }
-            Op::Sin(a) | Op::Unary(Unary::Sin, a) => Step::SinCos(to, spare, slot(a)),
-            Op::Unary(function, a) => Step::Unary(to, *function, slot(a)),
-            Op::Number(_) => unreachable!("numbers are fixed"),
+            ProgramOp::Sin(a) | ProgramOp::Unary(Unary::Sin, a) => SlotInstruction::SinCos(to, spare, slot(a)),
+            ProgramOp::Unary(function, a) => SlotInstruction::Unary(to, *function, slot(a)),
+            ProgramOp::Number(_) => unreachable!("numbers are fixed"),
         };
         steps.push(step);
     }
@@ -278,15 +278,15 @@ fn steps(program: &Program, computed: &[bool], slots: &[usize], spare: usize) ->
 }
 
 /// All steps on one block of states.
-struct OneBlock<'a, 's> {
-    steps: &'a [Step],
+struct BlockExecution<'a, 's> {
+    steps: &'a [SlotInstruction],
     /// What each step reads, if it is an input.
     inputs: &'a [&'s [f64]],
     states: std::ops::Range<usize>,
     memory: &'a mut [[f64; BLOCK]],
 }
 
-impl WithSimd for OneBlock<'_, '_> {
+impl WithSimd for BlockExecution<'_, '_> {
     type Output = ();
 
     #[allow(clippy::inline_always, reason = "the trait's manual asks for it")]
@@ -295,21 +295,21 @@ impl WithSimd for OneBlock<'_, '_> {
         let memory = self.memory;
         for (step, input) in self.steps.iter().zip(self.inputs) {
             match *step {
-                Step::Input(to, _) => {
+                SlotInstruction::Input(to, _) => {
                     memory[to][..self.states.len()].copy_from_slice(&input[self.states.clone()]);
                 }
-                Step::Add(to, a, b) => two(memory, to, a, b, |x, y| x + y),
-                Step::Sub(to, a, b) => two(memory, to, a, b, |x, y| x - y),
-                Step::Mul(to, a, b) => two(memory, to, a, b, |x, y| x * y),
-                Step::Div(to, a, b) => two(memory, to, a, b, |x, y| x / y),
-                Step::Atan2(to, a, b) => two(memory, to, a, b, f64::atan2),
-                Step::Neg(to, a) => one(memory, to, a, |x| -x),
-                Step::Unary(to, Unary::Sqrt, a) => one(memory, to, a, f64::sqrt),
-                Step::Unary(to, Unary::Abs, a) => one(memory, to, a, f64::abs),
-                Step::Unary(to, Unary::Sign, a) => one(memory, to, a, sign),
-                Step::Unary(to, function, a) => one(memory, to, a, |x| unary(function, x)),
-                Step::SinCos(sin, cos, a) => {
-                    let [sin, cos, a] = distinct(memory, [sin, cos, a]);
+                SlotInstruction::Add(to, a, b) => apply_binary(memory, to, a, b, |x, y| x + y),
+                SlotInstruction::Sub(to, a, b) => apply_binary(memory, to, a, b, |x, y| x - y),
+                SlotInstruction::Mul(to, a, b) => apply_binary(memory, to, a, b, |x, y| x * y),
+                SlotInstruction::Div(to, a, b) => apply_binary(memory, to, a, b, |x, y| x / y),
+                SlotInstruction::Atan2(to, a, b) => apply_binary(memory, to, a, b, f64::atan2),
+                SlotInstruction::Neg(to, a) => apply_unary(memory, to, a, |x| -x),
+                SlotInstruction::Unary(to, Unary::Sqrt, a) => apply_unary(memory, to, a, f64::sqrt),
+                SlotInstruction::Unary(to, Unary::Abs, a) => apply_unary(memory, to, a, f64::abs),
+                SlotInstruction::Unary(to, Unary::Sign, a) => apply_unary(memory, to, a, sign),
+                SlotInstruction::Unary(to, function, a) => apply_unary(memory, to, a, |x| evaluate_unary(function, x)),
+                SlotInstruction::SinCos(sin, cos, a) => {
+                    let [sin, cos, a] = distinct_slots(memory, [sin, cos, a]);
                     sin_cos_lanes(a, sin, cos);
                 }
             }
@@ -317,7 +317,7 @@ impl WithSimd for OneBlock<'_, '_> {
     }
 }
 
-fn distinct<const N: usize>(
+fn distinct_slots<const N: usize>(
     memory: &mut [[f64; BLOCK]],
     slots: [usize; N],
 ) -> [&mut [f64; BLOCK]; N] {
@@ -331,8 +331,8 @@ fn distinct<const N: usize>(
     reason = "a function of its own would be compiled for the narrowest vectors"
 )]
 #[inline(always)]
-fn one(memory: &mut [[f64; BLOCK]], to: usize, a: usize, operation: impl Fn(f64) -> f64) {
-    let [to, a] = distinct(memory, [to, a]);
+fn apply_unary(memory: &mut [[f64; BLOCK]], to: usize, a: usize, operation: impl Fn(f64) -> f64) {
+    let [to, a] = distinct_slots(memory, [to, a]);
     for k in 0..BLOCK {
         to[k] = operation(a[k]);
     }
@@ -341,7 +341,7 @@ fn one(memory: &mut [[f64; BLOCK]], to: usize, a: usize, operation: impl Fn(f64)
 /// Generic, so that each operation is a loop of its own that the compiler can make wide.
 #[allow(clippy::inline_always, reason = "as above")]
 #[inline(always)]
-fn two(
+fn apply_binary(
     memory: &mut [[f64; BLOCK]],
     to: usize,
     a: usize,
@@ -349,9 +349,9 @@ fn two(
     operation: impl Fn(f64, f64) -> f64,
 ) {
     if a == b {
-        return one(memory, to, a, |x| operation(x, x));
+        return apply_unary(memory, to, a, |x| operation(x, x));
     }
-    let [to, a, b] = distinct(memory, [to, a, b]);
+    let [to, a, b] = distinct_slots(memory, [to, a, b]);
     for k in 0..BLOCK {
         to[k] = operation(a[k], b[k]);
     }
@@ -370,7 +370,7 @@ fn sign(x: f64) -> f64 {
     }
 }
 
-fn unary(function: Unary, x: f64) -> f64 {
+fn evaluate_unary(function: Unary, x: f64) -> f64 {
     match function {
         Unary::Sqrt => x.sqrt(),
         Unary::Sign => sign(x),
@@ -382,19 +382,19 @@ fn unary(function: Unary, x: f64) -> f64 {
     }
 }
 
-fn scalar(op: &Op, value: impl Fn(usize) -> f64) -> f64 {
+fn evaluate_op(op: &ProgramOp, value: impl Fn(usize) -> f64) -> f64 {
     let get = |v: &crate::ValueId| value(v.index());
     match op {
-        Op::Number(number) => number.to_f64(),
-        Op::Input(_) => unreachable!("inputs are given"),
-        Op::Add(a, b) => get(a) + get(b),
-        Op::Sub(a, b) => get(a) - get(b),
-        Op::Mul(a, b) => get(a) * get(b),
-        Op::Div(a, b) => get(a) / get(b),
-        Op::Neg(a) => -get(a),
-        Op::Sin(a) => get(a).sin(),
-        Op::Cos(a) => get(a).cos(),
-        Op::Atan2(y, x) => get(y).atan2(get(x)),
-        Op::Unary(function, a) => unary(*function, get(a)),
+        ProgramOp::Number(number) => number.to_f64(),
+        ProgramOp::Input(_) => unreachable!("inputs are given"),
+        ProgramOp::Add(a, b) => get(a) + get(b),
+        ProgramOp::Sub(a, b) => get(a) - get(b),
+        ProgramOp::Mul(a, b) => get(a) * get(b),
+        ProgramOp::Div(a, b) => get(a) / get(b),
+        ProgramOp::Neg(a) => -get(a),
+        ProgramOp::Sin(a) => get(a).sin(),
+        ProgramOp::Cos(a) => get(a).cos(),
+        ProgramOp::Atan2(y, x) => get(y).atan2(get(x)),
+        ProgramOp::Unary(function, a) => evaluate_unary(*function, get(a)),
     }
 }

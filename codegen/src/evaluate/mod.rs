@@ -6,20 +6,20 @@ mod machine;
 
 use std::fmt;
 
-use modelmill_runtime::{Loops, PoseError, Scales, follow, settle};
+use modelmill_runtime::{Loops, PoseError, Scales, follow, solve_passive};
 use modelmill_spec::Mechanism;
 use nalgebra::DMatrix;
 
 use crate::expr::Atom;
-use crate::lower::{Op, Program};
+use crate::lower::{ProgramOp, StraightLineProgram};
 use crate::programs::{LoopPrograms, PassivePosition};
-use crate::{Derivation, Dynamics, Programs, Reactions};
+use crate::{Derivation, DynamicsPrograms, ModelPrograms, ReactionPrograms};
 
-use machine::{Block, Machine, Scalar};
+use machine::{OutputBlock, RegisterMachine, SingleStateProgram};
 
 /// Motion of the active coordinates, one slice of equal length per coordinate, in the order of the model file.
 #[derive(Clone, Debug, Default)]
-pub struct States<'a> {
+pub struct MotionStates<'a> {
     /// Coordinates, rad or m.
     pub q: Vec<&'a [f64]>,
     /// Rates, rad/s or m/s.
@@ -30,7 +30,7 @@ pub struct States<'a> {
     pub load: Vec<&'a [f64]>,
 }
 
-impl States<'_> {
+impl MotionStates<'_> {
     /// Number of states.
     pub fn len(&self) -> usize {
         self.q.first().map_or(0, |q| q.len())
@@ -107,15 +107,15 @@ impl std::error::Error for PoseFault {}
 
 /// Numeric values for a model's constants and base parameters, ready to run its programs.
 #[derive(Clone, Debug)]
-pub struct Evaluator<'a> {
+pub struct ModelEvaluator<'a> {
     mechanism: &'a Mechanism,
-    programs: &'a Programs,
+    programs: &'a ModelPrograms,
     active: Vec<usize>,
     passive: Vec<usize>,
     constants: Vec<f64>,
 }
 
-impl<'a> Evaluator<'a> {
+impl<'a> ModelEvaluator<'a> {
     /// An evaluator with the model file's values.
     pub fn new(derivation: &'a Derivation) -> Self {
         let constants = derivation
@@ -148,16 +148,16 @@ impl<'a> Evaluator<'a> {
     /// p_min for the mechanism's parameters, as emitted code computes it.
     pub(crate) fn base_parameters(&self) -> Vec<f64> {
         let program = &self.programs.base_parameters;
-        let machine = Machine::new(program, |atom| self.fixed(atom, &[]));
-        Scalar::new(machine).run(
+        let machine = RegisterMachine::new(program, |atom| self.fixed_value(atom, &[]));
+        SingleStateProgram::new(machine).run(
             |_| unreachable!("base parameters do not depend on the state"),
             |output| (0..program.outputs.len()).map(output).collect(),
         )
     }
 
     /// H_min, one matrix row per state and drive (states outermost), one column per base parameter.
-    pub fn regressor(&self, states: &States<'_>) -> Result<DMatrix<f64>, PoseFault> {
-        self.matrix(&self.programs.regressor, states)
+    pub fn regressor(&self, states: &MotionStates<'_>) -> Result<DMatrix<f64>, PoseFault> {
+        self.evaluate_matrix(&self.programs.regressor, states)
     }
 
     /// H_min block by block, for regressions over many states: `visit` gets how many states a block has (at most 64) and
@@ -166,98 +166,98 @@ impl<'a> Evaluator<'a> {
     /// Fails at the first state without an answer, and when `visit` does; what stands before a fault may have been shown.
     pub fn regressor_blocks<E: From<PoseFault>>(
         &self,
-        states: &States<'_>,
+        states: &MotionStates<'_>,
         visit: impl FnMut(usize, &[&[f64]]) -> Result<(), E>,
     ) -> Result<(), E> {
-        self.regressor_blocks_of(states, &|_| true, visit)
+        self.regressor_column_blocks(states, &|_| true, visit)
     }
 
     /// The same of some columns of H_min: the others are zero, and nothing is computed for them.
-    pub fn regressor_blocks_of<E: From<PoseFault>>(
+    pub fn regressor_column_blocks<E: From<PoseFault>>(
         &self,
-        states: &States<'_>,
+        states: &MotionStates<'_>,
         wanted: &dyn Fn(usize) -> bool,
         mut visit: impl FnMut(usize, &[&[f64]]) -> Result<(), E>,
     ) -> Result<(), E> {
         let program = &self.programs.regressor;
         let columns = program.outputs.len() / self.mechanism.drives.len().max(1);
-        self.run_blocks(program, &|k| wanted(k % columns), states, &[], |block| {
+        self.evaluate_blocks(program, &|k| wanted(k % columns), states, &[], |block| {
             visit(block.len, &block.columns)
         })
     }
 
     /// H for all products of p_g, laid out like [`Self::regressor`].
-    pub fn full_regressor(&self, states: &States<'_>) -> Result<DMatrix<f64>, PoseFault> {
-        self.matrix(&self.programs.full_regressor, states)
+    pub fn full_regressor(&self, states: &MotionStates<'_>) -> Result<DMatrix<f64>, PoseFault> {
+        self.evaluate_matrix(&self.programs.full_regressor, states)
     }
 
     /// Forces of the drives for given base parameters: one vector per drive.
     pub fn inverse_dynamics(
         &self,
-        states: &States<'_>,
+        states: &MotionStates<'_>,
         base: &[f64],
     ) -> Result<Vec<Vec<f64>>, PoseFault> {
-        self.run(&self.programs.inverse_dynamics, states, base)
+        self.evaluate_program(&self.programs.inverse_dynamics, states, base)
     }
 
     /// Passive coordinates, then their rates, then their accelerations: one vector each.
-    pub fn passive(&self, states: &States<'_>) -> Result<Vec<Vec<f64>>, PoseFault> {
-        self.run(&self.programs.passive, states, &[])
+    pub fn passive_motion(&self, states: &MotionStates<'_>) -> Result<Vec<Vec<f64>>, PoseFault> {
+        self.evaluate_program(&self.programs.passive, states, &[])
     }
 
     /// Coordinates and rates of the drives, then their Jacobian row by row: one vector each.
-    pub fn drives(&self, states: &States<'_>) -> Result<Vec<Vec<f64>>, PoseFault> {
-        self.run(&self.programs.drives, states, &[])
+    pub fn drive_motion(&self, states: &MotionStates<'_>) -> Result<Vec<Vec<f64>>, PoseFault> {
+        self.evaluate_program(&self.programs.drives, states, &[])
     }
 
     /// Mass matrix row by row: one vector per entry. Accelerations of the states are not read here and below.
     pub fn mass_matrix(
         &self,
-        dynamics: &Dynamics,
-        states: &States<'_>,
+        dynamics: &DynamicsPrograms,
+        states: &MotionStates<'_>,
         base: &[f64],
     ) -> Result<Vec<Vec<f64>>, PoseFault> {
-        self.run(&dynamics.mass_matrix, states, base)
+        self.evaluate_program(&dynamics.mass_matrix, states, base)
     }
 
     /// Generalised forces that rates alone ask for: one vector per independent coordinate.
     pub fn coriolis(
         &self,
-        dynamics: &Dynamics,
-        states: &States<'_>,
+        dynamics: &DynamicsPrograms,
+        states: &MotionStates<'_>,
         base: &[f64],
     ) -> Result<Vec<Vec<f64>>, PoseFault> {
-        self.run(&dynamics.coriolis, states, base)
+        self.evaluate_program(&dynamics.coriolis, states, base)
     }
 
     /// Generalised forces that weight alone asks for: one vector per independent coordinate.
     pub fn gravity(
         &self,
-        dynamics: &Dynamics,
-        states: &States<'_>,
+        dynamics: &DynamicsPrograms,
+        states: &MotionStates<'_>,
         base: &[f64],
     ) -> Result<Vec<Vec<f64>>, PoseFault> {
-        self.run(&dynamics.gravity, states, base)
+        self.evaluate_program(&dynamics.gravity, states, base)
     }
 
     /// Generalised forces that effects ask for where nothing accelerates: one vector per independent coordinate.
     pub fn effects(
         &self,
-        dynamics: &Dynamics,
-        states: &States<'_>,
+        dynamics: &DynamicsPrograms,
+        states: &MotionStates<'_>,
         base: &[f64],
     ) -> Result<Vec<Vec<f64>>, PoseFault> {
-        self.run(&dynamics.effects, states, base)
+        self.evaluate_program(&dynamics.effects, states, base)
     }
 
     /// `c + g + e`, generalised forces that do not depend on accelerations: one vector per independent coordinate.
     pub fn bias(
         &self,
-        dynamics: &Dynamics,
-        states: &States<'_>,
+        dynamics: &DynamicsPrograms,
+        states: &MotionStates<'_>,
         base: &[f64],
     ) -> Result<Vec<Vec<f64>>, PoseFault> {
-        let mut found = self.run(&dynamics.bias, states, base)?;
+        let mut found = self.evaluate_program(&dynamics.bias, states, base)?;
         // The Jacobian of the drives stands behind them.
         found.truncate(self.active.len());
         Ok(found)
@@ -267,24 +267,24 @@ impl<'a> Evaluator<'a> {
     /// which the places of [`Reactions`] count them.
     pub fn reactions(
         &self,
-        reactions: &Reactions,
-        states: &States<'_>,
+        reactions: &ReactionPrograms,
+        states: &MotionStates<'_>,
     ) -> Result<Vec<Vec<f64>>, PoseFault> {
-        self.run(&reactions.program, states, &[])
+        self.evaluate_program(&reactions.program, states, &[])
     }
 
     /// Forward dynamics: accelerations of the independent coordinates, one vector each, under the given forces of the
     /// drives, one slice each.
     pub fn forward_dynamics(
         &self,
-        dynamics: &Dynamics,
-        states: &States<'_>,
+        dynamics: &DynamicsPrograms,
+        states: &MotionStates<'_>,
         base: &[f64],
         forces: &[&[f64]],
     ) -> Result<Vec<Vec<f64>>, PoseFault> {
         let (n, n_drives) = (self.active.len(), self.mechanism.drives.len());
-        let mass = self.run(&dynamics.mass_matrix, states, base)?;
-        let rest = self.run(&dynamics.bias, states, base)?;
+        let mass = self.evaluate_program(&dynamics.mass_matrix, states, base)?;
+        let rest = self.evaluate_program(&dynamics.bias, states, base)?;
         let (bias, jacobian) = rest.split_at(n);
         let mut accelerations = vec![Vec::with_capacity(states.len()); n];
         for sample in 0..states.len() {
@@ -315,9 +315,9 @@ impl<'a> Evaluator<'a> {
         Ok(accelerations)
     }
 
-    fn matrix(&self, program: &Program, states: &States<'_>) -> Result<DMatrix<f64>, PoseFault> {
+    fn evaluate_matrix(&self, program: &StraightLineProgram, states: &MotionStates<'_>) -> Result<DMatrix<f64>, PoseFault> {
         let n_drives = self.mechanism.drives.len();
-        let columns = self.run(program, states, &[])?;
+        let columns = self.evaluate_program(program, states, &[])?;
         let n_columns = columns.len() / n_drives.max(1);
         let n_rows = states.len() * n_drives;
         let mut matrix = DMatrix::zeros(n_rows, n_columns);
@@ -332,14 +332,14 @@ impl<'a> Evaluator<'a> {
         Ok(matrix)
     }
 
-    fn run(
+    fn evaluate_program(
         &self,
-        program: &Program,
-        states: &States<'_>,
+        program: &StraightLineProgram,
+        states: &MotionStates<'_>,
         base: &[f64],
     ) -> Result<Vec<Vec<f64>>, PoseFault> {
         let mut outputs = vec![Vec::with_capacity(states.len()); program.outputs.len()];
-        self.run_blocks(program, &|_| true, states, base, |block| {
+        self.evaluate_blocks(program, &|_| true, states, base, |block| {
             for (output, column) in outputs.iter_mut().zip(&block.columns) {
                 output.extend_from_slice(column);
             }
@@ -348,35 +348,35 @@ impl<'a> Evaluator<'a> {
         Ok(outputs)
     }
 
-    fn run_blocks<E: From<PoseFault>>(
+    fn evaluate_blocks<E: From<PoseFault>>(
         &self,
-        program: &Program,
+        program: &StraightLineProgram,
         wanted: &dyn Fn(usize) -> bool,
-        states: &States<'_>,
+        states: &MotionStates<'_>,
         base: &[f64],
-        visit: impl FnMut(&Block<'_>) -> Result<(), E>,
+        visit: impl FnMut(&OutputBlock<'_>) -> Result<(), E>,
     ) -> Result<(), E> {
-        let (mut n, mut fault) = (states.len(), self.not_finite(program, states, base));
+        let (mut n, mut fault) = (states.len(), self.find_not_finite_input(program, states, base));
         if let Some(fault) = &fault {
             n = fault.sample;
         }
         let mut passive = Vec::new();
         if let PassivePosition::Newton(loops) = &self.programs.passive_position {
-            let found = self.newton(loops, states, n);
+            let found = self.solve_passive(loops, states, n);
             passive = found.passive;
             if let Some(earlier) = found.fault {
                 n = earlier.sample;
                 fault = Some(earlier);
             }
         }
-        let machine = Machine::of(program, wanted, |atom| self.fixed(atom, base));
+        let machine = RegisterMachine::for_outputs(program, wanted, |atom| self.fixed_value(atom, base));
         let input = |atom| match atom {
-            Atom::Coordinate(i) => match self.place(i) {
-                Place::Active(k) => states.q[k],
-                Place::Passive(k) => &passive[k],
+            Atom::Coordinate(i) => match self.coordinate_source(i) {
+                CoordinateSource::Active(k) => states.q[k],
+                CoordinateSource::Passive(k) => &passive[k],
             },
-            Atom::Rate(i) => states.qd[self.position(i)],
-            Atom::Acceleration(i) => states.qdd[self.position(i)],
+            Atom::Rate(i) => states.qd[self.coordinate_position(i)],
+            Atom::Acceleration(i) => states.qdd[self.coordinate_position(i)],
             Atom::Load(d) => states.load[d],
             Atom::Pi | Atom::Constant(_) | Atom::Parameter(_) | Atom::Base(_) => {
                 unreachable!("fixed atoms are no inputs of a state")
@@ -389,10 +389,10 @@ impl<'a> Evaluator<'a> {
     }
 
     /// The first state with an input that is no finite number; constants and base parameters belong to the first one.
-    fn not_finite(
+    fn find_not_finite_input(
         &self,
-        program: &Program,
-        states: &States<'_>,
+        program: &StraightLineProgram,
+        states: &MotionStates<'_>,
         base: &[f64],
     ) -> Option<PoseFault> {
         let fault = |sample, input| {
@@ -417,7 +417,7 @@ impl<'a> Evaluator<'a> {
             columns.extend(named.map(|(k, column)| (*column, format!("{}{suffix}", name(k)))));
         }
         // A load that nothing depends on is not looked at.
-        let uses_load = |op: &Op| matches!(op, Op::Input(Atom::Load(_)));
+        let uses_load = |op: &ProgramOp| matches!(op, ProgramOp::Input(Atom::Load(_)));
         if program.ops.iter().any(uses_load) {
             let drives = states.load.iter().zip(&self.mechanism.drives);
             columns.extend(drives.map(|(column, drive)| (*column, drive.name.clone())));
@@ -430,25 +430,25 @@ impl<'a> Evaluator<'a> {
     }
 
     /// Where a coordinate's values are.
-    fn place(&self, coordinate: usize) -> Place {
+    fn coordinate_source(&self, coordinate: usize) -> CoordinateSource {
         let position = |list: &[usize]| list.iter().position(|i| *i == coordinate);
         position(&self.active).map_or_else(
             || {
                 let k = position(&self.passive);
-                Place::Passive(k.expect("a coordinate is active or passive"))
+                CoordinateSource::Passive(k.expect("a coordinate is active or passive"))
             },
-            Place::Active,
+            CoordinateSource::Active,
         )
     }
 
-    fn position(&self, coordinate: usize) -> usize {
+    fn coordinate_position(&self, coordinate: usize) -> usize {
         self.active
             .iter()
             .position(|a| *a == coordinate)
             .expect("passive rates are put in place")
     }
 
-    fn fixed(&self, atom: Atom, base: &[f64]) -> f64 {
+    fn fixed_value(&self, atom: Atom, base: &[f64]) -> f64 {
         match atom {
             Atom::Pi => std::f64::consts::PI,
             Atom::Constant(i) => self.constants[i],
@@ -460,20 +460,20 @@ impl<'a> Evaluator<'a> {
 
     /// Passive coordinates of the first `n` states by Newton's method, each started from the state before; where that
     /// fails, from the nominal pose.
-    fn newton(&self, programs: &LoopPrograms, states: &States<'_>, n: usize) -> Followed {
-        let machine = |program| Machine::new(program, |atom| self.fixed(atom, &[]));
-        let loops = Poses {
+    fn solve_passive(&self, programs: &LoopPrograms, states: &MotionStates<'_>, n: usize) -> PassiveTrajectory {
+        let machine = |program| RegisterMachine::new(program, |atom| self.fixed_value(atom, &[]));
+        let loops = LoopEvaluator {
             evaluator: self,
-            residual: Scalar::new(machine(&programs.residual)),
-            scales: Scalar::new(machine(&programs.scales)),
+            residual: SingleStateProgram::new(machine(&programs.residual)),
+            scales: SingleStateProgram::new(machine(&programs.scales)),
         };
         let nominal = |list: &[usize]| -> Vec<f64> {
             let coordinates = list.iter().map(|i| &self.mechanism.coordinates[*i]);
             coordinates.map(|c| c.nominal).collect()
         };
         let first_active = nominal(&self.active);
-        let first = settle(&loops, &first_active, &nominal(&self.passive));
-        let mut followed = Followed {
+        let first = solve_passive(&loops, &first_active, &nominal(&self.passive));
+        let mut followed = PassiveTrajectory {
             passive: vec![Vec::with_capacity(n); self.passive.len()],
             fault: None,
         };
@@ -520,37 +520,37 @@ fn first_not_finite(values: &[f64]) -> Option<usize> {
 }
 
 /// Where a coordinate's values are: among the active or the passive ones.
-enum Place {
+enum CoordinateSource {
     Active(usize),
     Passive(usize),
 }
 
 /// Passive coordinates of the states before the first fault.
-struct Followed {
+struct PassiveTrajectory {
     passive: Vec<Vec<f64>>,
     fault: Option<PoseFault>,
 }
 
 /// The loops of one geometry, one pose at a time.
-struct Poses<'a> {
-    evaluator: &'a Evaluator<'a>,
-    residual: Scalar<'a>,
-    scales: Scalar<'a>,
+struct LoopEvaluator<'a> {
+    evaluator: &'a ModelEvaluator<'a>,
+    residual: SingleStateProgram<'a>,
+    scales: SingleStateProgram<'a>,
 }
 
-impl Poses<'_> {
-    fn value(&self, atom: Atom, active: &[f64], passive: &[f64]) -> f64 {
+impl LoopEvaluator<'_> {
+    fn atom_value(&self, atom: Atom, active: &[f64], passive: &[f64]) -> f64 {
         let Atom::Coordinate(i) = atom else {
             unreachable!("a loop's residual depends on coordinates alone")
         };
-        match self.evaluator.place(i) {
-            Place::Active(k) => active[k],
-            Place::Passive(k) => passive[k],
+        match self.evaluator.coordinate_source(i) {
+            CoordinateSource::Active(k) => active[k],
+            CoordinateSource::Passive(k) => passive[k],
         }
     }
 }
 
-impl Loops for Poses<'_> {
+impl Loops for LoopEvaluator<'_> {
     type Number = f64;
     type Active = Vec<f64>;
     type Passive = Vec<f64>;
@@ -559,7 +559,7 @@ impl Loops for Poses<'_> {
     fn linearise(&self, active: &Vec<f64>, passive: &Vec<f64>) -> (Vec<f64>, Vec<Vec<f64>>) {
         let n = passive.len();
         self.residual.run(
-            |atom| self.value(atom, active, passive),
+            |atom| self.atom_value(atom, active, passive),
             |output| {
                 let row = |i: usize| (0..n).map(|j| output(n + i * n + j)).collect();
                 ((0..n).map(output).collect(), (0..n).map(row).collect())
@@ -570,7 +570,7 @@ impl Loops for Poses<'_> {
     fn scales(&self, active: &Vec<f64>, passive: &Vec<f64>) -> Scales<Vec<f64>, Vec<f64>> {
         let (n, n_active) = (passive.len(), active.len());
         self.scales.run(
-            |atom| self.value(atom, active, passive),
+            |atom| self.atom_value(atom, active, passive),
             |output| Scales {
                 residual: (0..n).map(output).collect(),
                 passive: (n..2 * n).map(output).collect(),

@@ -6,9 +6,9 @@ use super::{Atom, ExprId, Graph, Node, Rational, Unary};
 
 /// An integer combination of angle atoms, sorted, without zero factors.
 #[derive(Clone, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct AngleSum(Vec<(Atom, i32)>);
+pub struct AtomAngleSum(Vec<(Atom, i32)>);
 
-impl AngleSum {
+impl AtomAngleSum {
     /// The empty sum.
     pub const NONE: Self = Self(Vec::new());
 
@@ -55,14 +55,14 @@ impl AngleSum {
 
 impl Graph {
     /// Cosine and sine of `sum + pi12 * pi/12`.
-    pub fn cos_sin(&mut self, sum: &AngleSum, pi12: i32) -> (ExprId, ExprId) {
+    pub fn cos_sin(&mut self, sum: &AtomAngleSum, pi12: i32) -> (ExprId, ExprId) {
         let (cd, sd) = self.cos_sin_fixed(pi12);
         if sum.is_empty() {
             return (cd, sd);
         }
         let negative = sum.0[0].1 < 0;
         let canonical = if negative {
-            AngleSum::default().plus(sum, -1)
+            AtomAngleSum::default().plus(sum, -1)
         } else {
             sum.clone()
         };
@@ -77,7 +77,7 @@ impl Graph {
     }
 
     /// `sum + pi12 * pi/12` as a number.
-    pub fn angle(&mut self, sum: &AngleSum, pi12: i32) -> ExprId {
+    pub fn angle(&mut self, sum: &AtomAngleSum, pi12: i32) -> ExprId {
         let mut terms: Vec<(ExprId, Rational)> = sum
             .terms()
             .iter()

@@ -3,13 +3,13 @@
 use super::{Atom, ExprId, Graph, Node, Rational, Unary};
 
 /// The root of a rational, if it is rational.
-fn whole_root(value: &Rational) -> Option<Rational> {
-    root_in_primes(value).and_then(|(root, primes)| primes.is_empty().then_some(root))
+fn rational_root(value: &Rational) -> Option<Rational> {
+    prime_root_product(value).and_then(|(root, primes)| primes.is_empty().then_some(root))
 }
 
 /// Writes the root of a positive rational as a rational times the roots of different primes, so that roots of
 /// different numbers that hang together are seen to; a cofactor without small divisors counts as a prime.
-fn root_in_primes(value: &Rational) -> Option<(Rational, Vec<i64>)> {
+fn prime_root_product(value: &Rational) -> Option<(Rational, Vec<i64>)> {
     const LARGEST: i64 = 1000;
     let (n, d) = value.as_small().filter(|(n, _)| *n > 0)?;
     let mut rest = n.checked_mul(d)?;
@@ -73,7 +73,7 @@ impl Graph {
         }
         let (base, k) = self.split_factor(a);
         let k = &k * factor;
-        self.scaled(base, k)
+        self.scaled_node(base, k)
     }
 
     /// Sum of all `terms`.
@@ -167,7 +167,7 @@ impl Graph {
                 self.intern(Node::Product(flat))
             }
         };
-        self.scaled(base, scale)
+        self.scaled_node(base, scale)
     }
 
     /// A function of one argument.
@@ -176,7 +176,7 @@ impl Graph {
             match function {
                 Unary::Sqrt if value.is_zero() || value.is_one() => return a,
                 Unary::Sqrt => {
-                    if let Some((factor, primes)) = root_in_primes(&value)
+                    if let Some((factor, primes)) = prime_root_product(&value)
                         && (primes.len() != 1 || !factor.is_one())
                     {
                         let roots: Vec<(ExprId, i32)> = primes
@@ -217,9 +217,9 @@ impl Graph {
                 let value = self.unary(Unary::Abs, base);
                 self.scale(value, &k)
             }
-            Unary::Sqrt if !k.is_one() && base != Self::ONE && whole_root(&k).is_some() => {
+            Unary::Sqrt if !k.is_one() && base != Self::ONE && rational_root(&k).is_some() => {
                 let value = self.unary(Unary::Sqrt, base);
-                let factor = whole_root(&k).unwrap_or(Rational::ONE);
+                let factor = rational_root(&k).unwrap_or(Rational::ONE);
                 self.scale(value, &factor)
             }
             Unary::Sqrt => {
@@ -244,7 +244,7 @@ impl Graph {
         }
     }
 
-    fn scaled(&mut self, base: ExprId, factor: Rational) -> ExprId {
+    fn scaled_node(&mut self, base: ExprId, factor: Rational) -> ExprId {
         if factor.is_zero() {
             Self::ZERO
         } else if base == Self::ONE {
@@ -261,7 +261,7 @@ impl Graph {
             0 => return Self::ZERO,
             1 => {
                 let (base, factor) = flat.remove(0);
-                return self.scaled(base, factor);
+                return self.scaled_node(base, factor);
             }
             _ => {}
         }
@@ -286,7 +286,7 @@ impl Graph {
             }
         }
         let base = self.intern(Node::Sum(flat));
-        self.scaled(base, content)
+        self.scaled_node(base, content)
     }
 
     /// If a nested sum holds a term that cancels against the others, the list with that sum opened.

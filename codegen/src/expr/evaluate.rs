@@ -2,13 +2,13 @@
 
 use std::collections::BTreeMap;
 
-use modelmill_algebra::field::{Element, Number, Stream};
+use modelmill_algebra::field::{FieldElement, FieldNumber, RandomStream};
 
-use super::{AngleSum, Atom, ExprId, Graph, Node, Rational, Unary};
+use super::{AtomAngleSum, Atom, ExprId, Graph, Node, Rational, Unary};
 
 /// A number system in which expressions can be evaluated. `None` means that the value does not exist there:
 /// a division by zero, a root that is not in the field, a function that the domain does not know.
-pub trait Domain {
+pub trait EvaluationDomain {
     /// Its numbers.
     type Value: Clone;
     /// A rational number.
@@ -24,12 +24,12 @@ pub trait Domain {
     /// What an atom stands for.
     fn atom(&self, atom: Atom) -> Option<Self::Value>;
     /// Cosine and sine of a sum of atoms.
-    fn cos_sin(&self, angle: &AngleSum) -> Option<(Self::Value, Self::Value)>;
+    fn cos_sin(&self, angle: &AtomAngleSum) -> Option<(Self::Value, Self::Value)>;
 }
 
 /// The nodes that some roots need, in the order of evaluation.
 #[derive(Clone, Debug)]
-pub struct Tape {
+pub struct EvaluationTape {
     steps: Vec<Node>,
     /// Per step the index of its operands' steps, flattened.
     operands: Vec<Vec<usize>>,
@@ -37,7 +37,7 @@ pub struct Tape {
     roots: Vec<usize>,
 }
 
-impl Tape {
+impl EvaluationTape {
     /// Collects what `roots` need.
     pub fn new(graph: &Graph, roots: &[ExprId]) -> Self {
         const NOWHERE: usize = usize::MAX;
@@ -72,7 +72,7 @@ impl Tape {
     }
 
     /// Values of the roots; `None` if any of them does not exist.
-    pub fn evaluate<D: Domain>(&self, domain: &D) -> Option<Vec<D::Value>> {
+    pub fn evaluate<D: EvaluationDomain>(&self, domain: &D) -> Option<Vec<D::Value>> {
         let mut values: Vec<D::Value> = Vec::with_capacity(self.steps.len());
         for (node, operands) in self.steps.iter().zip(&self.operands) {
             let value = match node {
@@ -122,12 +122,12 @@ impl Tape {
 }
 
 /// Floating-point evaluation; atoms come from a function.
-pub struct F64<F: Fn(Atom) -> f64>(
+pub struct FloatDomain<F: Fn(Atom) -> f64>(
     /// Value of an atom.
     pub F,
 );
 
-impl<F: Fn(Atom) -> f64> Domain for F64<F> {
+impl<F: Fn(Atom) -> f64> EvaluationDomain for FloatDomain<F> {
     type Value = f64;
     fn rational(&self, value: &Rational) -> Option<f64> {
         Some(value.to_f64())
@@ -155,7 +155,7 @@ impl<F: Fn(Atom) -> f64> Domain for F64<F> {
     fn atom(&self, atom: Atom) -> Option<f64> {
         Some((self.0)(atom))
     }
-    fn cos_sin(&self, angle: &AngleSum) -> Option<(f64, f64)> {
+    fn cos_sin(&self, angle: &AtomAngleSum) -> Option<(f64, f64)> {
         let total: f64 = angle
             .terms()
             .iter()
@@ -170,7 +170,7 @@ impl<F: Fn(Atom) -> f64> Domain for F64<F> {
 /// Functions that are not algebraic are opaque: equal arguments get equal random values. They keep the laws that
 /// matter for dependence: `sign` is odd with square 1, `abs(x) = x sign(x)`, `tanh` is odd.
 #[derive(Clone, Debug, Default)]
-pub struct FieldPoint<N = Element> {
+pub struct FieldPoint<N = FieldElement> {
     /// Values of atoms outside sines and cosines of sums of angles.
     pub values: BTreeMap<Atom, N>,
     /// Cosine and sine of atoms in sums of angles.
@@ -181,9 +181,9 @@ pub struct FieldPoint<N = Element> {
     pub root_seed: u64,
 }
 
-impl<N: Number> FieldPoint<N> {
+impl<N: FieldNumber> FieldPoint<N> {
     /// The same point over a larger field.
-    pub fn extended<M: From<N>>(&self) -> FieldPoint<M> {
+    pub fn over_field<M: From<N>>(&self) -> FieldPoint<M> {
         let values = self.values.iter().map(|(atom, x)| (*atom, M::from(*x)));
         let circle = |(c, s): (N, N)| (M::from(c), M::from(s));
         let angles = self.angles.iter().map(|(atom, cs)| (*atom, circle(*cs)));
@@ -196,8 +196,8 @@ impl<N: Number> FieldPoint<N> {
     }
 
     fn sign(&self, a: N) -> N {
-        let (key, odd) = canonical(a);
-        let value = if key.bits(self.seed) & 1 == 0 {
+        let (key, odd) = canonical_sign(a);
+        let value = if key.hash_bits(self.seed) & 1 == 0 {
             N::ONE
         } else {
             -N::ONE
@@ -213,19 +213,19 @@ impl<N: Number> FieldPoint<N> {
 
     /// Cosine and sine of an opaque angle: even and odd, on the unit circle.
     fn opaque_circle(&self, a: N) -> (N, N) {
-        let (key, odd) = canonical(a);
-        let seed = key.bits(self.seed ^ 0x0073_696E);
-        let (c, s) = N::draw_circle(&mut Stream::new(seed));
+        let (key, odd) = canonical_sign(a);
+        let seed = key.hash_bits(self.seed ^ 0x0073_696E);
+        let (c, s) = N::draw_circle(&mut RandomStream::new(seed));
         (c, if odd { -s } else { s })
     }
 }
 
 /// The smaller of `a` and `-a`, and whether it was `-a`.
-fn canonical<N: Number>(a: N) -> (N, bool) {
+fn canonical_sign<N: FieldNumber>(a: N) -> (N, bool) {
     if (-a) < a { (-a, true) } else { (a, false) }
 }
 
-impl<N: Number> Domain for FieldPoint<N> {
+impl<N: FieldNumber> EvaluationDomain for FieldPoint<N> {
     type Value = N;
     fn rational(&self, value: &Rational) -> Option<N> {
         if value.is_one() {
@@ -246,21 +246,21 @@ impl<N: Number> Domain for FieldPoint<N> {
         match function {
             // One fixed choice per radicand: equal radicands must have equal roots.
             Unary::Sqrt => a.square_root().map(|root| {
-                let flip = a.bits(self.root_seed) & 1 == 1;
+                let flip = a.hash_bits(self.root_seed) & 1 == 1;
                 if flip {
-                    -canonical(root).0
+                    -canonical_sign(root).0
                 } else {
-                    canonical(root).0
+                    canonical_sign(root).0
                 }
             }),
             Unary::Sign => Some(self.sign(*a)),
             Unary::Abs => Some(*a * self.sign(*a)),
             Unary::Tanh => {
-                let (key, odd) = canonical(*a);
-                let value = key.hashed(self.seed ^ 0x7461_6E68);
+                let (key, odd) = canonical_sign(*a);
+                let value = key.hash_with_seed(self.seed ^ 0x7461_6E68);
                 Some(if odd { -value } else { value })
             }
-            Unary::Exp => Some(a.hashed(self.seed ^ 0x0065_7870)),
+            Unary::Exp => Some(a.hash_with_seed(self.seed ^ 0x0065_7870)),
             Unary::Cos => Some(self.opaque_circle(*a).0),
             Unary::Sin => Some(self.opaque_circle(*a).1),
         }
@@ -268,7 +268,7 @@ impl<N: Number> Domain for FieldPoint<N> {
     fn atom(&self, atom: Atom) -> Option<N> {
         self.values.get(&atom).copied()
     }
-    fn cos_sin(&self, angle: &AngleSum) -> Option<(N, N)> {
+    fn cos_sin(&self, angle: &AtomAngleSum) -> Option<(N, N)> {
         let mut total = (N::ONE, N::ZERO);
         for (atom, n) in angle.terms() {
             let (c, s) = *self.angles.get(atom)?;
@@ -290,7 +290,7 @@ pub struct RationalPoint {
     pub angles: BTreeMap<Atom, (Rational, Rational)>,
 }
 
-impl Domain for RationalPoint {
+impl EvaluationDomain for RationalPoint {
     type Value = Rational;
     fn rational(&self, value: &Rational) -> Option<Rational> {
         Some(value.clone())
@@ -325,7 +325,7 @@ impl Domain for RationalPoint {
     fn atom(&self, atom: Atom) -> Option<Rational> {
         self.values.get(&atom).cloned()
     }
-    fn cos_sin(&self, angle: &AngleSum) -> Option<(Rational, Rational)> {
+    fn cos_sin(&self, angle: &AtomAngleSum) -> Option<(Rational, Rational)> {
         let mut total = (Rational::ONE, Rational::ZERO);
         for (atom, n) in angle.terms() {
             let (c, s) = self.angles.get(atom)?;

@@ -1,9 +1,9 @@
 //! Which functions are linearly independent: elimination on their values at random points of a prime field.
 
-use modelmill_algebra::eliminate::Echelon;
-use modelmill_algebra::field::{Element, Stream};
+use modelmill_algebra::eliminate::RowEchelonForm;
+use modelmill_algebra::field::{FieldElement, RandomStream};
 
-use super::{Atom, ExprId, FieldPoint, Graph, Tape};
+use super::{Atom, ExprId, FieldPoint, Graph, EvaluationTape};
 use crate::DeriveError;
 
 /// Seed of the draws: the same model gives the same text on any machine.
@@ -21,25 +21,25 @@ pub(crate) fn independent_functions(
     if roots.is_empty() {
         return Ok(Vec::new());
     }
-    let tape = Tape::new(graph, roots);
+    let tape = EvaluationTape::new(graph, roots);
     let atoms = graph.atoms(roots);
-    let mut stream = Stream::new(SEED);
-    let mut constants = FieldPoint::<Element> {
-        seed: stream.bits(),
-        root_seed: stream.bits(),
+    let mut stream = RandomStream::new(SEED);
+    let mut constants = FieldPoint::<FieldElement> {
+        seed: stream.next_bits(),
+        root_seed: stream.next_bits(),
         ..FieldPoint::default()
     };
     let mut draw = |point: &mut FieldPoint, fixed: bool| {
         for atom in &atoms {
             if matches!(atom, Atom::Constant(_) | Atom::Pi) == fixed {
-                point.values.insert(*atom, stream.element());
-                point.angles.insert(*atom, stream.circle());
+                point.values.insert(*atom, stream.next_element());
+                point.angles.insert(*atom, stream.next_circle_point());
             }
         }
     };
     draw(&mut constants, true);
     let order: Vec<usize> = (0..roots.len()).collect();
-    let mut echelon = Echelon::new(&order);
+    let mut echelon = RowEchelonForm::new(&order);
     let mut idle = 0;
     for _ in 0..50 * roots.len() {
         let mut point = constants.clone();

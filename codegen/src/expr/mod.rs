@@ -24,10 +24,10 @@ use std::collections::BTreeSet;
 
 use rustc_hash::FxHashMap;
 
-pub use angle::AngleSum;
+pub use angle::AtomAngleSum;
 pub(crate) use coordinates::coordinates_of;
-pub use evaluate::{Domain, F64, FieldPoint, RationalPoint, Tape};
-pub(crate) use many_digits::DigitsPoint;
+pub use evaluate::{EvaluationDomain, FloatDomain, FieldPoint, RationalPoint, EvaluationTape};
+pub(crate) use many_digits::BigFloatPoint;
 pub use modelmill_algebra::Rational;
 pub(crate) use nominal::{nominal_of, nominal_value};
 
@@ -102,9 +102,9 @@ pub enum Node {
     /// An opaque quantity.
     Atom(Atom),
     /// Sine of a sum of atoms with integer factors (canonical: the first factor is positive).
-    Sin(AngleSum),
+    Sin(AtomAngleSum),
     /// Cosine of such a sum.
-    Cos(AngleSum),
+    Cos(AtomAngleSum),
     /// Linear combination; a rational term stands as a multiple of [`Graph::ONE`].
     ///
     /// Either one term whose factor is not 1, or several of which the first has a positive factor; if all factors have

@@ -2,12 +2,12 @@
 
 use modelmill_spec::Mechanism;
 
-use super::{Atom, ExprId, F64, Graph, Tape};
+use super::{Atom, ExprId, FloatDomain, Graph, EvaluationTape};
 
 /// Value of an expression at the nominal pose, with the file's constants; rates are zero.
 pub(crate) fn nominal_value(graph: &Graph, mechanism: &Mechanism, id: ExprId) -> Option<f64> {
-    Tape::new(graph, &[id])
-        .evaluate(&F64(|atom| nominal_of(mechanism, atom)))
+    EvaluationTape::new(graph, &[id])
+        .evaluate(&FloatDomain(|atom| nominal_of(mechanism, atom)))
         .map(|v| v[0])
 }
 

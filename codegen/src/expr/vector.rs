@@ -1,24 +1,24 @@
 //! Vectors of three expressions and elementary rotations.
 
-use modelmill_spec::Axis;
+use modelmill_spec::FrameAxis;
 
-use crate::expr::{AngleSum, ExprId, Graph, Rational};
+use crate::expr::{AtomAngleSum, ExprId, Graph, Rational};
 
 /// Three components.
-pub(crate) type Vector = [ExprId; 3];
+pub(crate) type SymbolicVector = [ExprId; 3];
 
 /// The zero vector.
-pub(crate) const ZERO: Vector = [Graph::ZERO; 3];
+pub(crate) const ZERO: SymbolicVector = [Graph::ZERO; 3];
 
 /// A rotation by `sum + pi12 * pi/12` about an axis of the frame reached so far.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Turn {
-    pub(crate) axis: Axis,
-    pub(crate) sum: AngleSum,
+pub(crate) struct AxisRotation {
+    pub(crate) axis: FrameAxis,
+    pub(crate) sum: AtomAngleSum,
     pub(crate) pi12: i32,
 }
 
-impl Turn {
+impl AxisRotation {
     /// Whether it is the identity, seen from its form.
     pub(crate) fn is_identity(&self) -> bool {
         self.sum.is_empty() && self.pi12.rem_euclid(24) == 0
@@ -26,7 +26,7 @@ impl Turn {
 }
 
 /// Appends a turn to a product of turns, merging neighbours about the same axis.
-pub(crate) fn push_turn(turns: &mut Vec<Turn>, turn: &Turn) {
+pub(crate) fn push_rotation(turns: &mut Vec<AxisRotation>, turn: &AxisRotation) {
     if turn.is_identity() {
         return;
     }
@@ -43,27 +43,27 @@ pub(crate) fn push_turn(turns: &mut Vec<Turn>, turn: &Turn) {
 }
 
 impl Graph {
-    pub(crate) fn add_vectors(&mut self, vectors: &[Vector]) -> Vector {
+    pub(crate) fn add_vectors(&mut self, vectors: &[SymbolicVector]) -> SymbolicVector {
         std::array::from_fn(|i| {
             let terms: Vec<_> = vectors.iter().map(|v| v[i]).collect();
             self.add_all(&terms)
         })
     }
 
-    pub(crate) fn sub_vectors(&mut self, a: &Vector, b: &Vector) -> Vector {
+    pub(crate) fn sub_vectors(&mut self, a: &SymbolicVector, b: &SymbolicVector) -> SymbolicVector {
         std::array::from_fn(|i| self.sub(a[i], b[i]))
     }
 
-    pub(crate) fn scale_vector(&mut self, k: ExprId, v: &Vector) -> Vector {
+    pub(crate) fn scale_vector(&mut self, k: ExprId, v: &SymbolicVector) -> SymbolicVector {
         std::array::from_fn(|i| self.mul(k, v[i]))
     }
 
-    pub(crate) fn dot(&mut self, a: &Vector, b: &Vector) -> ExprId {
+    pub(crate) fn dot(&mut self, a: &SymbolicVector, b: &SymbolicVector) -> ExprId {
         let terms = [0, 1, 2].map(|i| self.mul(a[i], b[i]));
         self.add_all(&terms)
     }
 
-    pub(crate) fn cross(&mut self, a: &Vector, b: &Vector) -> Vector {
+    pub(crate) fn cross(&mut self, a: &SymbolicVector, b: &SymbolicVector) -> SymbolicVector {
         std::array::from_fn(|i| {
             let (j, k) = ((i + 1) % 3, (i + 2) % 3);
             let (x, y) = (self.mul(a[j], b[k]), self.mul(a[k], b[j]));
@@ -72,16 +72,16 @@ impl Graph {
     }
 
     /// Components, in the outer frame, of a vector given in the turned frame.
-    pub(crate) fn turn_out(&mut self, turn: &Turn, v: &Vector) -> Vector {
-        self.turn_by(turn, v, false)
+    pub(crate) fn rotate_out(&mut self, turn: &AxisRotation, v: &SymbolicVector) -> SymbolicVector {
+        self.rotate_by(turn, v, false)
     }
 
     /// Components, in the turned frame, of a vector given in the outer frame.
-    pub(crate) fn turn_in(&mut self, turn: &Turn, v: &Vector) -> Vector {
-        self.turn_by(turn, v, true)
+    pub(crate) fn rotate_in(&mut self, turn: &AxisRotation, v: &SymbolicVector) -> SymbolicVector {
+        self.rotate_by(turn, v, true)
     }
 
-    fn turn_by(&mut self, turn: &Turn, v: &Vector, inverse: bool) -> Vector {
+    fn rotate_by(&mut self, turn: &AxisRotation, v: &SymbolicVector, inverse: bool) -> SymbolicVector {
         let (c, s) = self.cos_sin(&turn.sum, turn.pi12);
         let s = if inverse { self.neg(s) } else { s };
         let axis = turn.axis as usize;
@@ -94,7 +94,7 @@ impl Graph {
     }
 
     /// Linear combination with rational factors.
-    pub(crate) fn combine(
+    pub(crate) fn linear_combination(
         &mut self,
         terms: impl IntoIterator<Item = (ExprId, Rational)>,
     ) -> ExprId {

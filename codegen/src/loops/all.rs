@@ -2,45 +2,45 @@
 
 use modelmill_spec::Mechanism;
 
-use super::closure::{Closure, closures};
+use super::closure::{LoopClosure, loop_closures};
 use super::coupling;
-use super::independent::{independent, sufficient};
+use super::independent::{independent_residuals, sufficient_residuals};
 use super::parallelogram;
 use crate::DeriveError;
 use crate::expr::{ExprId, Graph};
-use crate::tree::Tree;
+use crate::tree::KinematicTree;
 
 /// The loops of a mechanism with the coordinates that move it and those that follow.
 #[derive(Clone, Debug)]
-pub(crate) struct Loops {
+pub(crate) struct KinematicLoops {
     pub(crate) active: Vec<usize>,
     pub(crate) passive: Vec<usize>,
-    pub(crate) closures: Vec<Closure>,
+    pub(crate) closures: Vec<LoopClosure>,
     /// Residuals that are independent, as many as there are passive coordinates.
     pub(crate) residual: Vec<ExprId>,
     /// Angles whose turns others make fractions of, and into how many parts the field divides them.
     pub(crate) divided: Vec<(usize, i64)>,
 }
 
-impl Loops {
+impl KinematicLoops {
     pub(crate) fn new(
         graph: &mut Graph,
         mechanism: &Mechanism,
-        tree: &Tree,
+        tree: &KinematicTree,
     ) -> Result<Self, DeriveError> {
         let (passive, active): (Vec<usize>, Vec<usize>) =
             (0..mechanism.coordinates.len()).partition(|i| mechanism.coordinates[*i].passive);
-        let mut closures = closures(graph, mechanism, tree)?;
+        let mut closures = loop_closures(graph, mechanism, tree)?;
         let couplings = coupling::couplings(graph, mechanism)?;
         closures.extend(couplings.closures);
-        parallelogram::find(graph, mechanism, &mut closures, &couplings.divided);
+        parallelogram::find_relations(graph, mechanism, &mut closures, &couplings.divided);
         let residual: Vec<ExprId> = closures
             .iter()
             .flat_map(|c| c.residual.iter().copied())
             .collect();
-        let mut residual = independent(graph, &residual)?;
+        let mut residual = independent_residuals(graph, &residual)?;
         if residual.len() > passive.len()
-            && let Some(enough) = sufficient(graph, mechanism, &residual, passive.len())
+            && let Some(enough) = sufficient_residuals(graph, mechanism, &residual, passive.len())
         {
             residual = enough;
         }
@@ -66,7 +66,7 @@ impl Loops {
     }
 
     /// How many gaps close the loops, couplings aside: eqs. (L1) to (Ln) of the page.
-    pub(crate) fn n_gaps(&self, mechanism: &Mechanism) -> usize {
+    pub(crate) fn n_gap_equations(&self, mechanism: &Mechanism) -> usize {
         let of_loops = self.closures.iter().take(mechanism.loops.len());
         of_loops.map(|c| c.residual.len()).sum()
     }

@@ -6,20 +6,20 @@
 //! crank. Then the sign of the root follows from other coordinates and may even change along one branch.
 //! Which is the case shows in the field: a radicand that is no square function takes square and other values alike.
 
-use modelmill_algebra::field::{Element, Extended, MODULUS, Number, Stream};
+use modelmill_algebra::field::{FieldElement, ExtensionElement, MODULUS, FieldNumber, RandomStream};
 use modelmill_spec::Mechanism;
 
-use super::all::Loops;
-use super::field_poses::{FieldPoses, MOST_DRAWS};
-use super::plan::{Unknowns, plan};
-use super::solve_step::{Plan, radicands};
+use super::all::KinematicLoops;
+use super::field_poses::{FieldPoseSampler, MOST_DRAWS};
+use super::plan::{SolvableCoordinates, plan};
+use super::solve_step::{LoopPlan, radicands};
 use crate::DeriveError;
 use crate::expr::independent::SEED;
 use crate::expr::{ExprId, FieldPoint, Graph};
 
 /// What a square root is to those before it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Branch {
+pub(crate) enum RootBranch {
     /// Its sign is free.
     Free,
     /// Its radicand equals an earlier one: so does the root, but for the sign that the nominal pose tells.
@@ -32,42 +32,42 @@ pub(crate) enum Branch {
 
 /// A radicand of random values in which squares and others have not both been seen by then is a square: wrong with a
 /// probability of 2^-39.
-const ENOUGH: usize = 40;
+const SUFFICIENT_DRAWS: usize = 40;
 
 /// The order in which the loops give the passive coordinates in closed form, if every root keeps its sign wherever the
 /// mechanism can move; otherwise the loops must be followed.
-pub(crate) fn closed_form(graph: &mut Graph, mechanism: &Mechanism, loops: &Loops) -> Option<Plan> {
-    let found = plan(graph, mechanism, loops, Unknowns::Passive)?;
+pub(crate) fn closed_form_plan(graph: &mut Graph, mechanism: &Mechanism, loops: &KinematicLoops) -> Option<LoopPlan> {
+    let found = plan(graph, mechanism, loops, SolvableCoordinates::Passive)?;
     if found.steps.iter().all(|step| step.solved.root.is_none()) {
         return Some(found);
     }
-    let poses = FieldPoses::new(graph, mechanism, found.clone(), &loops.residual);
-    let branches = branches(graph, &poses, &[]).ok()?;
-    (!branches.contains(&Branch::Bound)).then_some(found)
+    let poses = FieldPoseSampler::new(graph, mechanism, found.clone(), &loops.residual);
+    let branches = root_branches(graph, &poses, &[]).ok()?;
+    (!branches.contains(&RootBranch::Bound)).then_some(found)
 }
 
 /// What each square root on the way to a pose is, and each of those of coordinates under `outputs`.
 ///
 /// Poses are closed over the quadratic extension, where roots of the prime field always exist.
-pub(crate) fn branches(
+pub(crate) fn root_branches(
     graph: &Graph,
-    poses: &FieldPoses,
+    poses: &FieldPoseSampler,
     outputs: &[ExprId],
-) -> Result<Vec<Branch>, DeriveError> {
+) -> Result<Vec<RootBranch>, DeriveError> {
     let further = radicands(graph, outputs);
     let of_steps: usize = poses.steps.iter().map(|s| s.radicands.len()).sum();
-    let mut seen: Vec<Seen> = (0..of_steps + further.len()).map(Seen::new).collect();
-    let mut stream = Stream::new(SEED);
-    let constants = poses.constants::<MODULUS>(&mut stream)?;
-    let mut kept = Characters::default();
+    let mut seen: Vec<RadicandStatistics> = (0..of_steps + further.len()).map(RadicandStatistics::new).collect();
+    let mut stream = RandomStream::new(SEED);
+    let constants = poses.draw_constants::<MODULUS>(&mut stream)?;
+    let mut kept = QuadraticCharacters::default();
     for _ in 0..MOST_DRAWS {
-        if (0..seen.len()).all(|k| seen[k].is_settled() || kept.is_settled(k)) {
+        if (0..seen.len()).all(|k| seen[k].is_decided() || kept.is_decided(k)) {
             break;
         }
-        let mut point: FieldPoint<Extended> = poses.open(&constants, &mut stream);
-        let mut values: Vec<Extended> = Vec::new();
+        let mut point: FieldPoint<ExtensionElement> = poses.draw_open_point(&constants, &mut stream);
+        let mut values: Vec<ExtensionElement> = Vec::new();
         // Says whether the root exists, so that what comes after it can be looked at.
-        let mut note = |value: Option<Vec<Extended>>| -> Option<()> {
+        let mut note = |value: Option<Vec<ExtensionElement>>| -> Option<()> {
             let value = value?[0];
             values.push(value);
             value.square_root().map(|_| ())
@@ -85,13 +85,13 @@ pub(crate) fn branches(
         };
         // Where a root does not exist the next draw goes on.
         let _: Option<()> = walk();
-        let inverses: Vec<Extended> = values
+        let inverses: Vec<ExtensionElement> = values
             .iter()
-            .map(|v| v.inverse().unwrap_or(Extended::ZERO))
+            .map(|v| v.inverse().unwrap_or(ExtensionElement::ZERO))
             .collect();
         let mut so_far_within = true;
         for (k, value) in values.iter().enumerate() {
-            let is_within = value.im == Element::ZERO;
+            let is_within = value.im == FieldElement::ZERO;
             let is_square = if is_within {
                 value.re.square_root().is_some()
             } else {
@@ -100,19 +100,19 @@ pub(crate) fn branches(
             // Squares of the prime field and others are told apart where all roots before lie in it, others of the
             // extension everywhere.
             if so_far_within || !is_within {
-                seen[k].note(is_square, so_far_within);
+                seen[k].record_draw(is_square, so_far_within);
             }
-            seen[k].compare(*value, &inverses[..k]);
+            seen[k].record_ratios(*value, &inverses[..k]);
             so_far_within &= is_within && is_square;
         }
-        kept.note(&values);
+        kept.record_draw(&values);
     }
     Ok((0..seen.len())
         .map(|k| {
-            if kept.is_settled(k) && kept.is_independent(k) {
-                Branch::Free
+            if kept.is_decided(k) && kept.is_independent(k) {
+                RootBranch::Free
             } else {
-                seen[k].branch()
+                seen[k].classify()
             }
         })
         .collect())
@@ -123,7 +123,7 @@ pub(crate) fn branches(
 /// Roots of functions of the free coordinates alone are independent unless a product of some of the radicands is a
 /// square, up to a sign (Kummer): then the sum of their characters is the same at every draw.
 #[derive(Default)]
-struct Characters {
+struct QuadraticCharacters {
     rows: Vec<Vec<bool>>,
     /// How many draws came as far as each radicand.
     draws: Vec<usize>,
@@ -131,26 +131,26 @@ struct Characters {
     leaves: Vec<bool>,
 }
 
-impl Characters {
-    fn note(&mut self, values: &[Extended]) {
+impl QuadraticCharacters {
+    fn record_draw(&mut self, values: &[ExtensionElement]) {
         let n = values.len().max(self.leaves.len());
         self.leaves.resize(n, false);
         self.draws.resize(n, 0);
         for (k, value) in values.iter().enumerate() {
-            self.leaves[k] |= value.im != Element::ZERO;
+            self.leaves[k] |= value.im != FieldElement::ZERO;
             self.draws[k] += 1;
         }
         self.rows.push(
             values
                 .iter()
-                .map(|v| v.im == Element::ZERO && v.re.square_root().is_none())
+                .map(|v| v.im == FieldElement::ZERO && v.re.square_root().is_none())
                 .collect(),
         );
     }
 
     /// Whether radicand `k` is a function of free coordinates that has been seen often enough.
-    fn is_settled(&self, k: usize) -> bool {
-        self.draws.get(k).is_some_and(|n| *n >= k + ENOUGH) && !self.leaves[k]
+    fn is_decided(&self, k: usize) -> bool {
+        self.draws.get(k).is_some_and(|n| *n >= k + SUFFICIENT_DRAWS) && !self.leaves[k]
     }
 
     /// Whether radicand `k` is independent of those before it: elimination over the field with two elements.
@@ -177,7 +177,7 @@ impl Characters {
 }
 
 /// What has been seen of one radicand.
-struct Seen {
+struct RadicandStatistics {
     squares: usize,
     others: usize,
     /// Draws at which it was looked at.
@@ -185,10 +185,10 @@ struct Seen {
     /// Whether it was no square even in the extension.
     is_outside: bool,
     /// Its ratio to each earlier radicand, as long as it has been the same at all poses.
-    ratios: Vec<Option<Extended>>,
+    ratios: Vec<Option<ExtensionElement>>,
 }
 
-impl Seen {
+impl RadicandStatistics {
     fn new(earlier: usize) -> Self {
         Self {
             squares: 0,
@@ -199,7 +199,7 @@ impl Seen {
         }
     }
 
-    fn note(&mut self, is_square: bool, within: bool) {
+    fn record_draw(&mut self, is_square: bool, within: bool) {
         if !within {
             self.is_outside |= !is_square;
         } else if is_square {
@@ -209,7 +209,7 @@ impl Seen {
         }
     }
 
-    fn compare(&mut self, value: Extended, inverses: &[Extended]) {
+    fn record_ratios(&mut self, value: ExtensionElement, inverses: &[ExtensionElement]) {
         let first = self.draws == 0;
         self.draws += 1;
         for (ratio, inverse) in self.ratios.iter_mut().zip(inverses) {
@@ -222,25 +222,25 @@ impl Seen {
         }
     }
 
-    fn is_free(&self) -> bool {
+    fn has_free_sign(&self) -> bool {
         self.is_outside || (self.squares > 0 && self.others > 0)
     }
 
-    fn is_settled(&self) -> bool {
-        self.is_free() || self.squares + self.others >= ENOUGH
+    fn is_decided(&self) -> bool {
+        self.has_free_sign() || self.squares + self.others >= SUFFICIENT_DRAWS
     }
 
-    fn branch(&self) -> Branch {
+    fn classify(&self) -> RootBranch {
         let mut ratios = self.ratios.iter().flatten();
         // What was hardly ever reached is left to those who draw points.
-        if self.is_free() || self.draws < ENOUGH {
-            Branch::Free
-        } else if self.ratios.contains(&Some(Extended::ONE)) {
-            Branch::Twin
+        if self.has_free_sign() || self.draws < SUFFICIENT_DRAWS {
+            RootBranch::Free
+        } else if self.ratios.contains(&Some(ExtensionElement::ONE)) {
+            RootBranch::Twin
         } else if ratios.next().is_some() {
-            Branch::Multiple
+            RootBranch::Multiple
         } else {
-            Branch::Bound
+            RootBranch::Bound
         }
     }
 }

@@ -10,7 +10,7 @@ use crate::loops::numeric_poses::NumericLoops;
 /// Sets of `size` of the `free` coordinates that settle the loops at the nominal pose and for which these look as if they
 /// could be solved together as [`crate::loops::spatial::solve`] does, seen from which coordinates occur in which equations. Sets that leave the
 /// coordinates of most equations given come first.
-pub(crate) fn promising(
+pub(crate) fn promising_sets(
     graph: &mut Graph,
     mechanism: &Mechanism,
     equations: &[ExprId],
@@ -62,7 +62,7 @@ pub(crate) fn promising(
     for _ in 0..MOST_SETS {
         let positions: Vec<usize> = (0..order.len()).filter(|k| !given.contains(k)).collect();
         let unknown: Vec<usize> = positions.iter().map(|k| order[*k]).collect();
-        if looks_solvable(known.clone(), mask(&unknown)) && settles(&positions) {
+        if is_probably_solvable(known.clone(), mask(&unknown)) && settles(&positions) {
             found.push(unknown);
             if found.len() == MOST_FOUND {
                 break;
@@ -82,10 +82,10 @@ fn nominal_jacobian(
     residual: &[ExprId],
     coordinates: &[usize],
 ) -> Option<DMatrix<f64>> {
-    let loops = NumericLoops::solved_for(graph, mechanism, residual, coordinates.to_vec(), &[]);
-    let (_, mut jacobian) = loops.linearise(&loops.as_written())?;
+    let loops = NumericLoops::for_unknowns(graph, mechanism, residual, coordinates.to_vec(), &[]);
+    let (_, mut jacobian) = loops.linearise(&loops.declared_nominal_pose())?;
     for (mut column, i) in jacobian.column_iter_mut().zip(coordinates) {
-        column *= loops.unit(*i);
+        column *= loops.coordinate_unit(*i);
     }
     Some(jacobian)
 }
@@ -104,7 +104,7 @@ fn next_set(set: &mut [usize], n: usize) -> bool {
 }
 
 /// Plays [`crate::loops::spatial::solve`] with the coordinates of the equations alone.
-fn looks_solvable(mut equations: Vec<(u64, Vec<(u64, u64)>)>, unknown: u64) -> bool {
+fn is_probably_solvable(mut equations: Vec<(u64, Vec<(u64, u64)>)>, unknown: u64) -> bool {
     let mut left = unknown;
     while left != 0 {
         let single = equations

@@ -3,16 +3,16 @@
 use modelmill_spec::{FrameIdx, Mechanism};
 
 use crate::DeriveError;
-use crate::expr::{AngleSum, ExprId, Graph, coordinates_of};
-use crate::loops::coupling::Follower;
+use crate::expr::{AtomAngleSum, ExprId, Graph, coordinates_of};
+use crate::loops::coupling::CoupledCoordinate;
 use crate::loops::relation::AngleRelation;
 use crate::loops::spatial;
-use crate::loops::stretch::{Between, Stretch, fixed_turns, inverse, point_at, sum_of};
-use crate::tree::Tree;
+use crate::loops::stretch::{PointPairPath, PathSegment, fixed_rotations, inverse_rotations, local_position, sum_segments};
+use crate::tree::KinematicTree;
 
 /// A loop cut open at two points that must coincide.
 #[derive(Clone, Debug)]
-pub(crate) struct Closure {
+pub(crate) struct LoopClosure {
     /// Name for people.
     pub(crate) name: String,
     /// Difference of the two positions in the plane of the loop (2) or in the frame of its root (3); all zero.
@@ -20,21 +20,21 @@ pub(crate) struct Closure {
     /// How many of these are independent of each other and of those of loops before.
     pub(crate) n_independent: usize,
     /// The same as a chain of vectors turned about one axis, if the loop is planar.
-    pub(crate) chain: Option<Vec<Leg>>,
+    pub(crate) chain: Option<Vec<PlanarLeg>>,
     /// Equations that hold where it closes, each without one or another of its coordinates; empty if all loops are
     /// planar.
     pub(crate) equations: Vec<ExprId>,
     /// Relations that solve it outright; empty if there are none.
     pub(crate) relations: Vec<AngleRelation>,
     /// What follows others, if this is a coupling and no loop.
-    pub(crate) follower: Option<Follower>,
+    pub(crate) follower: Option<CoupledCoordinate>,
     /// Coordinates on which it depends, sorted.
     pub(crate) coordinates: Vec<usize>,
 }
 
-impl Closure {
+impl LoopClosure {
     /// The coordinates that it gives outright; none where it has to be solved.
-    pub(super) fn given(&self) -> Vec<usize> {
+    pub(super) fn explicit_coordinates(&self) -> Vec<usize> {
         match &self.follower {
             Some(follower) => vec![follower.coordinate],
             None => self.relations.iter().map(|r| r.coordinate).collect(),
@@ -44,25 +44,25 @@ impl Closure {
 
 /// A vector of a planar chain, turned by `angle + pi12 * pi/12`.
 #[derive(Clone, Debug)]
-pub(crate) struct Leg {
-    pub(crate) angle: AngleSum,
+pub(crate) struct PlanarLeg {
+    pub(crate) angle: AtomAngleSum,
     pub(crate) pi12: i32,
     pub(crate) vector: [ExprId; 2],
 }
 
 /// The closure of every loop of the mechanism.
-pub(crate) fn closures(
+pub(crate) fn loop_closures(
     graph: &mut Graph,
     mechanism: &Mechanism,
-    tree: &Tree,
-) -> Result<Vec<Closure>, DeriveError> {
+    tree: &KinematicTree,
+) -> Result<Vec<LoopClosure>, DeriveError> {
     let paths: Vec<[Vec<usize>; 2]> = mechanism
         .loops
         .iter()
         .map(|l| {
             let [a, b] = l.joins.map(|p| {
                 let frame: FrameIdx = mechanism.points[p.0].frame;
-                tree.path(tree.link_of(frame))
+                tree.path_to(tree.link_of(frame))
             });
             let common = a.iter().zip(&b).take_while(|(x, y)| x == y).count();
             [a[common..].to_vec(), b[common..].to_vec()]
@@ -72,15 +72,15 @@ pub(crate) fn closures(
     for (l, [pa, pb]) in mechanism.loops.iter().zip(&paths) {
         let [a, b] = l.joins.map(|p| &mechanism.points[p.0]);
         // What stands still before the first turning joint leads into the plane of the loop, if it has one.
-        let into = fixed_turns(tree, pa)
-            .or_else(|| fixed_turns(tree, pb))
+        let into = fixed_rotations(tree, pa)
+            .or_else(|| fixed_rotations(tree, pb))
             .unwrap_or_default();
-        let between = Between {
+        let between = PointPairPath {
             paths: [pa, pb],
-            at: [point_at(graph, a)?, point_at(graph, b)?],
+            at: [local_position(graph, a)?, local_position(graph, b)?],
         };
-        let path = between.stretches(graph, tree, &inverse(&into));
-        all.push((close(graph, l.name.clone(), &path), between));
+        let path = between.segments(graph, tree, &inverse_rotations(&into));
+        all.push((closure_of_path(graph, l.name.clone(), &path), between));
     }
     // Planar loops among spatial ones may have to be solved together with them.
     let is_spatial = all.iter().any(|(closure, _)| closure.chain.is_none());
@@ -95,8 +95,8 @@ pub(crate) fn closures(
         .collect())
 }
 
-fn close(graph: &mut Graph, name: String, path: &[Stretch]) -> Closure {
-    let total = sum_of(graph, path);
+fn closure_of_path(graph: &mut Graph, name: String, path: &[PathSegment]) -> LoopClosure {
+    let total = sum_segments(graph, path);
     let mut chain = Some(Vec::new());
     for stretch in path {
         // Fixed rotations at the inner end are applied, which leaves one turn about the normal of a planar loop.
@@ -104,22 +104,22 @@ fn close(graph: &mut Graph, name: String, path: &[Stretch]) -> Closure {
         while let [rest @ .., last] = turns
             && last.sum.is_empty()
         {
-            vector = graph.turn_out(last, &vector);
+            vector = graph.rotate_out(last, &vector);
             turns = rest;
         }
         let turn = match turns {
             [] => None,
-            [turn] if turn.axis == modelmill_spec::Axis::Z => Some(turn),
+            [turn] if turn.axis == modelmill_spec::FrameAxis::Z => Some(turn),
             _ => {
                 chain = None;
                 break;
             }
         };
-        let (angle, pi12) = turn.map_or((AngleSum::NONE, 0), |t| (t.sum.clone(), t.pi12));
+        let (angle, pi12) = turn.map_or((AtomAngleSum::NONE, 0), |t| (t.sum.clone(), t.pi12));
         if let Some(legs) = &mut chain
             && vector[..2] != [Graph::ZERO; 2]
         {
-            legs.push(Leg {
+            legs.push(PlanarLeg {
                 angle,
                 pi12,
                 vector: [vector[0], vector[1]],
@@ -131,7 +131,7 @@ fn close(graph: &mut Graph, name: String, path: &[Stretch]) -> Closure {
     }
     let residual: Vec<ExprId> = total.into_iter().filter(|r| *r != Graph::ZERO).collect();
     let coordinates = coordinates_of(graph, &residual);
-    Closure {
+    LoopClosure {
         name,
         n_independent: residual.len(),
         residual,

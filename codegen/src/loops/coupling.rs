@@ -9,11 +9,11 @@ use std::collections::BTreeMap;
 
 use modelmill_spec::Mechanism;
 
-use super::closure::Closure;
+use super::closure::LoopClosure;
 use super::relation::AngleRelation;
-use super::solved::{times, turn};
+use super::solved::{multiply_angle, rotate_vector};
 use crate::DeriveError;
-use crate::expr::{AngleSum, Atom, ExprId, Graph, Node, Rational, Unary, coordinates_of};
+use crate::expr::{AtomAngleSum, Atom, ExprId, Graph, Node, Rational, Unary, coordinates_of};
 use crate::tree::expressions::expression;
 
 /// Angles are divided into at most so many parts, and turn by at most so many of them.
@@ -21,7 +21,7 @@ const MOST_PARTS: i64 = 1000;
 
 /// A coordinate that follows others.
 #[derive(Clone, Debug)]
-pub(crate) struct Follower {
+pub(crate) struct CoupledCoordinate {
     pub(crate) coordinate: usize,
     /// rad or m, in terms of what it follows.
     pub(crate) value: ExprId,
@@ -30,8 +30,8 @@ pub(crate) struct Follower {
 }
 
 /// All couplings of a mechanism.
-pub(crate) struct Couplings {
-    pub(crate) closures: Vec<Closure>,
+pub(crate) struct CouplingClosures {
+    pub(crate) closures: Vec<LoopClosure>,
     /// Angles whose turns others make fractions of, and into how many parts the field divides them.
     pub(crate) divided: Vec<(usize, i64)>,
 }
@@ -40,7 +40,7 @@ pub(crate) struct Couplings {
 pub(crate) fn couplings(
     graph: &mut Graph,
     mechanism: &Mechanism,
-) -> Result<Couplings, DeriveError> {
+) -> Result<CouplingClosures, DeriveError> {
     let is_angle = |i: usize| mechanism.coordinates[i].motion.is_angle();
     let mut values = Vec::new();
     for coupling in &mechanism.couplings {
@@ -67,7 +67,7 @@ pub(crate) fn couplings(
         .zip(&resolved)
         .filter(|((i, _), _)| is_angle(*i));
     for (_, value) in turning {
-        for (base, factor) in pieces(graph, *value) {
+        for (base, factor) in scaled_terms(graph, *value) {
             let denominator = factor.as_small().map_or(0, |(_, d)| d);
             let common = parts.entry(base).or_insert(1);
             let both = lcm(*common, denominator);
@@ -81,24 +81,24 @@ pub(crate) fn couplings(
         let own = graph.atom(Atom::Coordinate(coordinate));
         let residual = vec![graph.sub(own, value)];
         let relation = is_angle(coordinate)
-            .then(|| relation(graph, mechanism, coordinate, value))
+            .then(|| coupled_angle_relation(graph, mechanism, coordinate, value))
             .flatten();
         let in_parts = is_angle(coordinate).then(|| {
-            let all = pieces(graph, resolved);
+            let all = scaled_terms(graph, resolved);
             all.into_iter()
                 .fold([Graph::ONE, Graph::ZERO], |so_far, (base, factor)| {
-                    let piece = circle(graph, mechanism, base, &factor, &parts);
-                    turn(graph, piece, so_far)
+                    let piece = term_cos_sin(graph, mechanism, base, &factor, &parts);
+                    rotate_vector(graph, piece, so_far)
                 })
         });
-        closures.push(Closure {
+        closures.push(LoopClosure {
             name: mechanism.coordinates[coordinate].name.clone(),
             coordinates: coordinates_of(graph, &residual),
             residual,
             n_independent: 1,
             chain: None,
             equations: Vec::new(),
-            follower: Some(Follower {
+            follower: Some(CoupledCoordinate {
                 coordinate,
                 value,
                 in_parts,
@@ -111,14 +111,14 @@ pub(crate) fn couplings(
         Node::Atom(Atom::Coordinate(i)) if is_angle(*i) => Some((*i, n)),
         _ => None,
     });
-    Ok(Couplings {
+    Ok(CouplingClosures {
         closures,
         divided: divided.collect(),
     })
 }
 
 /// A sum as what it is made of, each with its rational factor.
-fn pieces(graph: &Graph, value: ExprId) -> Vec<(ExprId, Rational)> {
+fn scaled_terms(graph: &Graph, value: ExprId) -> Vec<(ExprId, Rational)> {
     match graph.node(value) {
         Node::Sum(terms) => terms.clone(),
         Node::Rational(number) if number.is_zero() => Vec::new(),
@@ -128,12 +128,12 @@ fn pieces(graph: &Graph, value: ExprId) -> Vec<(ExprId, Rational)> {
 }
 
 /// A piece that is a whole multiple of an angle with a name, or of pi/12.
-fn whole(
+fn integer_multiple(
     graph: &Graph,
     mechanism: &Mechanism,
     base: ExprId,
     factor: &Rational,
-) -> Option<(AngleSum, i32)> {
+) -> Option<(AtomAngleSum, i32)> {
     let count = |factor: &Rational| {
         let (n, _) = factor.as_small().filter(|(_, d)| *d == 1)?;
         i32::try_from(n)
@@ -143,20 +143,20 @@ fn whole(
     match graph.node(base) {
         Node::Atom(Atom::Pi) => {
             let twelfths = count(&(factor * &Rational::integer(12)))?;
-            Some((AngleSum::NONE, twelfths.rem_euclid(24)))
+            Some((AtomAngleSum::NONE, twelfths.rem_euclid(24)))
         }
         Node::Atom(atom @ Atom::Coordinate(i)) if mechanism.coordinates[*i].motion.is_angle() => {
-            Some((AngleSum::new([(*atom, count(factor)?)]), 0))
+            Some((AtomAngleSum::new([(*atom, count(factor)?)]), 0))
         }
         Node::Atom(atom @ Atom::Constant(i)) if mechanism.constants[*i].is_angle => {
-            Some((AngleSum::new([(*atom, count(factor)?)]), 0))
+            Some((AtomAngleSum::new([(*atom, count(factor)?)]), 0))
         }
         _ => None,
     }
 }
 
 /// The coupling of an angle that is a sum of whole multiples of others.
-fn relation(
+fn coupled_angle_relation(
     graph: &Graph,
     mechanism: &Mechanism,
     coordinate: usize,
@@ -164,11 +164,11 @@ fn relation(
 ) -> Option<AngleRelation> {
     let mut relation = AngleRelation {
         coordinate,
-        sum: AngleSum::NONE,
+        sum: AtomAngleSum::NONE,
         pi12: 0,
     };
-    for (base, factor) in pieces(graph, value) {
-        let (sum, pi12) = whole(graph, mechanism, base, &factor)?;
+    for (base, factor) in scaled_terms(graph, value) {
+        let (sum, pi12) = integer_multiple(graph, mechanism, base, &factor)?;
         relation.sum = relation.sum.plus(&sum, 1);
         relation.pi12 = (relation.pi12 + pi12).rem_euclid(24);
     }
@@ -176,14 +176,14 @@ fn relation(
 }
 
 /// Cosine and sine of a piece of an angle.
-fn circle(
+fn term_cos_sin(
     graph: &mut Graph,
     mechanism: &Mechanism,
     base: ExprId,
     factor: &Rational,
     parts: &BTreeMap<ExprId, i64>,
 ) -> [ExprId; 2] {
-    if let Some((sum, pi12)) = whole(graph, mechanism, base, factor) {
+    if let Some((sum, pi12)) = integer_multiple(graph, mechanism, base, factor) {
         let (c, s) = graph.cos_sin(&sum, pi12);
         return [c, s];
     }
@@ -197,7 +197,7 @@ fn circle(
     };
     let part = graph.scale(base, &part);
     let circle = [Unary::Cos, Unary::Sin].map(|function| graph.unary(function, part));
-    times(graph, circle, n)
+    multiply_angle(graph, circle, n)
 }
 
 fn lcm(a: i64, b: i64) -> i64 {

@@ -1,68 +1,68 @@
 //! Random poses of a mechanism in the prime field: angles as rational points of the circle, loops solved by square roots
 //! in the field.
 
-use modelmill_algebra::field::{Element, Number, Stream};
+use modelmill_algebra::field::{FieldElement, FieldNumber, RandomStream};
 use modelmill_spec::Mechanism;
 
-use super::solve_step::{Plan, SolveStep};
+use super::solve_step::{LoopPlan, FieldSolveStep};
 use crate::DeriveError;
-use crate::expr::{Atom, Domain, ExprId, FieldPoint, Graph, Node, Rational, Tape, Unary};
+use crate::expr::{Atom, EvaluationDomain, ExprId, FieldPoint, Graph, Node, Rational, EvaluationTape, Unary};
 
 /// How often a draw is repeated until all square roots exist.
 pub(crate) const MOST_DRAWS: usize = 4000;
 
 /// Draws poses that a plan solves for.
-pub(crate) struct FieldPoses {
+pub(crate) struct FieldPoseSampler {
     coordinates: Vec<(usize, bool)>,
     n_constants: usize,
     /// Functions of constants that exist only for some of them.
-    of_constants: Tape,
-    pub(crate) steps: Vec<SolveStep>,
+    of_constants: EvaluationTape,
+    pub(crate) steps: Vec<FieldSolveStep>,
     /// Angles whose turns are drawn in so many parts.
     divided: Vec<(usize, i64)>,
 }
 
-impl FieldPoses {
+impl FieldPoseSampler {
     /// Makes a plan evaluable at constants for which also `outputs` may exist.
     pub(crate) fn new(
         graph: &mut Graph,
         mechanism: &Mechanism,
-        plan: Plan,
+        plan: LoopPlan,
         outputs: &[ExprId],
     ) -> Self {
         let mut all = outputs.to_vec();
         let steps = plan
             .steps
             .into_iter()
-            .map(|step| SolveStep::new(graph, step, &mut all))
+            .map(|step| FieldSolveStep::new(graph, step, &mut all))
             .collect();
         let coordinates = mechanism.coordinates.iter().enumerate();
         Self {
             coordinates: coordinates.map(|(i, c)| (i, c.motion.is_angle())).collect(),
             n_constants: mechanism.constants.len(),
-            of_constants: functions_of_constants(graph, &all),
+            of_constants: partial_constant_functions(graph, &all),
             steps,
             divided: plan.divided,
         }
     }
 
     /// Random constants whose functions that do not depend on the motion all exist.
-    pub(crate) fn constants<const P: u64>(
+    pub(crate) fn draw_constants<const P: u64>(
         &self,
-        stream: &mut Stream,
-    ) -> Result<FieldPoint<Element<P>>, DeriveError> {
+        stream: &mut RandomStream,
+    ) -> Result<FieldPoint<FieldElement<P>>, DeriveError> {
         (0..MOST_DRAWS)
             .find_map(|_| {
                 let mut point = FieldPoint {
-                    seed: stream.bits(),
-                    root_seed: stream.bits(),
+                    seed: stream.next_bits(),
+                    root_seed: stream.next_bits(),
                     ..FieldPoint::default()
                 };
-                point.values.insert(Atom::Pi, stream.element());
+                point.values.insert(Atom::Pi, stream.next_element());
                 for i in 0..self.n_constants {
                     let atom = Atom::Constant(i);
-                    point.values.insert(atom, stream.element());
-                    point.angles.insert(atom, stream.circle());
+                    point.values.insert(atom, stream.next_element());
+                    point.angles.insert(atom, stream.next_circle_point());
                 }
                 self.of_constants.evaluate(&point).map(|_| point)
             })
@@ -71,12 +71,12 @@ impl FieldPoses {
 
     /// Some values for all coordinates, loops still open. They lie in the prime field, over whichever field the loops
     /// are closed.
-    pub(crate) fn open<const P: u64, N: Number + From<Element<P>>>(
+    pub(crate) fn draw_open_point<const P: u64, N: FieldNumber + From<FieldElement<P>>>(
         &self,
-        constants: &FieldPoint<Element<P>>,
-        stream: &mut Stream,
+        constants: &FieldPoint<FieldElement<P>>,
+        stream: &mut RandomStream,
     ) -> FieldPoint<N> {
-        let mut point = constants.extended();
+        let mut point = constants.over_field();
         for (i, is_angle) in &self.coordinates {
             if *is_angle {
                 let angle = N::draw_circle(stream);
@@ -85,7 +85,7 @@ impl FieldPoses {
             point.values.insert(Atom::Coordinate(*i), N::draw(stream));
         }
         for (i, n) in &self.divided {
-            if let Some(turn) = in_parts(&point, *i, *n) {
+            if let Some(turn) = divided_angle(&point, *i, *n) {
                 point.angles.insert(Atom::Coordinate(*i), turn);
             }
         }
@@ -93,7 +93,7 @@ impl FieldPoses {
     }
 
     /// The loops of a point closed; `None` if they do not close for its free coordinates.
-    pub(crate) fn close<N: Number>(&self, mut point: FieldPoint<N>) -> Option<FieldPoint<N>> {
+    pub(crate) fn close_loops<N: FieldNumber>(&self, mut point: FieldPoint<N>) -> Option<FieldPoint<N>> {
         for step in &self.steps {
             step.solve(&mut point)?;
         }
@@ -102,7 +102,7 @@ impl FieldPoses {
 }
 
 /// Cosine and sine of a coordinate as `n` times the opaque angle that is its `n`-th part.
-fn in_parts<N: Number>(point: &FieldPoint<N>, coordinate: usize, n: i64) -> Option<(N, N)> {
+fn divided_angle<N: FieldNumber>(point: &FieldPoint<N>, coordinate: usize, n: i64) -> Option<(N, N)> {
     let value = point.atom(Atom::Coordinate(coordinate))?;
     let part = value * point.rational(&Rational::new(1, n))?;
     let mut power = (
@@ -122,7 +122,7 @@ fn in_parts<N: Number>(point: &FieldPoint<N>, coordinate: usize, n: i64) -> Opti
 }
 
 /// Functions under `roots` that depend on constants alone and do not exist for all of them.
-fn functions_of_constants(graph: &Graph, roots: &[ExprId]) -> Tape {
+fn partial_constant_functions(graph: &Graph, roots: &[ExprId]) -> EvaluationTape {
     let mut moves = vec![false; graph.len()];
     let mut found = Vec::new();
     for (i, needed) in graph.reachable(roots).into_iter().enumerate() {
@@ -147,5 +147,5 @@ fn functions_of_constants(graph: &Graph, roots: &[ExprId]) -> Tape {
             found.push(id);
         }
     }
-    Tape::new(graph, &found)
+    EvaluationTape::new(graph, &found)
 }

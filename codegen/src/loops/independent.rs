@@ -1,6 +1,6 @@
 //! Which of the loops' equations are enough.
 
-use modelmill_algebra::field::Stream;
+use modelmill_algebra::field::RandomStream;
 use modelmill_spec::Mechanism;
 use nalgebra::DMatrix;
 
@@ -11,7 +11,7 @@ use crate::expr::independent::independent_functions;
 use crate::expr::{ExprId, Graph};
 
 /// The residuals without those that are constant combinations of others (a planar loop seen in a tilted frame).
-pub(super) fn independent(graph: &Graph, residual: &[ExprId]) -> Result<Vec<ExprId>, DeriveError> {
+pub(super) fn independent_residuals(graph: &Graph, residual: &[ExprId]) -> Result<Vec<ExprId>, DeriveError> {
     let columns = independent_functions(graph, residual)?;
     Ok(columns.into_iter().map(|i| residual[i]).collect())
 }
@@ -21,7 +21,7 @@ pub(super) fn independent(graph: &Graph, residual: &[ExprId]) -> Result<Vec<Expr
 ///
 /// That this is so is seen in numbers, at poses around the nominal one at which all residuals vanish. Those equations are
 /// taken that determine the passive coordinates best at the nominal pose.
-pub(super) fn sufficient(
+pub(super) fn sufficient_residuals(
     graph: &mut Graph,
     mechanism: &Mechanism,
     residual: &[ExprId],
@@ -33,12 +33,12 @@ pub(super) fn sufficient(
     /// Residuals relative to the size of the loops, and singular values relative to the largest, that count as zero.
     const CLOSED: f64 = 1e-7;
     const SINGULAR: f64 = 1e-7;
-    let size = magnitude::at_nominal(graph, mechanism, residual);
+    let size = magnitude::nominal_magnitude(graph, mechanism, residual);
     let loops = NumericLoops::new(graph, mechanism, residual);
-    let mut stream = Stream::new(5);
-    let mut poses = vec![loops.nominal()?];
+    let mut stream = RandomStream::new(5);
+    let mut poses = vec![loops.closed_nominal_pose()?];
     for _ in 0..POSES {
-        poses.push(loops.random(REACH, &mut stream)?);
+        poses.push(loops.random_pose(REACH, &mut stream)?);
     }
     let is_regular = |jacobian: &DMatrix<f64>| {
         let values = jacobian.clone().svd(false, false).singular_values;
@@ -50,12 +50,12 @@ pub(super) fn sufficient(
         let passive =
             (0..mechanism.coordinates.len()).filter(|i| mechanism.coordinates[*i].passive);
         for (mut column, i) in jacobian.column_iter_mut().zip(passive) {
-            column *= loops.unit(i);
+            column *= loops.coordinate_unit(i);
         }
         if gaps.amax() > CLOSED * size || !is_regular(&jacobian) {
             return None;
         }
-        let rows = chosen.get_or_insert_with(|| most_different_rows(&jacobian, n_passive));
+        let rows = chosen.get_or_insert_with(|| best_conditioned_rows(&jacobian, n_passive));
         if !is_regular(&jacobian.select_rows(rows.iter())) {
             return None;
         }
@@ -64,7 +64,7 @@ pub(super) fn sufficient(
 }
 
 /// Rows of a matrix that span its row space well: each time the one of which most is left.
-pub(crate) fn most_different_rows(matrix: &DMatrix<f64>, n: usize) -> Vec<usize> {
+pub(crate) fn best_conditioned_rows(matrix: &DMatrix<f64>, n: usize) -> Vec<usize> {
     let mut rest = matrix.clone();
     let mut chosen = Vec::new();
     for _ in 0..n.min(matrix.nrows()) {

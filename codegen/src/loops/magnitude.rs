@@ -7,17 +7,17 @@ use modelmill_spec::Mechanism;
 use num_rational::BigRational;
 use num_traits::One;
 
-use crate::expr::{Atom, ExprId, F64, Graph, Node, Tape, Unary, nominal_of, nominal_value};
+use crate::expr::{Atom, ExprId, FloatDomain, Graph, Node, EvaluationTape, Unary, nominal_of, nominal_value};
 
 /// The sum of the magnitudes of all terms of some expressions at the nominal pose: the size of a mechanism's loops in m.
 /// It is 1 where there is none; what couples angles has no length.
-pub(crate) fn at_nominal(graph: &mut Graph, mechanism: &Mechanism, roots: &[ExprId]) -> f64 {
+pub(crate) fn nominal_magnitude(graph: &mut Graph, mechanism: &Mechanism, roots: &[ExprId]) -> f64 {
     let mut known = HashMap::new();
     let mut lengths = roots.to_vec();
-    lengths.retain(|root| !couples_angles(graph, mechanism, *root));
+    lengths.retain(|root| !has_angle_term(graph, mechanism, *root));
     let terms: Vec<ExprId> = lengths
         .into_iter()
-        .map(|root| magnitude(graph, mechanism, &mut known, root))
+        .map(|root| expression_magnitude(graph, mechanism, &mut known, root))
         .collect();
     let total = graph.add_all(&terms);
     nominal_value(graph, mechanism, total)
@@ -31,9 +31,9 @@ pub(crate) fn at_nominal(graph: &mut Graph, mechanism: &Mechanism, roots: &[Expr
 /// For a sum that is its share of the magnitudes of its terms. A product has lost as many digits as its factors together
 /// have relative to their own sizes: it is as good as its worst factor, however many there are, while the magnitudes of all
 /// its terms, multiplied out, would count the digits of every factor.
-pub(crate) fn digits_left(graph: &Graph, mechanism: &Mechanism, root: ExprId) -> Option<f64> {
+pub(crate) fn significant_digits(graph: &Graph, mechanism: &Mechanism, root: ExprId) -> Option<f64> {
     let order = operands_first(graph, root);
-    let values = Tape::new(graph, &order).evaluate(&F64(|atom| nominal_of(mechanism, atom)))?;
+    let values = EvaluationTape::new(graph, &order).evaluate(&FloatDomain(|atom| nominal_of(mechanism, atom)))?;
     let mut known: HashMap<ExprId, (f64, f64)> = HashMap::new();
     for (id, value) in order.iter().zip(values) {
         let of = |id: &ExprId| known[id];
@@ -91,7 +91,7 @@ fn operands_first(graph: &Graph, root: ExprId) -> Vec<ExprId> {
 }
 
 /// Whether an angle itself, not its sine or cosine, is a term of a sum.
-fn couples_angles(graph: &Graph, mechanism: &Mechanism, root: ExprId) -> bool {
+fn has_angle_term(graph: &Graph, mechanism: &Mechanism, root: ExprId) -> bool {
     let is_angle = |id: ExprId| {
         matches!(graph.node(id), Node::Atom(Atom::Coordinate(i))
             if mechanism.coordinates[*i].motion.is_angle())
@@ -104,14 +104,14 @@ fn couples_angles(graph: &Graph, mechanism: &Mechanism, root: ExprId) -> bool {
 
 /// The size of a mechanism's loops: the magnitudes of all lengths in them, without those that move.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Size {
+pub(crate) struct LoopSize {
     /// A sum of magnitudes of constants, in m; 0 where there is none.
     pub(crate) total: ExprId,
     /// Its value for the mechanism's constants.
     pub(crate) nominal: f64,
 }
 
-impl Size {
+impl LoopSize {
     pub(crate) fn from_residual(
         graph: &mut Graph,
         mechanism: &Mechanism,
@@ -120,9 +120,9 @@ impl Size {
         let mut known = HashMap::new();
         let terms: Vec<ExprId> = residual
             .iter()
-            .map(|r| magnitude(graph, mechanism, &mut known, *r))
+            .map(|r| expression_magnitude(graph, mechanism, &mut known, *r))
             .collect();
-        let still = lengths(graph, mechanism, |_, _| Graph::ZERO);
+        let still = nominal_lengths(graph, mechanism, |_, _| Graph::ZERO);
         let mut terms = graph.substitute(&terms, &still);
         // What couples coordinates has no size of its own.
         terms.retain(|term| graph.atoms(&[*term]).into_iter().all(Atom::is_fixed));
@@ -138,26 +138,26 @@ impl Size {
     }
 
     /// How large these loops are beside those of the mechanism's constants; 1 for those.
-    pub(crate) fn scale(&self, graph: &mut Graph) -> ExprId {
-        self.scaled(graph, 1.0)
+    pub(crate) fn relative_scale(&self, graph: &mut Graph) -> ExprId {
+        self.scale_length(graph, 1.0)
     }
 
     /// A length of the mechanism, longer by as much as the loops are larger.
-    fn scaled(&self, graph: &mut Graph, length: f64) -> ExprId {
+    fn scale_length(&self, graph: &mut Graph, length: f64) -> ExprId {
         if self.nominal == 0.0 {
-            return number(graph, length);
+            return rounded_number(graph, length);
         }
-        let share = number(graph, length / self.nominal);
+        let share = rounded_number(graph, length / self.nominal);
         graph.mul(share, self.total)
     }
 
     /// The sum of the magnitudes of all terms of an expression that depends on the pose: for any lengths, with sines and
     /// cosines of 1 and slides as far out as at the nominal pose. Fractions have the values of the nominal pose, and grow
     /// with the loops.
-    pub(crate) fn of_terms(&self, graph: &mut Graph, mechanism: &Mechanism, id: ExprId) -> ExprId {
-        let found = magnitude(graph, mechanism, &mut HashMap::new(), id);
-        let out = lengths(graph, mechanism, |graph, nominal| {
-            self.scaled(graph, nominal)
+    pub(crate) fn term_magnitude(&self, graph: &mut Graph, mechanism: &Mechanism, id: ExprId) -> ExprId {
+        let found = expression_magnitude(graph, mechanism, &mut HashMap::new(), id);
+        let out = nominal_lengths(graph, mechanism, |graph, nominal| {
+            self.scale_length(graph, nominal)
         });
         let at_any_pose = graph.substitute(&[found], &out)[0];
         let is_known = graph.atoms(&[at_any_pose]).into_iter().all(Atom::is_fixed);
@@ -165,18 +165,18 @@ impl Size {
         if is_known && is_there {
             return at_any_pose;
         }
-        let nominal = at_nominal(graph, mechanism, &[id]);
-        let nominal = number(graph, nominal);
+        let nominal = nominal_magnitude(graph, mechanism, &[id]);
+        let nominal = rounded_number(graph, nominal);
         // Its own lengths say how large it is: drives between points have some without a loop.
         let lengths: Vec<Atom> = graph.atoms(&[found]).into_iter().collect();
         let is_metre =
             |atom: &Atom| matches!(atom, Atom::Constant(i) if mechanism.constants[*i].unit == "m");
         let lengths: Vec<Atom> = lengths.into_iter().filter(is_metre).collect();
-        let degree = degree(graph, mechanism, found, &lengths);
-        let own = Self::sum(graph, mechanism, &lengths).unwrap_or(*self);
+        let degree = length_degree(graph, mechanism, found, &lengths);
+        let own = Self::from_constants(graph, mechanism, &lengths).unwrap_or(*self);
         match degree {
             Some(degree) => {
-                let scale = own.scale(graph);
+                let scale = own.relative_scale(graph);
                 let grown = graph.pow(scale, degree);
                 graph.mul(nominal, grown)
             }
@@ -187,7 +187,7 @@ impl Size {
     /// What a determinant is held against: the sum of the magnitudes of its terms, as [`Size::of_terms`] has it. Where the
     /// nominal pose itself would all but count as singular by that, since the terms cancel in every factor and at every pose,
     /// it is what rounding says that counts, which grows with the loops. What is below `singular` of its size counts as zero.
-    pub(crate) fn of_determinant(
+    pub(crate) fn determinant_magnitude(
         &self,
         graph: &mut Graph,
         mechanism: &Mechanism,
@@ -196,7 +196,7 @@ impl Size {
     ) -> ExprId {
         /// Determinants become smaller by this from pose to pose before they are singular.
         const ROOM: f64 = 1e3;
-        let terms = self.of_terms(graph, mechanism, id);
+        let terms = self.term_magnitude(graph, mechanism, id);
         let at_nominal = |graph: &Graph, id| nominal_value(graph, mechanism, id).map(f64::abs);
         let (Some(value), Some(size)) = (at_nominal(graph, id), at_nominal(graph, terms)) else {
             return terms;
@@ -204,9 +204,9 @@ impl Size {
         if value > ROOM * singular * size {
             return terms;
         }
-        match digits_left(graph, mechanism, id) {
+        match significant_digits(graph, mechanism, id) {
             Some(left) if left > value / size => {
-                let share = number(graph, value / left / size);
+                let share = rounded_number(graph, value / left / size);
                 graph.mul(share, terms)
             }
             _ => terms,
@@ -214,7 +214,7 @@ impl Size {
     }
 
     /// The size that some constants make up, if they do.
-    fn sum(graph: &mut Graph, mechanism: &Mechanism, constants: &[Atom]) -> Option<Self> {
+    fn from_constants(graph: &mut Graph, mechanism: &Mechanism, constants: &[Atom]) -> Option<Self> {
         let terms: Vec<ExprId> = constants
             .iter()
             .map(|constant| {
@@ -230,7 +230,7 @@ impl Size {
 
 /// The power of the unit of length with which an expression grows, if it does so with one: `lengths` are those of its
 /// constants that are in it, besides the coordinates that slide.
-fn degree(graph: &Graph, mechanism: &Mechanism, id: ExprId, lengths: &[Atom]) -> Option<i32> {
+fn length_degree(graph: &Graph, mechanism: &Mechanism, id: ExprId, lengths: &[Atom]) -> Option<i32> {
     let value = |unit: f64| {
         let atom = |atom: Atom| {
             let moves = matches!(atom, Atom::Coordinate(i)
@@ -238,7 +238,7 @@ fn degree(graph: &Graph, mechanism: &Mechanism, id: ExprId, lengths: &[Atom]) ->
             let is_length = moves || lengths.contains(&atom);
             nominal_of(mechanism, atom) * if is_length { unit } else { 1.0 }
         };
-        let values = Tape::new(graph, &[id]).evaluate(&F64(atom))?;
+        let values = EvaluationTape::new(graph, &[id]).evaluate(&FloatDomain(atom))?;
         Some(values[0].abs().log2()).filter(|size| size.is_finite())
     };
     let [one, two, four] = [value(1.0)?, value(2.0)?, value(4.0)?];
@@ -251,7 +251,7 @@ fn degree(graph: &Graph, mechanism: &Mechanism, id: ExprId, lengths: &[Atom]) ->
 }
 
 /// What stands for each coordinate that is a length, by its nominal value in m.
-fn lengths(
+fn nominal_lengths(
     graph: &mut Graph,
     mechanism: &Mechanism,
     of: impl Fn(&mut Graph, f64) -> ExprId,
@@ -264,13 +264,13 @@ fn lengths(
 }
 
 /// A number that is exact to rounding.
-fn number(graph: &mut Graph, value: f64) -> ExprId {
+fn rounded_number(graph: &mut Graph, value: f64) -> ExprId {
     let value = BigRational::from_float(value).unwrap_or_else(BigRational::one);
     graph.rational(value.into())
 }
 
 /// An expression with every term taken by its magnitude.
-pub(crate) fn magnitude(
+pub(crate) fn expression_magnitude(
     graph: &mut Graph,
     mechanism: &Mechanism,
     known: &mut HashMap<ExprId, ExprId>,
@@ -289,15 +289,15 @@ pub(crate) fn magnitude(
             Graph::ONE
         }
         Node::Atom(_) | Node::Unary(Unary::Exp, _) => graph.unary(Unary::Abs, id),
-        Node::Unary(Unary::Abs, inner) => magnitude(graph, mechanism, known, inner),
+        Node::Unary(Unary::Abs, inner) => expression_magnitude(graph, mechanism, known, inner),
         Node::Unary(Unary::Sqrt, inner) => {
-            let inner = magnitude(graph, mechanism, known, inner);
+            let inner = expression_magnitude(graph, mechanism, known, inner);
             graph.unary(Unary::Sqrt, inner)
         }
         Node::Sum(terms) => {
             let terms: Vec<_> = terms
                 .into_iter()
-                .map(|(term, factor)| (magnitude(graph, mechanism, known, term), factor.abs()))
+                .map(|(term, factor)| (expression_magnitude(graph, mechanism, known, term), factor.abs()))
                 .collect();
             graph.sum(&terms)
         }
@@ -306,7 +306,7 @@ pub(crate) fn magnitude(
                 .into_iter()
                 .map(|(base, n)| {
                     let base = if n > 0 {
-                        magnitude(graph, mechanism, known, base)
+                        expression_magnitude(graph, mechanism, known, base)
                     } else {
                         graph.unary(Unary::Abs, base)
                     };

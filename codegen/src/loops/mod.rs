@@ -21,4 +21,4 @@ pub(crate) mod stretch;
 pub(crate) mod walk;
 mod whole_root;
 
-pub(crate) use all::Loops;
+pub(crate) use all::KinematicLoops;

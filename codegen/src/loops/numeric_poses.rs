@@ -1,10 +1,10 @@
 //! Poses in floating point: loops closed by Newton's method from the nominal pose.
 
-use modelmill_algebra::field::Stream;
+use modelmill_algebra::field::RandomStream;
 use modelmill_spec::Mechanism;
 use nalgebra::{DMatrix, DVector};
 
-use crate::expr::{Atom, ExprId, F64, Graph, Tape};
+use crate::expr::{Atom, ExprId, FloatDomain, Graph, EvaluationTape};
 use crate::loops::magnitude;
 
 /// Residuals of loops with their derivatives by the coordinates that close them.
@@ -17,7 +17,7 @@ pub(crate) struct NumericLoops<'a> {
     n_residuals: usize,
     /// What one is for each unknown: 1 rad, or the size of the loops in m.
     scales: Vec<f64>,
-    tape: Tape,
+    tape: EvaluationTape,
 }
 
 impl<'a> NumericLoops<'a> {
@@ -25,18 +25,18 @@ impl<'a> NumericLoops<'a> {
     pub(crate) fn new(graph: &mut Graph, mechanism: &'a Mechanism, residual: &[ExprId]) -> Self {
         let (unknown, moved): (Vec<usize>, Vec<usize>) =
             (0..mechanism.coordinates.len()).partition(|i| mechanism.coordinates[*i].passive);
-        Self::solved_for(graph, mechanism, residual, unknown, &moved)
+        Self::for_unknowns(graph, mechanism, residual, unknown, &moved)
     }
 
     /// Some loops, solved for `unknown` while the coordinates `moved` are given.
-    pub(crate) fn solved_for(
+    pub(crate) fn for_unknowns(
         graph: &mut Graph,
         mechanism: &'a Mechanism,
         residual: &[ExprId],
         unknown: Vec<usize>,
         moved: &[usize],
     ) -> Self {
-        let size = magnitude::at_nominal(graph, mechanism, residual);
+        let size = magnitude::nominal_magnitude(graph, mechanism, residual);
         let one = |i: usize| {
             if mechanism.coordinates[i].motion.is_angle() {
                 1.0
@@ -54,25 +54,25 @@ impl<'a> NumericLoops<'a> {
             unknown,
             moved: moved.iter().map(|i| (*i, one(*i))).collect(),
             n_residuals: residual.len(),
-            tape: Tape::new(graph, &roots),
+            tape: EvaluationTape::new(graph, &roots),
         }
     }
 
     /// Coordinates of the nominal pose with the loops closed to rounding.
-    pub(crate) fn nominal(&self) -> Option<Vec<f64>> {
-        let mut q = self.as_written();
-        self.close(&mut q)?;
+    pub(crate) fn closed_nominal_pose(&self) -> Option<Vec<f64>> {
+        let mut q = self.declared_nominal_pose();
+        self.close_loops(&mut q)?;
         Some(q)
     }
 
     /// Coordinates of the nominal pose as the model file has them, loops closed by its reader.
-    pub(crate) fn as_written(&self) -> Vec<f64> {
+    pub(crate) fn declared_nominal_pose(&self) -> Vec<f64> {
         let coordinates = self.mechanism.coordinates.iter();
         coordinates.map(|c| c.nominal).collect()
     }
 
     /// What counts as one for each coordinate: 1 rad, the size of the loops in m, or 1 m where no loop sets a size.
-    pub(crate) fn unit(&self, coordinate: usize) -> f64 {
+    pub(crate) fn coordinate_unit(&self, coordinate: usize) -> f64 {
         let moved = self.moved.iter().copied();
         let unknown = self
             .unknown
@@ -87,19 +87,19 @@ impl<'a> NumericLoops<'a> {
 
     /// A pose whose moved coordinates lie within `reach` (angles in rad, lengths relative to the size of the loops) of
     /// the nominal one, followed from there; `None` if the loops cannot be followed so far.
-    pub(crate) fn random(&self, reach: f64, stream: &mut Stream) -> Option<Vec<f64>> {
+    pub(crate) fn random_pose(&self, reach: f64, stream: &mut RandomStream) -> Option<Vec<f64>> {
         const STEPS: u32 = 8;
-        let mut q = self.as_written();
+        let mut q = self.declared_nominal_pose();
         let moves: Vec<(usize, f64)> = self
             .moved
             .iter()
-            .map(|(i, one)| (*i, one * reach * symmetric(stream) / f64::from(STEPS)))
+            .map(|(i, one)| (*i, one * reach * uniform_symmetric(stream) / f64::from(STEPS)))
             .collect();
         for _ in 0..STEPS {
             for (i, dx) in &moves {
                 q[*i] += dx;
             }
-            self.close(&mut q)?;
+            self.close_loops(&mut q)?;
         }
         Some(q)
     }
@@ -112,7 +112,7 @@ impl<'a> NumericLoops<'a> {
             Atom::Pi => std::f64::consts::PI,
             _ => 0.0,
         };
-        let values = self.tape.evaluate(&F64(value))?;
+        let values = self.tape.evaluate(&FloatDomain(value))?;
         // A singular value decomposition of what are no numbers comes to no end.
         if !values.iter().all(|x| x.is_finite()) {
             return None;
@@ -138,7 +138,7 @@ impl<'a> NumericLoops<'a> {
     }
 
     /// Closes the loops by moving the unknown coordinates.
-    fn close(&self, q: &mut [f64]) -> Option<()> {
+    fn close_loops(&self, q: &mut [f64]) -> Option<()> {
         if self.unknown.is_empty() {
             return Some(());
         }
@@ -162,6 +162,6 @@ impl<'a> NumericLoops<'a> {
 }
 
 /// A number between -1 and 1.
-pub(crate) fn symmetric(stream: &mut Stream) -> f64 {
-    2.0 * (stream.bits() as f64 / u64::MAX as f64) - 1.0
+pub(crate) fn uniform_symmetric(stream: &mut RandomStream) -> f64 {
+    2.0 * (stream.next_bits() as f64 / u64::MAX as f64) - 1.0
 }

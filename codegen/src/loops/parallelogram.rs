@@ -6,34 +6,34 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use modelmill_algebra::field::{Element, MODULUS, Stream};
+use modelmill_algebra::field::{FieldElement, MODULUS, RandomStream};
 use modelmill_spec::Mechanism;
 use nalgebra::{DMatrix, DVector};
 
 use crate::expr::{
-    AngleSum, Atom, ExprId, F64, FieldPoint, Graph, Node, Tape, coordinates_of, nominal_of,
+    AtomAngleSum, Atom, ExprId, FloatDomain, FieldPoint, Graph, Node, EvaluationTape, coordinates_of, nominal_of,
 };
-use crate::loops::all::Loops;
-use crate::loops::closure::Closure;
-use crate::loops::field_poses::FieldPoses;
+use crate::loops::all::KinematicLoops;
+use crate::loops::closure::LoopClosure;
+use crate::loops::field_poses::FieldPoseSampler;
 use crate::loops::magnitude;
-use crate::loops::numeric_poses::{NumericLoops, symmetric};
-use crate::loops::plan::{Unknowns, plan};
+use crate::loops::numeric_poses::{NumericLoops, uniform_symmetric};
+use crate::loops::plan::{SolvableCoordinates, plan};
 use crate::loops::relation::AngleRelation;
 
 /// How far known coordinates are moved from the nominal pose, in rad or relative to the size of the loop, and how exact
 /// a relation must look.
-const MOVE: f64 = 0.05;
+const PERTURBATION: f64 = 0.05;
 const TOLERANCE: f64 = 1e-8;
 
 /// Finds loops that are solved by relations and writes these into them.
 ///
 /// Loops are looked at one after the other, as soon as all but as many of their coordinates are known as they have
 /// equations: a loop may be driven by another one.
-pub(crate) fn find(
+pub(crate) fn find_relations(
     graph: &mut Graph,
     mechanism: &Mechanism,
-    closures: &mut [Closure],
+    closures: &mut [LoopClosure],
     divided: &[(usize, i64)],
 ) {
     let mut known: BTreeSet<usize> = (0..mechanism.coordinates.len())
@@ -42,7 +42,7 @@ pub(crate) fn find(
     let mut related: Vec<AngleRelation> = Vec::new();
     let mut solved: Vec<usize> = Vec::new();
     let mut todo: Vec<usize> = (0..closures.len()).collect();
-    let unknown_of = |closure: &Closure, known: &BTreeSet<usize>| -> Vec<usize> {
+    let unknown_of = |closure: &LoopClosure, known: &BTreeSet<usize>| -> Vec<usize> {
         let coordinates = closure.coordinates.iter().copied();
         coordinates.filter(|c| !known.contains(c)).collect()
     };
@@ -57,12 +57,12 @@ pub(crate) fn find(
             .filter(|c| related.iter().all(|r| r.coordinate != *c))
             .collect();
         known.extend(&unknown);
-        if closure.given().is_empty() {
+        if closure.explicit_coordinates().is_empty() {
             // What is known of other loops' angles may be what makes this one a parallelogram.
-            let residual = put_in(graph, &related, &closure.residual);
+            let residual = substitute_relations(graph, &related, &closure.residual);
             let relations = relations_of(graph, mechanism, &residual, &unknown).or_else(|| {
                 let before = solved.iter().map(|i| &closures[*i]);
-                let motion = Motion::new(mechanism, before, divided)?;
+                let motion = PriorLoops::new(mechanism, before, divided)?;
                 relations_along(graph, mechanism, &motion, &turning, &residual, &unknown)
             });
             if let Some(relations) = relations {
@@ -79,16 +79,16 @@ pub(crate) fn find(
 }
 
 /// Loops that were solved before, by whose motion others may turn.
-struct Motion(Loops);
+struct PriorLoops(KinematicLoops);
 
-impl Motion {
+impl PriorLoops {
     /// `None` if there are no loops.
     fn new<'a>(
         mechanism: &Mechanism,
-        solved: impl Iterator<Item = &'a Closure>,
+        solved: impl Iterator<Item = &'a LoopClosure>,
         divided: &[(usize, i64)],
     ) -> Option<Self> {
-        let closures: Vec<Closure> = solved
+        let closures: Vec<LoopClosure> = solved
             .cloned()
             .map(|mut closure| {
                 closure.n_independent = closure.residual.len();
@@ -101,7 +101,7 @@ impl Motion {
         (!closures.is_empty()).then(|| {
             let (passive, active) =
                 (0..mechanism.coordinates.len()).partition(|c| settled.contains(c));
-            Self(Loops {
+            Self(KinematicLoops {
                 active,
                 passive,
                 residual: closures.iter().flat_map(|c| c.residual.clone()).collect(),
@@ -112,25 +112,25 @@ impl Motion {
     }
 
     /// Whether expressions vanish wherever these loops close: shown at random points of the field.
-    fn makes_vanish(&self, graph: &mut Graph, mechanism: &Mechanism, closed: &[ExprId]) -> bool {
+    fn is_zero_where_closed(&self, graph: &mut Graph, mechanism: &Mechanism, closed: &[ExprId]) -> bool {
         /// Points, and how many draws may fail to be one.
         const POINTS: usize = 8;
         const DRAWS: usize = 400;
-        let Some(plan) = plan(graph, mechanism, &self.0, Unknowns::Any) else {
+        let Some(plan) = plan(graph, mechanism, &self.0, SolvableCoordinates::Any) else {
             return false;
         };
-        let poses = FieldPoses::new(graph, mechanism, plan, closed);
-        let tape = Tape::new(graph, closed);
-        let mut stream = Stream::new(4);
-        let Ok(constants) = poses.constants::<MODULUS>(&mut stream) else {
+        let poses = FieldPoseSampler::new(graph, mechanism, plan, closed);
+        let tape = EvaluationTape::new(graph, closed);
+        let mut stream = RandomStream::new(4);
+        let Ok(constants) = poses.draw_constants::<MODULUS>(&mut stream) else {
             return false;
         };
         let points = (0..DRAWS).filter_map(|_| {
-            let open: FieldPoint<Element> = poses.open(&constants, &mut stream);
-            tape.evaluate(&poses.close(open)?)
+            let open: FieldPoint<FieldElement> = poses.draw_open_point(&constants, &mut stream);
+            tape.evaluate(&poses.close_loops(open)?)
         });
         let seen: Vec<_> = points.take(POINTS).collect();
-        seen.len() == POINTS && seen.iter().flatten().all(|left| *left == Element::ZERO)
+        seen.len() == POINTS && seen.iter().flatten().all(|left| *left == FieldElement::ZERO)
     }
 }
 
@@ -140,7 +140,7 @@ impl Motion {
 fn relations_along(
     graph: &mut Graph,
     mechanism: &Mechanism,
-    motion: &Motion,
+    motion: &PriorLoops,
     turning: &[usize],
     residual: &[ExprId],
     unknown: &[usize],
@@ -150,18 +150,18 @@ fn relations_along(
     let given: Vec<usize> = (0..mechanism.coordinates.len())
         .filter(|c| !following.contains(c))
         .collect();
-    let poses = poses(graph, mechanism, &all, &following, &given)?;
+    let poses = nearby_poses(graph, mechanism, &all, &following, &given)?;
     let fixed = fixed_angles(graph, residual);
     let candidates: Vec<Vec<AngleRelation>> = unknown
         .iter()
-        .map(|p| relations(mechanism, &poses, turning, &fixed, *p))
+        .map(|p| angle_relations(mechanism, &poses, turning, &fixed, *p))
         .collect();
-    let size = magnitude::at_nominal(graph, mechanism, residual);
+    let size = magnitude::nominal_magnitude(graph, mechanism, residual);
     combinations(&candidates).find(|relations| {
-        let closed = put_in(graph, relations, residual);
-        let tape = Tape::new(graph, &closed);
-        poses.iter().all(|q| closes_at(mechanism, &tape, q, size))
-            && (mechanism.is_at_values || motion.makes_vanish(graph, mechanism, &closed))
+        let closed = substitute_relations(graph, relations, residual);
+        let tape = EvaluationTape::new(graph, &closed);
+        poses.iter().all(|q| is_loop_closed_at(mechanism, &tape, q, size))
+            && (mechanism.is_at_values || motion.is_zero_where_closed(graph, mechanism, &closed))
     })
 }
 
@@ -176,17 +176,17 @@ fn relations_of(
         .into_iter()
         .filter(|c| !unknown.contains(c))
         .collect();
-    let poses = poses(graph, mechanism, residual, unknown, &given)?;
+    let poses = nearby_poses(graph, mechanism, residual, unknown, &given)?;
     let fixed = fixed_angles(graph, residual);
     let candidates: Vec<Vec<AngleRelation>> = unknown
         .iter()
-        .map(|p| relations(mechanism, &poses, &given, &fixed, *p))
+        .map(|p| angle_relations(mechanism, &poses, &given, &fixed, *p))
         .collect();
-    combinations(&candidates).find(|relations| closes(graph, mechanism, residual, relations))
+    combinations(&candidates).find(|relations| is_loop_closed(graph, mechanism, residual, relations))
 }
 
 /// Coordinates at the nominal pose and at some poses around it; `None` if the loop cannot be followed there.
-fn poses(
+fn nearby_poses(
     graph: &mut Graph,
     mechanism: &Mechanism,
     residual: &[ExprId],
@@ -195,15 +195,15 @@ fn poses(
 ) -> Option<Vec<Vec<f64>>> {
     /// How often the reach is halved where loops cannot be followed, as near the end of a slide.
     const HALVINGS: u32 = 6;
-    let loops = NumericLoops::solved_for(graph, mechanism, residual, unknown.to_vec(), given);
+    let loops = NumericLoops::for_unknowns(graph, mechanism, residual, unknown.to_vec(), given);
     // A loop that leaves some of them free keeps to relations of many kinds.
-    let nominal = loops.nominal().filter(|q| loops.is_regular(q))?;
+    let nominal = loops.closed_nominal_pose().filter(|q| loops.is_regular(q))?;
     (0..=HALVINGS).find_map(|k| {
-        let reach = MOVE / f64::from(1_u32 << k);
-        let mut stream = Stream::new(1);
+        let reach = PERTURBATION / f64::from(1_u32 << k);
+        let mut stream = RandomStream::new(1);
         let mut found = vec![nominal.clone()];
         for _ in 0..given.len() + unknown.len() + 4 {
-            found.push(loops.random(reach, &mut stream)?);
+            found.push(loops.random_pose(reach, &mut stream)?);
         }
         Some(found)
     })
@@ -244,14 +244,14 @@ fn combinations(candidates: &[Vec<AngleRelation>]) -> impl Iterator<Item = Vec<A
 
 /// Relations that an unknown angle keeps to at all poses: with the known angles of its loop, and in its fixed part with
 /// multiples of constant angles. The simplest come first.
-fn relations(
+fn angle_relations(
     mechanism: &Mechanism,
     poses: &[Vec<f64>],
     given: &[usize],
     fixed: &[usize],
     p: usize,
 ) -> Vec<AngleRelation> {
-    let Some((turning, offset)) = turning(mechanism, poses, given, p) else {
+    let Some((turning, offset)) = co_rotating_angles(mechanism, poses, given, p) else {
         return Vec::new();
     };
     multiples(fixed.len())
@@ -267,7 +267,7 @@ fn relations(
             #[expect(clippy::cast_possible_truncation, reason = "small and rounded")]
             let pi12 = twelfths.round() as i32;
             let constants = fixed.iter().zip(&factors);
-            let constants = AngleSum::new(constants.map(|(c, n)| (Atom::Constant(*c), *n)));
+            let constants = AtomAngleSum::new(constants.map(|(c, n)| (Atom::Constant(*c), *n)));
             Some(AngleRelation {
                 coordinate: p,
                 sum: turning.plus(&constants, 1),
@@ -300,12 +300,12 @@ fn multiples(n: usize) -> Vec<Vec<i32>> {
 }
 
 /// The known angles with which an unknown one turns, and what it is beside them.
-fn turning(
+fn co_rotating_angles(
     mechanism: &Mechanism,
     poses: &[Vec<f64>],
     given: &[usize],
     p: usize,
-) -> Option<(AngleSum, f64)> {
+) -> Option<(AtomAngleSum, f64)> {
     let others: Vec<usize> = given
         .iter()
         .copied()
@@ -340,67 +340,67 @@ fn turning(
         .iter()
         .zip(rounded.iter())
         .map(|(c, n)| (Atom::Coordinate(*c), *n as i32));
-    Some((AngleSum::new(terms), offset))
+    Some((AtomAngleSum::new(terms), offset))
 }
 
 /// Whether the relations close the loop at every pose: shown at random points of the field; or, of a mechanism for its file's
 /// values alone, in numbers, since there lengths are what is left of those that were meant.
-fn closes(
+fn is_loop_closed(
     graph: &mut Graph,
     mechanism: &Mechanism,
     residual: &[ExprId],
     relations: &[AngleRelation],
 ) -> bool {
-    let closed = put_in(graph, relations, residual);
-    let tape = Tape::new(graph, &closed);
+    let closed = substitute_relations(graph, relations, residual);
+    let tape = EvaluationTape::new(graph, &closed);
     let atoms = graph.atoms(&closed);
-    let mut stream = Stream::new(2);
+    let mut stream = RandomStream::new(2);
     let closes_exactly = (0..8).all(|_| {
-        let mut point = FieldPoint::<Element>::default();
+        let mut point = FieldPoint::<FieldElement>::default();
         for atom in &atoms {
-            point.values.insert(*atom, stream.element());
-            point.angles.insert(*atom, stream.circle());
+            point.values.insert(*atom, stream.next_element());
+            point.angles.insert(*atom, stream.next_circle_point());
         }
         tape.evaluate(&point)
-            .is_some_and(|values| values.iter().all(|v| *v == Element::ZERO))
+            .is_some_and(|values| values.iter().all(|v| *v == FieldElement::ZERO))
     });
-    closes_exactly || mechanism.is_at_values && closes_in_numbers(graph, mechanism, residual, &tape)
+    closes_exactly || mechanism.is_at_values && is_loop_closed_numerically(graph, mechanism, residual, &tape)
 }
 
 /// Whether nothing but the last digits of the file's lengths is left of a loop, at any angles.
-fn closes_in_numbers(
+fn is_loop_closed_numerically(
     graph: &mut Graph,
     mechanism: &Mechanism,
     residual: &[ExprId],
-    closed: &Tape,
+    closed: &EvaluationTape,
 ) -> bool {
-    let size = magnitude::at_nominal(graph, mechanism, residual);
-    let mut stream = Stream::new(3);
+    let size = magnitude::nominal_magnitude(graph, mechanism, residual);
+    let mut stream = RandomStream::new(3);
     (0..8).all(|_| {
         let moved: Vec<f64> = (mechanism.coordinates.iter())
             .map(|c| {
                 let far = if c.motion.is_angle() { 3.0 } else { size };
-                c.nominal + far * symmetric(&mut stream)
+                c.nominal + far * uniform_symmetric(&mut stream)
             })
             .collect();
-        closes_at(mechanism, closed, &moved, size)
+        is_loop_closed_at(mechanism, closed, &moved, size)
     })
 }
 
 /// Whether nothing but the last digits of the file's lengths is left of a loop at a pose.
-fn closes_at(mechanism: &Mechanism, closed: &Tape, pose: &[f64], size: f64) -> bool {
+fn is_loop_closed_at(mechanism: &Mechanism, closed: &EvaluationTape, pose: &[f64], size: f64) -> bool {
     /// Relative to the size of the loop: what the arithmetic of other programs leaves in lengths that they write.
     const LAST_DIGITS: f64 = 1e-11;
     let value = |atom: Atom| match atom {
         Atom::Coordinate(i) => pose[i],
         fixed => nominal_of(mechanism, fixed),
     };
-    let left = closed.evaluate(&F64(value));
+    let left = closed.evaluate(&FloatDomain(value));
     left.is_some_and(|left| left.iter().all(|x| x.abs() <= LAST_DIGITS * size))
 }
 
 /// Replaces the related angles in sines and cosines.
-fn put_in(graph: &mut Graph, relations: &[AngleRelation], roots: &[ExprId]) -> Vec<ExprId> {
+fn substitute_relations(graph: &mut Graph, relations: &[AngleRelation], roots: &[ExprId]) -> Vec<ExprId> {
     let nodes: Vec<Node> = graph
         .nodes_of(roots)
         .filter(|n| matches!(n, Node::Sin(_) | Node::Cos(_)))
@@ -411,7 +411,7 @@ fn put_in(graph: &mut Graph, relations: &[AngleRelation], roots: &[ExprId]) -> V
         let (Node::Sin(angle) | Node::Cos(angle)) = &node else {
             continue;
         };
-        let (mut sum, mut pi12) = (AngleSum::NONE, 0);
+        let (mut sum, mut pi12) = (AtomAngleSum::NONE, 0);
         for (atom, n) in angle.terms() {
             match relations
                 .iter()
@@ -421,7 +421,7 @@ fn put_in(graph: &mut Graph, relations: &[AngleRelation], roots: &[ExprId]) -> V
                     sum = sum.plus(&relation.sum, *n);
                     pi12 += relation.pi12 * n;
                 }
-                None => sum = sum.plus(&AngleSum::new([(*atom, *n)]), 1),
+                None => sum = sum.plus(&AtomAngleSum::new([(*atom, *n)]), 1),
             }
         }
         let (cosine, sine) = graph.cos_sin(angle, 0);

@@ -4,18 +4,18 @@ use std::collections::BTreeSet;
 
 use modelmill_spec::Mechanism;
 
-use super::all::Loops;
-use super::solve_step::{Plan, PlanStep};
-use super::solved::Solved;
-use crate::expr::{AngleSum, Atom, ExprId, Graph, nominal_value};
+use super::all::KinematicLoops;
+use super::solve_step::{LoopPlan, PlanStep};
+use super::solved::ClosureSolution;
+use crate::expr::{AtomAngleSum, Atom, ExprId, Graph, nominal_value};
 use crate::loops::choose;
-use crate::loops::closure::Closure;
+use crate::loops::closure::LoopClosure;
 use crate::loops::planar;
 use crate::loops::spatial;
 
 /// Which coordinates a plan may solve for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Unknowns {
+pub(crate) enum SolvableCoordinates {
     /// The passive ones, with the active ones given: what a controller needs.
     Passive,
     /// Any, with the others drawn at random: what sampling needs.
@@ -31,9 +31,9 @@ pub(crate) enum Unknowns {
 pub(crate) fn plan(
     graph: &mut Graph,
     mechanism: &Mechanism,
-    loops: &Loops,
-    unknowns: Unknowns,
-) -> Option<Plan> {
+    loops: &KinematicLoops,
+    unknowns: SolvableCoordinates,
+) -> Option<LoopPlan> {
     let mut steps: Vec<PlanStep> = Vec::new();
     let mut todo: Vec<usize> = (0..loops.closures.len())
         .filter(|i| loops.closures[*i].n_independent > 0)
@@ -47,20 +47,20 @@ pub(crate) fn plan(
                 .iter()
                 .copied()
                 .filter(|c| match unknowns {
-                    Unknowns::Passive => !known.contains(c),
-                    Unknowns::Any => !todo.iter().any(|other| {
+                    SolvableCoordinates::Passive => !known.contains(c),
+                    SolvableCoordinates::Any => !todo.iter().any(|other| {
                         other != index && loops.closures[*other].coordinates.contains(c)
                     }),
                 })
                 .collect();
-            choices(graph, mechanism, closure, &free, loops, unknowns)
+            coordinate_choices(graph, mechanism, closure, &free, loops, unknowns)
                 .into_iter()
-                .find_map(|unknown| solve(graph, mechanism, closure, unknown, unknowns))
+                .find_map(|unknown| solve_loop(graph, mechanism, closure, unknown, unknowns))
                 .map(|found| (position, found))
         });
         let Some((position, mut found)) = next else {
-            let mut found = together(graph, mechanism, loops, unknowns, &todo, &known)?;
-            if unknowns == Unknowns::Any {
+            let mut found = solve_jointly(graph, mechanism, loops, unknowns, &todo, &known)?;
+            if unknowns == SolvableCoordinates::Any {
                 found.reverse();
             }
             steps.extend(found);
@@ -68,19 +68,19 @@ pub(crate) fn plan(
         };
         let index = todo.remove(position);
         known.extend(&loops.closures[index].coordinates);
-        if unknowns == Unknowns::Any {
+        if unknowns == SolvableCoordinates::Any {
             found.reverse();
         }
         steps.extend(found);
     }
-    if unknowns == Unknowns::Any {
+    if unknowns == SolvableCoordinates::Any {
         steps.reverse();
     }
     let divided = match unknowns {
-        Unknowns::Passive => Vec::new(),
-        Unknowns::Any => loops.divided.clone(),
+        SolvableCoordinates::Passive => Vec::new(),
+        SolvableCoordinates::Any => loops.divided.clone(),
     };
-    Some(Plan { steps, divided })
+    Some(LoopPlan { steps, divided })
 }
 
 /// Of more sets than this of a loop's coordinates not all are tried: each attempt derives expressions.
@@ -88,19 +88,19 @@ const MOST_SETS: usize = 1000;
 
 /// Sets of coordinates for which a loop may be solved; passive ones first. Of very many only those that look solvable, in
 /// their own order.
-fn choices(
+fn coordinate_choices(
     graph: &mut Graph,
     mechanism: &Mechanism,
-    closure: &Closure,
+    closure: &LoopClosure,
     free: &[usize],
-    loops: &Loops,
-    unknowns: Unknowns,
+    loops: &KinematicLoops,
+    unknowns: SolvableCoordinates,
 ) -> Vec<Vec<usize>> {
-    let related = closure.given();
+    let related = closure.explicit_coordinates();
     if !related.is_empty() {
         let all = match unknowns {
-            Unknowns::Passive => free.iter().all(|c| related.contains(c)),
-            Unknowns::Any => related.iter().all(|c| free.contains(c)),
+            SolvableCoordinates::Passive => free.iter().all(|c| related.contains(c)),
+            SolvableCoordinates::Any => related.iter().all(|c| free.contains(c)),
         };
         return if all { vec![related] } else { Vec::new() };
     }
@@ -109,7 +109,7 @@ fn choices(
     } else {
         closure.n_independent
     };
-    if unknowns == Unknowns::Passive {
+    if unknowns == SolvableCoordinates::Passive {
         return if free.len() == size {
             vec![free.to_vec()]
         } else {
@@ -117,7 +117,7 @@ fn choices(
         };
     }
     if closure.chain.is_none() && n_subsets(free.len(), size) > MOST_SETS {
-        return choose::promising(
+        return choose::promising_sets(
             graph,
             mechanism,
             &closure.equations,
@@ -132,18 +132,18 @@ fn choices(
 }
 
 /// Solves several loops together.
-fn together(
+fn solve_jointly(
     graph: &mut Graph,
     mechanism: &Mechanism,
-    loops: &Loops,
-    unknowns: Unknowns,
+    loops: &KinematicLoops,
+    unknowns: SolvableCoordinates,
     todo: &[usize],
     known: &BTreeSet<usize>,
 ) -> Option<Vec<PlanStep>> {
-    let closures: Vec<&Closure> = todo.iter().map(|i| &loops.closures[*i]).collect();
+    let closures: Vec<&LoopClosure> = todo.iter().map(|i| &loops.closures[*i]).collect();
     if closures
         .iter()
-        .any(|c| c.equations.is_empty() || !c.given().is_empty())
+        .any(|c| c.equations.is_empty() || !c.explicit_coordinates().is_empty())
     {
         return None;
     }
@@ -157,7 +157,7 @@ fn together(
         .collect();
     let size = closures.iter().map(|c| c.n_independent).sum();
     let sets = match unknowns {
-        Unknowns::Passive => {
+        SolvableCoordinates::Passive => {
             free.retain(|c| !known.contains(c));
             let free: Vec<usize> = free.into_iter().collect();
             if free.len() == size {
@@ -166,9 +166,9 @@ fn together(
                 Vec::new()
             }
         }
-        Unknowns::Any => {
+        SolvableCoordinates::Any => {
             let free: Vec<usize> = free.into_iter().collect();
-            choose::promising(graph, mechanism, &equations, &residual, &free, size)
+            choose::promising_sets(graph, mechanism, &equations, &residual, &free, size)
         }
     };
     sets.into_iter().find_map(|unknown| {
@@ -178,7 +178,7 @@ fn together(
 }
 
 /// Coordinates solved for one by one as steps of a plan.
-fn single_steps(steps: Vec<(usize, Solved)>) -> Vec<PlanStep> {
+fn single_steps(steps: Vec<(usize, ClosureSolution)>) -> Vec<PlanStep> {
     let step = |(coordinate, solved)| PlanStep {
         unknown: vec![coordinate],
         solved,
@@ -208,19 +208,19 @@ fn subsets(of: &[usize], size: usize) -> Vec<Vec<usize>> {
     (0..of.len()).flat_map(with).collect()
 }
 
-fn solve(
+fn solve_loop(
     graph: &mut Graph,
     mechanism: &Mechanism,
-    closure: &Closure,
+    closure: &LoopClosure,
     unknown: Vec<usize>,
-    unknowns: Unknowns,
+    unknowns: SolvableCoordinates,
 ) -> Option<Vec<PlanStep>> {
     if let Some(follower) = &closure.follower
         && closure.relations.is_empty()
     {
-        let angle = AngleSum::new([(Atom::Coordinate(follower.coordinate), 1)]);
-        let in_parts = follower.in_parts.filter(|_| unknowns == Unknowns::Any);
-        let solved = Solved {
+        let angle = AtomAngleSum::new([(Atom::Coordinate(follower.coordinate), 1)]);
+        let in_parts = follower.in_parts.filter(|_| unknowns == SolvableCoordinates::Any);
+        let solved = ClosureSolution {
             angles: in_parts
                 .map(|cos_sin| (angle, cos_sin))
                 .into_iter()
@@ -248,7 +248,7 @@ fn solve(
         .extend(follower.map(|follower| (follower.coordinate, follower.value)));
     if let Some(root) = solved.root {
         let mut sign = nominal_value(graph, mechanism, root.witness).unwrap_or(1.0);
-        if let Some(whole) = root.whole {
+        if let Some(whole) = root.exact {
             sign *= nominal_value(graph, mechanism, whole).unwrap_or(1.0);
         }
         if sign < 0.0 {
@@ -256,6 +256,6 @@ fn solve(
         }
     }
     // A root that is none can neither fail to exist nor choose between what hangs together.
-    solved.root = solved.root.filter(|root| root.whole.is_none());
+    solved.root = solved.root.filter(|root| root.exact.is_none());
     Some(vec![PlanStep { unknown, solved }])
 }

@@ -1,12 +1,12 @@
 //! Passive angles that are integer combinations of other angles.
 
-use crate::expr::{AngleSum, Atom, ExprId, Graph};
+use crate::expr::{AtomAngleSum, Atom, ExprId, Graph};
 
 /// A passive angle that equals `sum + pi12 * pi/12`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct AngleRelation {
     pub(crate) coordinate: usize,
-    pub(crate) sum: AngleSum,
+    pub(crate) sum: AtomAngleSum,
     pub(crate) pi12: i32,
 }
 

@@ -1,13 +1,13 @@
 //! Loops solved one after the other: the steps, and the same made evaluable in the field.
 
-use modelmill_algebra::field::Number;
+use modelmill_algebra::field::FieldNumber;
 
-use super::solved::Solved;
-use crate::expr::{AngleSum, Atom, Domain, ExprId, FieldPoint, Graph, Node, Tape, Unary};
+use super::solved::ClosureSolution;
+use crate::expr::{AtomAngleSum, Atom, EvaluationDomain, ExprId, FieldPoint, Graph, Node, EvaluationTape, Unary};
 
 /// A way to solve all loops one after the other, each for at most two coordinates.
 #[derive(Clone, Debug)]
-pub(crate) struct Plan {
+pub(crate) struct LoopPlan {
     pub(crate) steps: Vec<PlanStep>,
     /// Angles whose turns are drawn in so many parts, for others to follow them by fractions.
     pub(crate) divided: Vec<(usize, i64)>,
@@ -17,30 +17,30 @@ pub(crate) struct Plan {
 #[derive(Clone, Debug)]
 pub(crate) struct PlanStep {
     pub(crate) unknown: Vec<usize>,
-    pub(crate) solved: Solved,
+    pub(crate) solved: ClosureSolution,
 }
 
 /// A step of a plan in the field.
-pub(crate) struct SolveStep {
+pub(crate) struct FieldSolveStep {
     unknown: Vec<usize>,
-    angles: Vec<AngleSum>,
+    angles: Vec<AtomAngleSum>,
     /// Coordinates whose values follow: lengths, angles that are combinations of known ones, and what follows others.
     numbers: Vec<usize>,
     /// Cosines and sines of the angles in pairs, then the numbers.
-    tape: Tape,
+    tape: EvaluationTape,
     /// What the step takes roots of: one at most, as it stands.
-    pub(crate) radicands: Vec<Tape>,
+    pub(crate) radicands: Vec<EvaluationTape>,
 }
 
-impl SolveStep {
+impl FieldSolveStep {
     /// Makes a step evaluable; what it evaluates goes to `roots`.
     pub(crate) fn new(graph: &mut Graph, step: PlanStep, roots: &mut Vec<ExprId>) -> Self {
         let solved = step.solved;
-        let mut angles: Vec<(AngleSum, [ExprId; 2])> = solved.angles;
+        let mut angles: Vec<(AtomAngleSum, [ExprId; 2])> = solved.angles;
         let mut numbers: Vec<(usize, ExprId)> = solved.values;
         for relation in &solved.relations {
             let (c, s) = graph.cos_sin(&relation.sum, relation.pi12);
-            let angle = AngleSum::new([(Atom::Coordinate(relation.coordinate), 1)]);
+            let angle = AtomAngleSum::new([(Atom::Coordinate(relation.coordinate), 1)]);
             angles.push((angle, [c, s]));
             numbers.push((relation.coordinate, relation.value(graph)));
         }
@@ -51,13 +51,13 @@ impl SolveStep {
             unknown: step.unknown,
             angles: angles.into_iter().map(|(angle, _)| angle).collect(),
             numbers: numbers.iter().map(|(i, _)| *i).collect(),
-            tape: Tape::new(graph, &own),
+            tape: EvaluationTape::new(graph, &own),
             radicands: radicands(graph, &own),
         }
     }
 
     /// Sets the unknown coordinates of a point whose other coordinates are set; `None` if the loop does not close there.
-    pub(crate) fn solve<N: Number>(&self, point: &mut FieldPoint<N>) -> Option<()> {
+    pub(crate) fn solve<N: FieldNumber>(&self, point: &mut FieldPoint<N>) -> Option<()> {
         let values = self.tape.evaluate(point)?;
         let numbers = &values[2 * self.angles.len()..];
         for (i, value) in self.numbers.iter().zip(numbers) {
@@ -80,7 +80,7 @@ impl SolveStep {
                 let &[(atom @ Atom::Coordinate(i), sign)] = inside.as_slice() else {
                     continue;
                 };
-                let rest = angle.plus(&AngleSum::new([(*atom, *sign)]), -1);
+                let rest = angle.plus(&AtomAngleSum::new([(*atom, *sign)]), -1);
                 let (cr, sr) = point.cos_sin(&rest)?;
                 let (c, s) = (values[2 * k], values[2 * k + 1]);
                 // The unknown angle is sign * (angle - rest).
@@ -99,7 +99,7 @@ impl SolveStep {
 }
 
 /// What roots under `outputs` are taken of, if it depends on coordinates and constants alone.
-pub(crate) fn radicands(graph: &Graph, outputs: &[ExprId]) -> Vec<Tape> {
+pub(crate) fn radicands(graph: &Graph, outputs: &[ExprId]) -> Vec<EvaluationTape> {
     let inner = graph.nodes_of(outputs).filter_map(|node| match node {
         Node::Unary(Unary::Sqrt, inner) => Some(*inner),
         _ => None,
@@ -112,6 +112,6 @@ pub(crate) fn radicands(graph: &Graph, outputs: &[ExprId]) -> Vec<Tape> {
                     .iter()
                     .all(|a| matches!(a, Atom::Coordinate(_) | Atom::Constant(_) | Atom::Pi))
         })
-        .map(|inner| Tape::new(graph, &[inner]))
+        .map(|inner| EvaluationTape::new(graph, &[inner]))
         .collect()
 }

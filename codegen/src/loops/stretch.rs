@@ -1,62 +1,62 @@
 //! Paths along the tree as sums of vectors, each given in a frame that a chain of turns leads to.
 
-use modelmill_spec::{Mechanism, Point};
+use modelmill_spec::{Mechanism, FramePoint};
 
 use crate::DeriveError;
-use crate::expr::vector::{self, Turn, Vector, push_turn};
-use crate::expr::{AngleSum, ExprId, Graph};
-use crate::tree::Tree;
+use crate::expr::vector::{self, AxisRotation, SymbolicVector, push_rotation};
+use crate::expr::{AtomAngleSum, ExprId, Graph};
+use crate::tree::KinematicTree;
 use crate::tree::expressions;
 
 /// A stretch of a path: a vector given in a frame that `turns` lead to.
 #[derive(Clone)]
-pub(crate) struct Stretch {
-    pub(crate) turns: Vec<Turn>,
-    pub(crate) vector: Vector,
+pub(crate) struct PathSegment {
+    pub(crate) turns: Vec<AxisRotation>,
+    pub(crate) vector: SymbolicVector,
 }
 
 /// Position of a point in a frame up its tree, as stretches: `start` turns stand in front of all.
-pub(crate) fn stretches(tree: &Tree, links: &[usize], start: &[Turn], at: &Vector) -> Vec<Stretch> {
+pub(crate) fn path_segments(tree: &KinematicTree, links: &[usize], start: &[AxisRotation], at: &SymbolicVector) -> Vec<PathSegment> {
     let mut turns = start.to_vec();
     let mut path = Vec::new();
     for &i in links {
         let link = &tree.links[i];
-        path.push(Stretch {
+        path.push(PathSegment {
             turns: turns.clone(),
             vector: link.position,
         });
         for turn in link.pre.iter().chain([&link.joint]) {
-            push_turn(&mut turns, turn);
+            push_rotation(&mut turns, turn);
         }
     }
-    path.push(Stretch { turns, vector: *at });
+    path.push(PathSegment { turns, vector: *at });
     path.retain(|stretch| stretch.vector != vector::ZERO);
     path
 }
 
 /// The fixed rotations from the root of a path to the axis of its first turning joint; `None` if nothing turns.
-pub(crate) fn fixed_turns(tree: &Tree, links: &[usize]) -> Option<Vec<Turn>> {
+pub(crate) fn fixed_rotations(tree: &KinematicTree, links: &[usize]) -> Option<Vec<AxisRotation>> {
     let mut turns = Vec::new();
     for &i in links {
         let link = &tree.links[i];
         for turn in &link.pre {
-            push_turn(&mut turns, turn);
+            push_rotation(&mut turns, turn);
         }
         if !link.turns.is_empty() {
             return Some(turns);
         }
-        push_turn(&mut turns, &link.joint);
+        push_rotation(&mut turns, &link.joint);
     }
     None
 }
 
-pub(crate) fn sum_of(graph: &mut Graph, path: &[Stretch]) -> Vector {
-    let vectors: Vec<Vector> = path
+pub(crate) fn sum_segments(graph: &mut Graph, path: &[PathSegment]) -> SymbolicVector {
+    let vectors: Vec<SymbolicVector> = path
         .iter()
         .map(|stretch| {
             let mut v = stretch.vector;
             for turn in stretch.turns.iter().rev() {
-                v = graph.turn_out(turn, &v);
+                v = graph.rotate_out(turn, &v);
             }
             v
         })
@@ -64,7 +64,7 @@ pub(crate) fn sum_of(graph: &mut Graph, path: &[Stretch]) -> Vector {
     graph.add_vectors(&vectors)
 }
 
-pub(crate) fn point_at(graph: &mut Graph, point: &Point) -> Result<Vector, DeriveError> {
+pub(crate) fn local_position(graph: &mut Graph, point: &FramePoint) -> Result<SymbolicVector, DeriveError> {
     Ok([
         expressions::expression(graph, &point.at[0])?,
         expressions::expression(graph, &point.at[1])?,
@@ -76,25 +76,25 @@ pub(crate) fn point_at(graph: &mut Graph, point: &Point) -> Result<Vector, Deriv
 pub(crate) fn position_in_base(
     graph: &mut Graph,
     mechanism: &Mechanism,
-    tree: &Tree,
+    tree: &KinematicTree,
     point: usize,
-) -> Result<Vector, DeriveError> {
+) -> Result<SymbolicVector, DeriveError> {
     let point = &mechanism.points[point];
-    let at = point_at(graph, point)?;
-    let path = stretches(tree, &tree.path(tree.link_of(point.frame)), &[], &at);
-    Ok(sum_of(graph, &path))
+    let at = local_position(graph, point)?;
+    let path = path_segments(tree, &tree.path_to(tree.link_of(point.frame)), &[], &at);
+    Ok(sum_segments(graph, &path))
 }
 
 /// The paths of two points from the frame that both hang on, and the points' positions in their own frames.
-pub(crate) struct Between<'a> {
+pub(crate) struct PointPairPath<'a> {
     pub(crate) paths: [&'a [usize]; 2],
-    pub(crate) at: [Vector; 2],
+    pub(crate) at: [SymbolicVector; 2],
 }
 
-impl Between<'_> {
+impl PointPairPath<'_> {
     /// The vector from the second point to the first as stretches, in the common frame turned by `start`.
-    pub(crate) fn stretches(&self, graph: &mut Graph, tree: &Tree, start: &[Turn]) -> Vec<Stretch> {
-        let [first, second] = [0, 1].map(|i| stretches(tree, self.paths[i], start, &self.at[i]));
+    pub(crate) fn segments(&self, graph: &mut Graph, tree: &KinematicTree, start: &[AxisRotation]) -> Vec<PathSegment> {
+        let [first, second] = [0, 1].map(|i| path_segments(tree, self.paths[i], start, &self.at[i]));
         let mut path = first;
         for mut stretch in second {
             stretch.vector = stretch.vector.map(|x| graph.neg(x));
@@ -105,13 +105,13 @@ impl Between<'_> {
 }
 
 /// Turns the other way, in the opposite order.
-pub(crate) fn inverse(turns: &[Turn]) -> Vec<Turn> {
+pub(crate) fn inverse_rotations(turns: &[AxisRotation]) -> Vec<AxisRotation> {
     turns
         .iter()
         .rev()
-        .map(|t| Turn {
+        .map(|t| AxisRotation {
             axis: t.axis,
-            sum: AngleSum::NONE.plus(&t.sum, -1),
+            sum: AtomAngleSum::NONE.plus(&t.sum, -1),
             pi12: -t.pi12,
         })
         .collect()
@@ -122,23 +122,23 @@ pub(crate) fn inverse(turns: &[Turn]) -> Vec<Turn> {
 pub(crate) fn distance_squared(
     graph: &mut Graph,
     mechanism: &Mechanism,
-    tree: &Tree,
+    tree: &KinematicTree,
     points: [usize; 2],
 ) -> Result<ExprId, DeriveError> {
     let points = points.map(|i| &mechanism.points[i]);
-    let at = [point_at(graph, points[0])?, point_at(graph, points[1])?];
-    let paths = points.map(|p| tree.path(tree.link_of(p.frame)));
+    let at = [local_position(graph, points[0])?, local_position(graph, points[1])?];
+    let paths = points.map(|p| tree.path_to(tree.link_of(p.frame)));
     let common = (paths[0].iter().zip(&paths[1]))
         .take_while(|(x, y)| x == y)
         .count();
-    let between = Between {
+    let between = PointPairPath {
         paths: [&paths[0][common..], &paths[1][common..]],
         at,
     };
     let mut best: Option<(usize, ExprId)> = None;
-    let mut try_frame = |graph: &mut Graph, turns: &[Turn]| {
-        let path = between.stretches(graph, tree, &inverse(turns));
-        let along = sum_of(graph, &path);
+    let mut try_frame = |graph: &mut Graph, turns: &[AxisRotation]| {
+        let path = between.segments(graph, tree, &inverse_rotations(turns));
+        let along = sum_segments(graph, &path);
         let square = graph.dot(&along, &along);
         let size = graph.nodes_of(&[square]).count();
         if best.is_none_or(|(least, _)| size < least) {
@@ -151,7 +151,7 @@ pub(crate) fn distance_squared(
         for &i in path {
             let link = &tree.links[i];
             for turn in link.pre.iter().chain([&link.joint]) {
-                push_turn(&mut turns, turn);
+                push_rotation(&mut turns, turn);
                 try_frame(graph, &turns);
             }
         }

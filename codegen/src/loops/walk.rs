@@ -5,40 +5,40 @@
 //! branches meet, so that none is passed over. Drives' dead points are passed: motion is smooth there. Of mechanisms that are
 //! always near such poses, such as planar ones that digits have tilted, steps follow from how fast they come nearer.
 
-use modelmill_algebra::field::Stream;
+use modelmill_algebra::field::RandomStream;
 use modelmill_spec::Mechanism;
 use nalgebra::{DMatrix, DVector};
 
-use super::all::Loops;
-use super::closure::Closure;
+use super::all::KinematicLoops;
+use super::closure::LoopClosure;
 use super::magnitude;
-use super::numeric_poses::{NumericLoops, symmetric};
+use super::numeric_poses::{NumericLoops, uniform_symmetric};
 use crate::expr::{ExprId, Graph};
 
 /// Longest step, in rad or relative to the size of the loops, and as a share of the least singular value of the loops'
 /// derivatives, which says how near branches meet.
-const LONGEST: f64 = 0.15;
-const SHARE: f64 = 0.5;
+const LONGEST_STEP: f64 = 0.15;
+const STEP_SHARE: f64 = 0.5;
 /// Nearer than this to a pose where branches meet the walk turns round; or than this share of how near the nominal pose is.
-const NEAR: f64 = 2e-3;
-const NEAR_OF_NOMINAL: f64 = 0.3;
+const BRANCH_DISTANCE: f64 = 2e-3;
+const NOMINAL_BRANCH_SHARE: f64 = 0.3;
 /// A step at whose end the least singular value has fallen to less than this share was too long.
-const FALLEN: f64 = 0.25;
+const ACCEPTED_DECREASE: f64 = 0.25;
 /// How far the coordinates that move the mechanism may go from the nominal pose.
-const FARTHEST: f64 = 2.0;
+const WALK_RANGE: f64 = 2.0;
 /// Steps between two poses that are shown.
-const STEPS: usize = 6;
+const STEPS_PER_POSE: usize = 6;
 /// Residuals relative to the size of the loops that count as closed at once, and those that a file with rounded lengths may
 /// leave where a loop has equations that follow from others.
 const CLOSED: f64 = 1e-12;
 pub(crate) const NEARLY_CLOSED: f64 = 1e-7;
 /// The least singular value by the passive coordinates relative to the largest: below, rates say little but rounding. Or this
 /// share of what it is at the nominal pose.
-const DEAD: f64 = 1e-3;
-const DEAD_OF_NOMINAL: f64 = 0.1;
+const SINGULAR_RATIO: f64 = 1e-3;
+const NOMINAL_SINGULAR_SHARE: f64 = 0.1;
 
 /// Where a walk is.
-pub(crate) struct Walk<'a> {
+pub(crate) struct PoseWalk<'a> {
     loops: NumericLoops<'a>,
     units: Vec<f64>,
     active: Vec<usize>,
@@ -58,7 +58,7 @@ pub(crate) struct Walk<'a> {
 }
 
 /// The loops' equations at a pose.
-struct Tangent {
+struct LoopTangent {
     /// Relative to the sizes of the loops.
     residual: DVector<f64>,
     /// As many right singular vectors as there are passive coordinates, one row each.
@@ -69,20 +69,20 @@ struct Tangent {
     least: f64,
 }
 
-impl<'a> Walk<'a> {
+impl<'a> PoseWalk<'a> {
     /// Begins at the nominal pose; `None` if that closes no loop.
-    pub(crate) fn new(graph: &mut Graph, mechanism: &'a Mechanism, loops: &Loops) -> Option<Self> {
+    pub(crate) fn new(graph: &mut Graph, mechanism: &'a Mechanism, loops: &KinematicLoops) -> Option<Self> {
         let residual = all_residuals(loops);
         let all: Vec<usize> = (0..mechanism.coordinates.len()).collect();
-        let numeric = NumericLoops::solved_for(graph, mechanism, &residual, all.clone(), &[]);
-        let nominal = numeric.as_written();
-        let sizes = sizes(graph, mechanism, loops);
-        let of_lengths = loops.closures.iter().filter(|c| c.given().is_empty());
-        let of_lengths = of_lengths.map(|c| magnitude::at_nominal(graph, mechanism, &c.residual));
+        let numeric = NumericLoops::for_unknowns(graph, mechanism, &residual, all.clone(), &[]);
+        let nominal = numeric.declared_nominal_pose();
+        let sizes = residual_loop_sizes(graph, mechanism, loops);
+        let of_lengths = loops.closures.iter().filter(|c| c.explicit_coordinates().is_empty());
+        let of_lengths = of_lengths.map(|c| magnitude::nominal_magnitude(graph, mechanism, &c.residual));
         let length = of_lengths.reduce(f64::max).unwrap_or(1.0);
         let mut walk = Self {
             length,
-            units: all.iter().map(|i| numeric.unit(*i)).collect(),
+            units: all.iter().map(|i| numeric.coordinate_unit(*i)).collect(),
             active: loops.active.clone(),
             passive: loops.passive.clone(),
             sizes,
@@ -90,37 +90,37 @@ impl<'a> Walk<'a> {
             nominal,
             heading: None,
             trusted: None,
-            near: NEAR,
-            dead: DEAD,
+            near: BRANCH_DISTANCE,
+            dead: SINGULAR_RATIO,
             loops: numeric,
         };
         walk.measure_couplings(loops)?;
         // The file's pose is as good as its last digit.
-        walk.q = walk.closed(walk.q.clone())?;
+        walk.q = walk.close_loops(walk.q.clone())?;
         walk.nominal.clone_from(&walk.q);
-        let least = walk.tangent(&walk.q)?.least;
-        if least < NEAR {
-            walk.trusted = Some(SHARE * least);
-            walk.near = NEAR_OF_NOMINAL * least;
+        let least = walk.loop_tangent(&walk.q)?.least;
+        if least < BRANCH_DISTANCE {
+            walk.trusted = Some(STEP_SHARE * least);
+            walk.near = NOMINAL_BRANCH_SHARE * least;
         }
-        let determined_by = walk.determined_by()?;
-        if determined_by < DEAD {
-            walk.dead = DEAD_OF_NOMINAL * determined_by;
+        let determined_by = walk.relative_singular_value()?;
+        if determined_by < SINGULAR_RATIO {
+            walk.dead = NOMINAL_SINGULAR_SHARE * determined_by;
         }
         Some(walk)
     }
 
     /// The next pose at which the passive coordinates are determined; `None` where the walk comes to no end.
-    pub(crate) fn next(&mut self, stream: &mut Stream) -> Option<Vec<f64>> {
+    pub(crate) fn next_pose(&mut self, stream: &mut RandomStream) -> Option<Vec<f64>> {
         const TRIES: usize = 400;
         let mut steps = 0;
         for _ in 0..TRIES {
-            match self.step(stream) {
+            match self.take_step(stream) {
                 Some(()) => steps += 1,
                 // Back, and a little aside.
                 None => self.heading = self.heading.take().map(|h| -h),
             }
-            if steps >= STEPS && self.is_determined() {
+            if steps >= STEPS_PER_POSE && self.is_determined() {
                 return Some(self.q.clone());
             }
         }
@@ -128,24 +128,24 @@ impl<'a> Walk<'a> {
     }
 
     /// What counts as one for a coordinate.
-    pub(crate) fn unit(&self, coordinate: usize) -> f64 {
+    pub(crate) fn coordinate_unit(&self, coordinate: usize) -> f64 {
         self.units[coordinate]
     }
 
     /// The size of the largest loop, m.
-    pub(crate) fn length(&self) -> f64 {
+    pub(crate) fn loop_size(&self) -> f64 {
         self.length
     }
 
     /// What each residual is held against, in m.
-    pub(crate) fn sizes(&self) -> &[f64] {
+    pub(crate) fn residual_sizes(&self) -> &[f64] {
         &self.sizes
     }
 
-    fn step(&mut self, stream: &mut Stream) -> Option<()> {
+    fn take_step(&mut self, stream: &mut RandomStream) -> Option<()> {
         let n = self.q.len();
-        let here = self.tangent(&self.q)?;
-        let mut towards = DVector::from_fn(n, |_, _| symmetric(stream));
+        let here = self.loop_tangent(&self.q)?;
+        let mut towards = DVector::from_fn(n, |_, _| uniform_symmetric(stream));
         if let Some(heading) = &self.heading {
             towards += heading;
         }
@@ -158,16 +158,16 @@ impl<'a> Walk<'a> {
             towards = -towards;
         }
         let step = towards / size;
-        let length = self.step_length(&here, &step)? * (0.65 + 0.35 * symmetric(stream));
+        let length = self.step_length(&here, &step)? * (0.65 + 0.35 * uniform_symmetric(stream));
         let there: Vec<f64> = (0..n)
             .map(|i| self.q[i] + length * step[i] * self.units[i])
             .collect();
-        let closed = self.closed(there.clone())?;
+        let closed = self.close_loops(there.clone())?;
         let by = |a: &[f64], b: &[f64], i: usize| ((a[i] - b[i]) / self.units[i]).abs();
         let is_far = (0..n).any(|i| by(&closed, &there, i) > 0.5 * length)
-            || (self.active.iter()).any(|i| by(&closed, &self.nominal, *i) > FARTHEST);
-        let least = self.tangent(&closed)?.least;
-        let has_fallen = self.trusted.is_some() && least < FALLEN * here.least;
+            || (self.active.iter()).any(|i| by(&closed, &self.nominal, *i) > WALK_RANGE);
+        let least = self.loop_tangent(&closed)?.least;
+        let has_fallen = self.trusted.is_some() && least < ACCEPTED_DECREASE * here.least;
         if is_far || least < self.near || has_fallen {
             self.trusted = self.trusted.map(|_| 0.5 * length);
             return None;
@@ -179,25 +179,25 @@ impl<'a> Walk<'a> {
     }
 
     /// How long a step may be in a direction.
-    fn step_length(&self, here: &Tangent, step: &DVector<f64>) -> Option<f64> {
+    fn step_length(&self, here: &LoopTangent, step: &DVector<f64>) -> Option<f64> {
         /// A small step, in units of the coordinates.
         const SMALL: f64 = 1e-4;
-        let sure = SHARE * here.least;
+        let sure = STEP_SHARE * here.least;
         let Some(trusted) = self.trusted else {
-            return Some(LONGEST.min(sure));
+            return Some(LONGEST_STEP.min(sure));
         };
         // As far as the least singular value would fall by a share if it went on as it does here.
         let after = |by: f64| -> Option<f64> {
             let moved = (0..self.q.len()).map(|i| self.q[i] + by * step[i] * self.units[i]);
-            Some(self.tangent(&moved.collect::<Vec<_>>())?.least)
+            Some(self.loop_tangent(&moved.collect::<Vec<_>>())?.least)
         };
         let changes = [after(SMALL)?, after(-SMALL)?].map(|least| (least - here.least).abs());
         let reach = sure * SMALL / changes[0].max(changes[1]).max(f64::MIN_POSITIVE);
-        Some(LONGEST.min(sure.max(reach.min(trusted))))
+        Some(LONGEST_STEP.min(sure.max(reach.min(trusted))))
     }
 
     /// What couples coordinates has the norm of its row for a size.
-    fn measure_couplings(&mut self, loops: &Loops) -> Option<()> {
+    fn measure_couplings(&mut self, loops: &KinematicLoops) -> Option<()> {
         let (_, jacobian) = self.loops.linearise(&self.nominal)?;
         let mut row = 0;
         for closure in &loops.closures {
@@ -217,11 +217,11 @@ impl<'a> Walk<'a> {
     }
 
     /// The nearest pose at which all loops are closed.
-    fn closed(&self, mut q: Vec<f64>) -> Option<Vec<f64>> {
+    fn close_loops(&self, mut q: Vec<f64>) -> Option<Vec<f64>> {
         const ROUNDS: usize = 12;
         const STILL: f64 = 1e-12;
         for _ in 0..ROUNDS {
-            let here = self.tangent(&q)?;
+            let here = self.loop_tangent(&q)?;
             if here.residual.is_empty() || here.residual.amax() <= CLOSED {
                 return Some(q);
             }
@@ -250,11 +250,11 @@ impl<'a> Walk<'a> {
         Some((residual, jacobian))
     }
 
-    fn tangent(&self, q: &[f64]) -> Option<Tangent> {
+    fn loop_tangent(&self, q: &[f64]) -> Option<LoopTangent> {
         let (residual, jacobian) = self.linearise(q)?;
         let (rank, n) = (self.passive.len(), q.len());
         if rank == 0 {
-            return Some(Tangent {
+            return Some(LoopTangent {
                 closing: DMatrix::zeros(n, residual.len()),
                 across: DMatrix::zeros(0, n),
                 residual,
@@ -276,7 +276,7 @@ impl<'a> Walk<'a> {
         for (mut column, k) in closing.column_iter_mut().zip(&order) {
             column /= svd.singular_values[*k];
         }
-        Some(Tangent {
+        Some(LoopTangent {
             closing: closing * u.select_columns(&order).transpose(),
             across,
             residual,
@@ -286,11 +286,11 @@ impl<'a> Walk<'a> {
 
     /// Whether the passive coordinates follow from the others, and not only just.
     fn is_determined(&self) -> bool {
-        self.determined_by().is_some_and(|x| x > self.dead)
+        self.relative_singular_value().is_some_and(|x| x > self.dead)
     }
 
     /// The least singular value by the passive coordinates relative to the largest.
-    fn determined_by(&self) -> Option<f64> {
+    fn relative_singular_value(&self) -> Option<f64> {
         if self.passive.is_empty() {
             return Some(1.0);
         }
@@ -303,11 +303,11 @@ impl<'a> Walk<'a> {
 }
 
 /// The size of the loop that each of [`all_residuals`] belongs to; 1 for what couples coordinates.
-fn sizes(graph: &mut Graph, mechanism: &Mechanism, loops: &Loops) -> Vec<f64> {
-    let of_one = |closure: &Closure| {
+fn residual_loop_sizes(graph: &mut Graph, mechanism: &Mechanism, loops: &KinematicLoops) -> Vec<f64> {
+    let of_one = |closure: &LoopClosure| {
         let size = match closure.follower {
             Some(_) => 1.0,
-            None => magnitude::at_nominal(graph, mechanism, &closure.residual),
+            None => magnitude::nominal_magnitude(graph, mechanism, &closure.residual),
         };
         vec![size; closure.residual.len()]
     };
@@ -315,7 +315,7 @@ fn sizes(graph: &mut Graph, mechanism: &Mechanism, loops: &Loops) -> Vec<f64> {
 }
 
 /// What all loops leave open, equations that follow from others included.
-pub(crate) fn all_residuals(loops: &Loops) -> Vec<ExprId> {
+pub(crate) fn all_residuals(loops: &KinematicLoops) -> Vec<ExprId> {
     let closures = loops.closures.iter();
     closures.flat_map(|c| c.residual.iter().copied()).collect()
 }

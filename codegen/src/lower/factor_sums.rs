@@ -11,7 +11,7 @@ pub(crate) fn factor_sums(graph: &mut Graph, roots: &[ExprId]) -> Vec<ExprId> {
     let mut shared: BTreeMap<ExprId, bool> = BTreeMap::new();
     rewrite(graph, roots, |graph, id, node| {
         let value = match &node {
-            Node::Sum(terms) if terms.len() > 1 => factor(graph, terms, &shared),
+            Node::Sum(terms) if terms.len() > 1 => factor_terms(graph, terms, &shared),
             _ => rebuild(graph, id, &node),
         };
         let many = uses[id.index()] > 1;
@@ -24,14 +24,14 @@ pub(crate) fn factor_sums(graph: &mut Graph, roots: &[ExprId]) -> Vec<ExprId> {
 }
 
 /// A term as its rational factor and the factors that may be taken out of it.
-type Term = (Rational, Vec<(ExprId, i32)>);
+type FactoredTerm = (Rational, Vec<(ExprId, i32)>);
 
-fn factor(
+fn factor_terms(
     graph: &mut Graph,
     terms: &[(ExprId, Rational)],
     shared: &BTreeMap<ExprId, bool>,
 ) -> ExprId {
-    let open: Vec<Term> = terms
+    let open: Vec<FactoredTerm> = terms
         .iter()
         .map(|(id, k)| {
             let (base, inner) = graph.split_factor(*id);
@@ -44,10 +44,10 @@ fn factor(
             }
         })
         .collect();
-    gather(graph, open)
+    gather_terms(graph, open)
 }
 
-fn gather(graph: &mut Graph, terms: Vec<Term>) -> ExprId {
+fn gather_terms(graph: &mut Graph, terms: Vec<FactoredTerm>) -> ExprId {
     let mut counts: BTreeMap<ExprId, usize> = BTreeMap::new();
     for (_, factors) in &terms {
         for (id, n) in factors {
@@ -67,7 +67,7 @@ fn gather(graph: &mut Graph, terms: Vec<Term>) -> ExprId {
             .collect();
         return graph.sum(&terms);
     };
-    let (with, without): (Vec<Term>, Vec<Term>) = terms
+    let (with, without): (Vec<FactoredTerm>, Vec<FactoredTerm>) = terms
         .into_iter()
         .partition(|(_, factors)| factors.iter().any(|(id, n)| *id == common && *n > 0));
     let inner = with
@@ -82,7 +82,7 @@ fn gather(graph: &mut Graph, terms: Vec<Term>) -> ExprId {
             (k, factors)
         })
         .collect();
-    let inner = gather(graph, inner);
+    let inner = gather_terms(graph, inner);
     let product = graph.mul(common, inner);
     if without.is_empty() {
         return product;
@@ -90,5 +90,5 @@ fn gather(graph: &mut Graph, terms: Vec<Term>) -> ExprId {
     let (base, k) = graph.split_factor(product);
     let mut rest = without;
     rest.push((k, vec![(base, 1)]));
-    gather(graph, rest)
+    gather_terms(graph, rest)
 }

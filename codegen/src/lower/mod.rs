@@ -12,13 +12,13 @@ mod share;
 mod tests;
 
 pub(crate) use program::SINGULAR;
-pub use program::{Guard, Op, OperationCount, Program, Stage, ValueId};
-pub(crate) use schedule::{By, Definition};
+pub use program::{PoseGuard, ProgramOp, OperationCount, StraightLineProgram, ProgramStage, ValueId};
+pub(crate) use schedule::{AtomRule, AtomDefinition};
 
 use crate::expr::{ExprId, Graph};
 
 /// What a program computes.
-pub(crate) struct Request<'a> {
+pub(crate) struct LoweringRequest<'a> {
     /// Expressions whose values come out.
     pub(crate) outputs: &'a [ExprId],
     /// What must not be negative.
@@ -28,35 +28,35 @@ pub(crate) struct Request<'a> {
     /// Whether outputs may have no finite value at states where everything else is regular.
     pub(crate) may_be_undefined: bool,
     /// Atoms that are computed rather than read.
-    pub(crate) definitions: &'a [Definition],
+    pub(crate) definitions: &'a [AtomDefinition],
 }
 
 /// A rewriting of expressions into cheaper ones of equal value.
-pub(crate) struct Pass {
+pub(crate) struct LoweringPass {
     /// What it does.
     pub(crate) name: &'static str,
     run: fn(Graph, &[ExprId]) -> (Graph, Vec<ExprId>),
 }
 
 /// The passes of lowering in the order in which they run. What stands here is checked and counted with all others.
-pub(crate) static PASSES: [Pass; 3] = [
-    Pass {
+pub(crate) static PASSES: [LoweringPass; 3] = [
+    LoweringPass {
         name: "nested sums and products opened first",
         run: |mut graph, roots| {
             let roots = flatten::flatten(&mut graph, roots);
             (graph, roots)
         },
     },
-    Pass {
+    LoweringPass {
         name: "common factors out of sums",
         run: |mut graph, roots| {
             let roots = factor_sums::factor_sums(&mut graph, roots);
             (graph, roots)
         },
     },
-    Pass {
+    LoweringPass {
         name: "common pairs of terms and factors once",
-        run: |graph, roots| share::share(&graph, roots),
+        run: |graph, roots| share::share_pairs(&graph, roots),
     },
 ];
 
@@ -64,17 +64,17 @@ pub(crate) static PASSES: [Pass; 3] = [
 const MOST_ROUNDS: usize = 4;
 
 /// Lowers the expressions of a request to a program.
-pub(crate) fn lower(graph: &Graph, request: &Request<'_>) -> Program {
-    lower_by(graph, &PASSES, request)
+pub(crate) fn lower(graph: &Graph, request: &LoweringRequest<'_>) -> StraightLineProgram {
+    lower_with_passes(graph, &PASSES, request)
 }
 
 /// Lowers them with some passes only.
-pub(crate) fn lower_by(graph: &Graph, passes: &[Pass], request: &Request<'_>) -> Program {
+pub(crate) fn lower_with_passes(graph: &Graph, passes: &[LoweringPass], request: &LoweringRequest<'_>) -> StraightLineProgram {
     let mut roots: Vec<ExprId> = request.outputs.to_vec();
     roots.extend(request.reachable);
     roots.extend(request.regular.iter().flat_map(|(id, size)| [*id, *size]));
     for definition in request.definitions {
-        roots.extend(definition.by.operands());
+        roots.extend(definition.rule.operands());
     }
     // Costs are the finished programs', so that no round is kept that does not pay. The passes go through the whole arena
     // again and again, so that only what is needed should be in it.

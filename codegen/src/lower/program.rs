@@ -20,7 +20,7 @@ impl ValueId {
 
 /// One operation; operands stand before it.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
-pub enum Op {
+pub enum ProgramOp {
     /// A number.
     Number(Rational),
     /// An input.
@@ -45,7 +45,7 @@ pub enum Op {
     Atan2(ValueId, ValueId),
 }
 
-impl Op {
+impl ProgramOp {
     /// The same operation on other operands.
     pub(crate) fn map_operands(self, new: impl Fn(ValueId) -> ValueId) -> Self {
         match self {
@@ -81,7 +81,7 @@ impl Op {
 
 /// When a value can be computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Stage {
+pub enum ProgramStage {
     /// Once for a geometry and a set of parameters.
     Fixed,
     /// At every state.
@@ -93,7 +93,7 @@ pub(crate) const SINGULAR: f64 = 1e-9;
 
 /// What must hold at a pose for the model to have an answer.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Guard {
+pub enum PoseGuard {
     /// The value must not be negative: otherwise the loops cannot close.
     Reachable(ValueId),
     /// The magnitude of the value must stay above 1e-9 of the second one, the magnitude of its terms, which is fixed: otherwise the pose is singular.
@@ -102,7 +102,7 @@ pub enum Guard {
     Finite(ValueId),
 }
 
-impl Guard {
+impl PoseGuard {
     /// The guarded value.
     pub fn value(self) -> ValueId {
         match self {
@@ -111,7 +111,7 @@ impl Guard {
     }
 
     /// What it is held against, if that is a value of the program.
-    pub fn size(self) -> Option<ValueId> {
+    pub fn reference_size(self) -> Option<ValueId> {
         match self {
             Self::Regular(_, size) => Some(size),
             Self::Reachable(_) | Self::Finite(_) => None,
@@ -120,11 +120,11 @@ impl Guard {
 
     /// Both, for each that there is.
     pub fn values(self) -> impl Iterator<Item = ValueId> {
-        std::iter::once(self.value()).chain(self.size())
+        std::iter::once(self.value()).chain(self.reference_size())
     }
 
     /// Whether a value passes beside its size; what is not a number never does.
-    pub fn passes(self, value: f64, size: f64) -> bool {
+    pub fn is_satisfied(self, value: f64, size: f64) -> bool {
         match self {
             Self::Reachable(_) => value >= 0.0,
             Self::Regular(..) => value.abs() > SINGULAR * size,
@@ -135,20 +135,20 @@ impl Guard {
 
 /// A straight-line program with several outputs.
 #[derive(Clone, Debug, Default)]
-pub struct Program {
+pub struct StraightLineProgram {
     /// Operations in order.
-    pub ops: Vec<Op>,
+    pub ops: Vec<ProgramOp>,
     /// Stage of each operation.
-    pub stages: Vec<Stage>,
+    pub stages: Vec<ProgramStage>,
     /// Outputs.
     pub outputs: Vec<ValueId>,
     /// What must hold at a pose.
-    pub guards: Vec<Guard>,
+    pub guards: Vec<PoseGuard>,
 }
 
-impl Program {
+impl StraightLineProgram {
     /// Which operations some outputs and the guards need.
-    pub(crate) fn needed(&self, wanted: &dyn Fn(usize) -> bool) -> Vec<bool> {
+    pub(crate) fn needed_operations(&self, wanted: &dyn Fn(usize) -> bool) -> Vec<bool> {
         let mut needed = vec![false; self.ops.len()];
         let outputs = self.outputs.iter().enumerate();
         let outputs = outputs.filter(|(k, _)| wanted(*k)).map(|(_, value)| *value);
@@ -212,7 +212,7 @@ impl fmt::Display for OperationCount {
     }
 }
 
-impl Program {
+impl StraightLineProgram {
     /// The same program without the operations that no output and no guard needs.
     pub(crate) fn without_dead_code(self) -> Self {
         let mut needed = vec![false; self.ops.len()];
@@ -230,7 +230,7 @@ impl Program {
             }
         }
         let kept: Vec<usize> = (0..self.ops.len()).filter(|i| needed[*i]).collect();
-        self.in_order(&kept)
+        self.reorder(&kept)
     }
 
     /// The same program with its first `n` outputs alone.
@@ -238,12 +238,12 @@ impl Program {
         self.outputs.truncate(n);
         let outputs = &self.outputs;
         self.guards
-            .retain(|guard| !matches!(guard, Guard::Finite(v) if !outputs.contains(v)));
+            .retain(|guard| !matches!(guard, PoseGuard::Finite(v) if !outputs.contains(v)));
         self.without_dead_code()
     }
 
     /// The same program with the operations that `order` names, in that order; operands stand before what needs them.
-    pub(crate) fn in_order(&self, order: &[usize]) -> Self {
+    pub(crate) fn reorder(&self, order: &[usize]) -> Self {
         let mut places: Vec<Option<ValueId>> = vec![None; self.ops.len()];
         let mut ordered = Self::default();
         for i in order {
@@ -265,9 +265,9 @@ impl Program {
             .guards
             .iter()
             .map(|guard| match guard {
-                Guard::Reachable(v) => Guard::Reachable(new(v)),
-                Guard::Regular(v, size) => Guard::Regular(new(v), new(size)),
-                Guard::Finite(v) => Guard::Finite(new(v)),
+                PoseGuard::Reachable(v) => PoseGuard::Reachable(new(v)),
+                PoseGuard::Regular(v, size) => PoseGuard::Regular(new(v), new(size)),
+                PoseGuard::Finite(v) => PoseGuard::Finite(new(v)),
             })
             .collect();
         ordered
@@ -275,12 +275,12 @@ impl Program {
 
     /// Estimated cost per state in additions: multiplications cost the same, the slow operations more.
     pub fn weight(&self) -> usize {
-        let count = self.count(Stage::State);
+        let count = self.count_operations(ProgramStage::State);
         count.add + count.mul + 6 * (count.div + count.sqrt) + 20 * (count.sincos + count.other)
     }
 
     /// Counts the operations of one stage.
-    pub fn count(&self, stage: Stage) -> OperationCount {
+    pub fn count_operations(&self, stage: ProgramStage) -> OperationCount {
         let mut count = OperationCount::default();
         let mut angles = std::collections::BTreeSet::new();
         for (op, s) in self.ops.iter().zip(&self.stages) {
@@ -288,14 +288,14 @@ impl Program {
                 continue;
             }
             match op {
-                Op::Add(..) | Op::Sub(..) => count.add += 1,
-                Op::Mul(..) => count.mul += 1,
-                Op::Div(..) => count.div += 1,
-                Op::Unary(Unary::Sqrt, _) => count.sqrt += 1,
-                Op::Sin(a) | Op::Cos(a) => _ = angles.insert(*a),
-                Op::Atan2(..) => count.sincos += 1,
-                Op::Unary(..) => count.other += 1,
-                Op::Number(_) | Op::Input(_) | Op::Neg(_) => {}
+                ProgramOp::Add(..) | ProgramOp::Sub(..) => count.add += 1,
+                ProgramOp::Mul(..) => count.mul += 1,
+                ProgramOp::Div(..) => count.div += 1,
+                ProgramOp::Unary(Unary::Sqrt, _) => count.sqrt += 1,
+                ProgramOp::Sin(a) | ProgramOp::Cos(a) => _ = angles.insert(*a),
+                ProgramOp::Atan2(..) => count.sincos += 1,
+                ProgramOp::Unary(..) => count.other += 1,
+                ProgramOp::Number(_) | ProgramOp::Input(_) | ProgramOp::Neg(_) => {}
             }
         }
         count.sincos += angles.len();

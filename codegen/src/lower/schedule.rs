@@ -5,20 +5,20 @@ use std::collections::BTreeSet;
 
 use rustc_hash::FxHashMap;
 
-use super::Request;
-use super::program::{Guard, Op, Program, Stage, ValueId};
-use crate::expr::{AngleSum, Atom, ExprId, Graph, Node, Rational};
+use super::LoweringRequest;
+use super::program::{PoseGuard, ProgramOp, StraightLineProgram, ProgramStage, ValueId};
+use crate::expr::{AtomAngleSum, Atom, ExprId, Graph, Node, Rational};
 
 /// An atom that is computed.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Definition {
+pub(crate) struct AtomDefinition {
     pub(crate) atom: Atom,
-    pub(crate) by: By,
+    pub(crate) rule: AtomRule,
 }
 
 /// How an atom is computed.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum By {
+pub(crate) enum AtomRule {
     /// By its value: an angle that follows others.
     Value(ExprId),
     /// A passive angle from the sine and cosine of what it exceeds `quarters` quarter turns by.
@@ -31,7 +31,7 @@ pub(crate) enum By {
     },
 }
 
-impl By {
+impl AtomRule {
     pub(crate) fn operands(self) -> Vec<ExprId> {
         match self {
             Self::Value(value) => vec![value],
@@ -40,7 +40,7 @@ impl By {
     }
 
     /// The same by other operands, which are taken from `from`.
-    fn with(self, from: &mut impl Iterator<Item = ExprId>) -> Self {
+    fn with_operands(self, from: &mut impl Iterator<Item = ExprId>) -> Self {
         let mut next = || from.next().expect("as many roots as operands");
         match self {
             Self::Value(_) => Self::Value(next()),
@@ -55,31 +55,31 @@ impl By {
 
 /// Writes the program for `roots`: outputs, then what must be reachable, regular (each with its size), and defined, as in
 /// `request`.
-pub(crate) fn schedule(graph: &Graph, roots: &[ExprId], request: &Request<'_>) -> Program {
+pub(crate) fn schedule(graph: &Graph, roots: &[ExprId], request: &LoweringRequest<'_>) -> StraightLineProgram {
     let (outputs, rest) = roots.split_at(request.outputs.len());
     let (reachable, rest) = rest.split_at(request.reachable.len());
     let (regular, defined) = rest.split_at(2 * request.regular.len());
     let mut defined = defined.iter().copied();
-    let mut scheduler = Scheduler {
+    let mut scheduler = ProgramScheduler {
         graph,
         fixed: fixed_nodes(graph, roots),
         uses: inverse_uses(graph, roots),
-        program: Program::default(),
+        program: StraightLineProgram::default(),
         known: FxHashMap::default(),
         values: FxHashMap::default(),
         defined: request
             .definitions
             .iter()
-            .map(|d| (d.atom, d.by.with(&mut defined)))
+            .map(|d| (d.atom, d.rule.with_operands(&mut defined)))
             .collect(),
     };
     for id in reachable {
         let value = scheduler.value(*id);
-        scheduler.program.guards.push(Guard::Reachable(value));
+        scheduler.program.guards.push(PoseGuard::Reachable(value));
     }
     for pair in regular.chunks(2) {
         let [value, size] = [pair[0], pair[1]].map(|id| scheduler.value(id));
-        scheduler.program.guards.push(Guard::Regular(value, size));
+        scheduler.program.guards.push(PoseGuard::Regular(value, size));
     }
     let outputs: Vec<ValueId> = outputs.iter().map(|id| scheduler.value(*id)).collect();
     if request.may_be_undefined {
@@ -87,8 +87,8 @@ pub(crate) fn schedule(graph: &Graph, roots: &[ExprId], request: &Request<'_>) -
         let program = &mut scheduler.program;
         let moving = distinct
             .into_iter()
-            .filter(|v| program.stages[v.index()] == Stage::State);
-        program.guards.extend(moving.map(Guard::Finite));
+            .filter(|v| program.stages[v.index()] == ProgramStage::State);
+        program.guards.extend(moving.map(PoseGuard::Finite));
     }
     scheduler.program.outputs = outputs;
     scheduler.program.without_dead_code()
@@ -130,24 +130,24 @@ fn inverse_uses(graph: &Graph, roots: &[ExprId]) -> FxHashMap<(ExprId, i32), usi
     uses
 }
 
-struct Scheduler<'a> {
+struct ProgramScheduler<'a> {
     graph: &'a Graph,
     fixed: Vec<bool>,
     uses: FxHashMap<(ExprId, i32), usize>,
-    program: Program,
-    known: FxHashMap<Op, ValueId>,
+    program: StraightLineProgram,
+    known: FxHashMap<ProgramOp, ValueId>,
     values: FxHashMap<ExprId, ValueId>,
-    defined: FxHashMap<Atom, By>,
+    defined: FxHashMap<Atom, AtomRule>,
 }
 
-impl Scheduler<'_> {
-    fn push(&mut self, op: Op) -> ValueId {
+impl ProgramScheduler<'_> {
+    fn push_op(&mut self, op: ProgramOp) -> ValueId {
         if let Some(value) = self.known.get(&op) {
             return *value;
         }
         let mut stage = match &op {
-            Op::Input(atom) if !atom.is_fixed() => Stage::State,
-            _ => Stage::Fixed,
+            ProgramOp::Input(atom) if !atom.is_fixed() => ProgramStage::State,
+            _ => ProgramStage::Fixed,
         };
         op.for_each_operand(|operand| stage = stage.max(self.program.stages[operand.index()]));
         let value =
@@ -159,11 +159,11 @@ impl Scheduler<'_> {
     }
 
     fn number(&mut self, value: Rational) -> ValueId {
-        self.push(Op::Number(value))
+        self.push_op(ProgramOp::Number(value))
     }
 
-    fn commutative(&mut self, op: fn(ValueId, ValueId) -> Op, a: ValueId, b: ValueId) -> ValueId {
-        self.push(op(a.min(b), a.max(b)))
+    fn commutative(&mut self, op: fn(ValueId, ValueId) -> ProgramOp, a: ValueId, b: ValueId) -> ValueId {
+        self.push_op(op(a.min(b), a.max(b)))
     }
 
     /// Value of a node; operands first, without recursion on the depth of the graph beyond its sums and products.
@@ -173,14 +173,14 @@ impl Scheduler<'_> {
         }
         for node in self.unknown_below(id) {
             if !self.values.contains_key(&node) && !self.is_inner(node) {
-                let value = self.make(node);
+                let value = self.schedule_node(node);
                 self.values.insert(node, value);
             }
         }
         match self.values.get(&id) {
             Some(value) => *value,
             None => {
-                let value = self.make(id);
+                let value = self.schedule_node(id);
                 self.values.insert(id, value);
                 value
             }
@@ -206,58 +206,58 @@ impl Scheduler<'_> {
         matches!(self.graph.node(id), Node::Rational(_))
     }
 
-    fn get(&mut self, id: ExprId) -> ValueId {
+    fn scheduled_value(&mut self, id: ExprId) -> ValueId {
         if let Node::Rational(value) = self.graph.node(id) {
             return self.number(value.clone());
         }
         self.values[&id]
     }
 
-    fn make(&mut self, id: ExprId) -> ValueId {
+    fn schedule_node(&mut self, id: ExprId) -> ValueId {
         match self.graph.node(id).clone() {
             Node::Rational(value) => self.number(value),
             Node::Atom(atom) => self.atom(atom),
             Node::Sin(angle) => {
                 let angle = self.angle(&angle);
-                self.push(Op::Cos(angle));
-                self.push(Op::Sin(angle))
+                self.push_op(ProgramOp::Cos(angle));
+                self.push_op(ProgramOp::Sin(angle))
             }
             Node::Cos(angle) => {
                 let angle = self.angle(&angle);
-                self.push(Op::Cos(angle))
+                self.push_op(ProgramOp::Cos(angle))
             }
             Node::Sum(terms) => self.sum(&terms),
             Node::Product(factors) => self.product(&factors),
             Node::Unary(function, child) => {
-                let child = self.get(child);
-                self.push(Op::Unary(function, child))
+                let child = self.scheduled_value(child);
+                self.push_op(ProgramOp::Unary(function, child))
             }
         }
     }
 
     fn atom(&mut self, atom: Atom) -> ValueId {
         match self.defined.get(&atom).copied() {
-            Some(By::Value(value)) => self.value(value),
-            Some(By::Turn {
+            Some(AtomRule::Value(value)) => self.value(value),
+            Some(AtomRule::Turn {
                 quarters,
                 sine,
                 cosine,
             }) => {
                 let (y, x) = (self.value(sine), self.value(cosine));
-                let angle = self.push(Op::Atan2(y, x));
+                let angle = self.push_op(ProgramOp::Atan2(y, x));
                 if quarters == 0 {
                     return angle;
                 }
-                let pi = self.push(Op::Input(Atom::Pi));
+                let pi = self.push_op(ProgramOp::Input(Atom::Pi));
                 let factor = self.number(Rational::new(i64::from(quarters), 2));
-                let turned = self.commutative(Op::Mul, factor, pi);
-                self.commutative(Op::Add, turned, angle)
+                let turned = self.commutative(ProgramOp::Mul, factor, pi);
+                self.commutative(ProgramOp::Add, turned, angle)
             }
-            None => self.push(Op::Input(atom)),
+            None => self.push_op(ProgramOp::Input(atom)),
         }
     }
 
-    fn angle(&mut self, angle: &AngleSum) -> ValueId {
+    fn angle(&mut self, angle: &AtomAngleSum) -> ValueId {
         let mut total: Option<ValueId> = None;
         for (atom, n) in angle.terms() {
             let value = self.atom(*atom);
@@ -265,13 +265,13 @@ impl Scheduler<'_> {
                 value
             } else {
                 let factor = self.number(Rational::integer(i64::from(n.abs())));
-                self.commutative(Op::Mul, factor, value)
+                self.commutative(ProgramOp::Mul, factor, value)
             };
             total = Some(match (total, *n < 0) {
                 (None, false) => term,
-                (None, true) => self.push(Op::Neg(term)),
-                (Some(sum), false) => self.commutative(Op::Add, sum, term),
-                (Some(sum), true) => self.push(Op::Sub(sum, term)),
+                (None, true) => self.push_op(ProgramOp::Neg(term)),
+                (Some(sum), false) => self.commutative(ProgramOp::Add, sum, term),
+                (Some(sum), true) => self.push_op(ProgramOp::Sub(sum, term)),
             });
         }
         total.expect("an angle node has terms")
@@ -286,21 +286,21 @@ impl Scheduler<'_> {
         let mut signed: Vec<(bool, ValueId)> = Vec::new();
         for (id, factor) in fixed.iter().chain(&moving) {
             if fixed.len() > 1 && signed.len() == fixed.len() && fixed.len() < terms.len() {
-                signed = vec![self.add_up(&signed)];
+                signed = vec![self.add_signed(&signed)];
             }
-            let value = self.term(*id, &factor.abs());
+            let value = self.scaled_value(*id, &factor.abs());
             signed.push((factor.is_negative(), value));
         }
-        let (negative, value) = self.add_up(&signed);
+        let (negative, value) = self.add_signed(&signed);
         if negative {
-            self.push(Op::Neg(value))
+            self.push_op(ProgramOp::Neg(value))
         } else {
             value
         }
     }
 
     /// Adds signed values; the result's sign comes back beside it.
-    fn add_up(&mut self, signed: &[(bool, ValueId)]) -> (bool, ValueId) {
+    fn add_signed(&mut self, signed: &[(bool, ValueId)]) -> (bool, ValueId) {
         let start = signed
             .iter()
             .position(|(negative, _)| !negative)
@@ -312,21 +312,21 @@ impl Scheduler<'_> {
                 continue;
             }
             total = if *negative == all_negative {
-                self.commutative(Op::Add, total, *value)
+                self.commutative(ProgramOp::Add, total, *value)
             } else {
-                self.push(Op::Sub(total, *value))
+                self.push_op(ProgramOp::Sub(total, *value))
             };
         }
         (all_negative, total)
     }
 
     /// `factor * id`, with the factor put to what is fixed.
-    fn term(&mut self, id: ExprId, factor: &Rational) -> ValueId {
+    fn scaled_value(&mut self, id: ExprId, factor: &Rational) -> ValueId {
         if id == Graph::ONE {
             return self.number(factor.clone());
         }
         if factor.is_one() {
-            return self.get(id);
+            return self.scheduled_value(id);
         }
         if let Node::Product(factors) = self.graph.node(id).clone() {
             let (fixed, moving): (Vec<_>, Vec<_>) =
@@ -334,17 +334,17 @@ impl Scheduler<'_> {
             if !fixed.is_empty() && !moving.is_empty() {
                 let k = self.powers(&fixed);
                 let number = self.number(factor.clone());
-                let k = self.commutative(Op::Mul, number, k);
+                let k = self.commutative(ProgramOp::Mul, number, k);
                 let m = self.powers(&moving);
-                return self.commutative(Op::Mul, k, m);
+                return self.commutative(ProgramOp::Mul, k, m);
             }
         }
-        let value = self.get(id);
+        let value = self.scheduled_value(id);
         if *factor == Rational::integer(2) {
-            return self.push(Op::Add(value, value));
+            return self.push_op(ProgramOp::Add(value, value));
         }
         let number = self.number(factor.clone());
-        self.commutative(Op::Mul, number, value)
+        self.commutative(ProgramOp::Mul, number, value)
     }
 
     fn product(&mut self, factors: &[(ExprId, i32)]) -> ValueId {
@@ -354,7 +354,7 @@ impl Scheduler<'_> {
             (false, false) => {
                 let k = self.powers(&fixed);
                 let m = self.powers(&moving);
-                self.commutative(Op::Mul, k, m)
+                self.commutative(ProgramOp::Mul, k, m)
             }
             _ => self.powers(factors),
         }
@@ -366,10 +366,10 @@ impl Scheduler<'_> {
         let mut divisors = Vec::new();
         for (id, n) in factors {
             let shared = *n < 0 && self.uses.get(&(*id, *n)).is_some_and(|u| *u > 1);
-            let base = self.get(*id);
+            let base = self.scheduled_value(*id);
             let mut power = base;
             for _ in 1..n.abs() {
-                power = self.commutative(Op::Mul, power, base);
+                power = self.commutative(ProgramOp::Mul, power, base);
             }
             if *n < 0 && !shared {
                 divisors.push(power);
@@ -377,22 +377,22 @@ impl Scheduler<'_> {
             }
             if shared {
                 let one = self.number(Rational::ONE);
-                power = self.push(Op::Div(one, power));
+                power = self.push_op(ProgramOp::Div(one, power));
             }
             total = Some(match total {
                 None => power,
-                Some(product) => self.commutative(Op::Mul, product, power),
+                Some(product) => self.commutative(ProgramOp::Mul, product, power),
             });
         }
         let divisor = divisors
             .into_iter()
-            .reduce(|a, b| self.commutative(Op::Mul, a, b));
+            .reduce(|a, b| self.commutative(ProgramOp::Mul, a, b));
         match (total, divisor) {
             (Some(product), None) => product,
-            (Some(product), Some(divisor)) => self.push(Op::Div(product, divisor)),
+            (Some(product), Some(divisor)) => self.push_op(ProgramOp::Div(product, divisor)),
             (None, Some(divisor)) => {
                 let one = self.number(Rational::ONE);
-                self.push(Op::Div(one, divisor))
+                self.push_op(ProgramOp::Div(one, divisor))
             }
             (None, None) => self.number(Rational::ONE),
         }

@@ -9,7 +9,7 @@ use super::schedule::fixed_nodes;
 use crate::expr::{ExprId, Graph, Node, Rational};
 
 /// Gives a node of its own to every pair that occurs at least twice, most frequent first.
-pub(crate) fn share(graph: &Graph, roots: &[ExprId]) -> (Graph, Vec<ExprId>) {
+pub(crate) fn share_pairs(graph: &Graph, roots: &[ExprId]) -> (Graph, Vec<ExprId>) {
     let (mut graph, mut roots) = graph.compacted(roots);
     let mut live = graph.len();
     for _ in 0..200 {
@@ -17,7 +17,7 @@ pub(crate) fn share(graph: &Graph, roots: &[ExprId]) -> (Graph, Vec<ExprId>) {
         if pairs.is_empty() {
             break;
         }
-        roots = replace(&mut graph, &roots, &pairs);
+        roots = replace_pairs(&mut graph, &roots, &pairs);
         if graph.len() > 2 * live {
             (graph, roots) = graph.compacted(&roots);
             live = graph.len();
@@ -28,12 +28,12 @@ pub(crate) fn share(graph: &Graph, roots: &[ExprId]) -> (Graph, Vec<ExprId>) {
 
 /// Two operands that stand together: factors, or terms with the ratio of their coefficients.
 #[derive(Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
-enum Pair {
+enum OperandPair {
     Factors(ExprId, ExprId),
     Terms(ExprId, ExprId, Rational),
 }
 
-impl Pair {
+impl OperandPair {
     fn operands(&self) -> [ExprId; 2] {
         match self {
             Self::Factors(a, b) | Self::Terms(a, b, _) => [*a, *b],
@@ -41,13 +41,13 @@ impl Pair {
     }
 }
 
-fn pairs_of(node: &Node, fixed: &[bool], mut visit: impl FnMut(Pair)) {
+fn pairs_of(node: &Node, fixed: &[bool], mut visit: impl FnMut(OperandPair)) {
     match node {
         Node::Sum(terms) if terms.len() > 2 => {
             for (i, (a, k)) in terms.iter().enumerate() {
                 for (b, m) in &terms[i + 1..] {
                     if !(fixed[a.index()] && fixed[b.index()]) {
-                        visit(Pair::Terms(*a, *b, m * &k.recip()));
+                        visit(OperandPair::Terms(*a, *b, m * &k.recip()));
                     }
                 }
             }
@@ -59,7 +59,7 @@ fn pairs_of(node: &Node, fixed: &[bool], mut visit: impl FnMut(Pair)) {
                 .collect();
             for (i, (a, _)) in simple.iter().enumerate() {
                 for (b, _) in &simple[i + 1..] {
-                    visit(Pair::Factors(*a, *b));
+                    visit(OperandPair::Factors(*a, *b));
                 }
             }
         }
@@ -67,7 +67,7 @@ fn pairs_of(node: &Node, fixed: &[bool], mut visit: impl FnMut(Pair)) {
         Node::Sum(terms) if terms.len() == 2 => {
             let ((a, k), (b, m)) = (&terms[0], &terms[1]);
             if !(fixed[a.index()] && fixed[b.index()]) {
-                visit(Pair::Terms(*a, *b, m * &k.recip()));
+                visit(OperandPair::Terms(*a, *b, m * &k.recip()));
             }
         }
         Node::Product(factors) => {
@@ -75,7 +75,7 @@ fn pairs_of(node: &Node, fixed: &[bool], mut visit: impl FnMut(Pair)) {
                 && !fixed[a.index()]
                 && !fixed[b.index()]
             {
-                visit(Pair::Factors(*a, *b));
+                visit(OperandPair::Factors(*a, *b));
             }
         }
         _ => {}
@@ -83,9 +83,9 @@ fn pairs_of(node: &Node, fixed: &[bool], mut visit: impl FnMut(Pair)) {
 }
 
 /// Pairs that occur more than once, best first, no operand twice, so that they can be replaced together.
-fn common_pairs(graph: &Graph, roots: &[ExprId]) -> BTreeSet<Pair> {
+fn common_pairs(graph: &Graph, roots: &[ExprId]) -> BTreeSet<OperandPair> {
     let fixed = fixed_nodes(graph, roots);
-    let mut counts: FxHashMap<Pair, usize> = FxHashMap::default();
+    let mut counts: FxHashMap<OperandPair, usize> = FxHashMap::default();
     for (i, needed) in graph.reachable(roots).into_iter().enumerate() {
         if needed && !fixed[i] {
             let id = ExprId(u32::try_from(i).expect("graph below 4G nodes"));
@@ -94,7 +94,7 @@ fn common_pairs(graph: &Graph, roots: &[ExprId]) -> BTreeSet<Pair> {
             });
         }
     }
-    let mut found: Vec<(usize, Pair)> = counts
+    let mut found: Vec<(usize, OperandPair)> = counts
         .into_iter()
         .filter(|(_, n)| *n > 1)
         .map(|(p, n)| (n, p))
@@ -116,13 +116,13 @@ fn common_pairs(graph: &Graph, roots: &[ExprId]) -> BTreeSet<Pair> {
         .collect()
 }
 
-fn replace(graph: &mut Graph, roots: &[ExprId], pairs: &BTreeSet<Pair>) -> Vec<ExprId> {
+fn replace_pairs(graph: &mut Graph, roots: &[ExprId], pairs: &BTreeSet<OperandPair>) -> Vec<ExprId> {
     // No operand stands in two pairs of a kind, so that the first one tells which pair it is.
     let (mut terms_with, mut factors_with) = (FxHashMap::default(), FxHashMap::default());
     for pair in pairs {
         match pair {
-            Pair::Terms(a, b, ratio) => _ = terms_with.insert(*a, (*b, ratio)),
-            Pair::Factors(a, b) => _ = factors_with.insert(*a, *b),
+            OperandPair::Terms(a, b, ratio) => _ = terms_with.insert(*a, (*b, ratio)),
+            OperandPair::Factors(a, b) => _ = factors_with.insert(*a, *b),
         }
     }
     rewrite(graph, roots, |graph, id, node| match &node {

@@ -2,12 +2,12 @@
 
 use std::path::Path;
 
-use modelmill_algebra::field::{Element, Stream};
+use modelmill_algebra::field::{FieldElement, RandomStream};
 use proc_macro2::{Delimiter, TokenStream, TokenTree};
 use quote::ToTokens as _;
 
-use super::{Op, PASSES, Stage, cost};
-use crate::expr::{Atom, ExprId, FieldPoint, Graph, Tape};
+use super::{ProgramOp, PASSES, ProgramStage, cost};
+use crate::expr::{Atom, ExprId, FieldPoint, Graph, EvaluationTape};
 use crate::{Derivation, derive};
 
 fn derivation(model: &str) -> Derivation {
@@ -19,8 +19,8 @@ fn derivation(model: &str) -> Derivation {
 }
 
 /// Values of some expressions at a random point of the field, with all atoms free.
-fn values(graph: &Graph, roots: &[ExprId], seed: u64) -> Vec<Element> {
-    let mut stream = Stream::new(seed);
+fn values(graph: &Graph, roots: &[ExprId], seed: u64) -> Vec<FieldElement> {
+    let mut stream = RandomStream::new(seed);
     loop {
         let mut point = FieldPoint {
             root_seed: seed,
@@ -37,11 +37,11 @@ fn values(graph: &Graph, roots: &[ExprId], seed: u64) -> Vec<Element> {
             Atom::Acceleration,
         ] {
             for i in 0..80 {
-                point.values.insert(kind(i), stream.element());
-                point.angles.insert(kind(i), stream.circle());
+                point.values.insert(kind(i), stream.next_element());
+                point.angles.insert(kind(i), stream.next_circle_point());
             }
         }
-        if let Some(values) = Tape::new(graph, roots).evaluate(&point) {
+        if let Some(values) = EvaluationTape::new(graph, roots).evaluate(&point) {
             return values;
         }
     }
@@ -90,7 +90,7 @@ fn the_estimated_cost_is_what_the_program_counts() {
     let program = super::schedule::schedule(
         &derivation.graph,
         &roots,
-        &super::Request {
+        &super::LoweringRequest {
             may_be_undefined: false,
             outputs: &roots,
             reachable: &[],
@@ -118,7 +118,7 @@ fn the_printed_count_equals_a_recount_of_the_emitted_source() {
             // What closes loops stands once, in a function of its own, for all programs.
             let [own, pose] = [&format!("{method}_program"), "at"].map(|m| recount(&file, m));
             let recount = (own.0 + pose.0, own.1 + pose.1, own.2 + pose.2);
-            let count = program.count(Stage::State);
+            let count = program.count_operations(ProgramStage::State);
             assert_eq!(
                 recount,
                 (count.add, count.mul, count.div),
@@ -133,7 +133,7 @@ fn the_printed_count_equals_a_recount_of_the_emitted_source() {
             let numbers = program
                 .ops
                 .iter()
-                .filter(|op| matches!(op, Op::Number(_)))
+                .filter(|op| matches!(op, ProgramOp::Number(_)))
                 .count();
             assert!(numbers < program.ops.len());
         }

@@ -5,21 +5,21 @@
 
 use modelmill_spec::{CoordinateIdx, FreeBody, TwistAxes};
 
-use super::{Body, Depths, Side, Spread, Style, Wrench, carry};
-use crate::expr::vector::{self, Turn, Vector};
+use super::{BodyInertia, CarryDepths, JointSide, InertiaDiagonal, RecursionStyle, SymbolicWrench, carry_wrench};
+use crate::expr::vector::{self, AxisRotation, SymbolicVector};
 use crate::expr::{ExprId, Graph, Rational};
-use crate::tree::{Link, Tree, free};
+use crate::tree::{TreeLink, KinematicTree, free};
 
 /// Mass, first moment and second moments of mass (xx, yy, zz; yz, xz, xy) about the origin of a frame.
 #[derive(Clone, Copy)]
-struct Moments {
+struct CompositeInertia {
     mass: ExprId,
-    first: Vector,
-    square: Vector,
-    mixed: Vector,
+    first: SymbolicVector,
+    square: SymbolicVector,
+    mixed: SymbolicVector,
 }
 
-impl Moments {
+impl CompositeInertia {
     const NONE: Self = Self {
         mass: Graph::ZERO,
         first: vector::ZERO,
@@ -27,13 +27,13 @@ impl Moments {
         mixed: vector::ZERO,
     };
 
-    fn from_body(graph: &mut Graph, body: &Body) -> Self {
+    fn from_body(graph: &mut Graph, body: &BodyInertia) -> Self {
         let square = match body.spread {
-            Spread::Flat([x, y]) => [x, y, Graph::ZERO],
-            Spread::Moments(moments) => std::array::from_fn(|i| {
+            InertiaDiagonal::Flat([x, y]) => [x, y, Graph::ZERO],
+            InertiaDiagonal::Moments(moments) => std::array::from_fn(|i| {
                 let half = Rational::new(1, 2);
                 let (j, k) = ((i + 1) % 3, (i + 2) % 3);
-                graph.combine([
+                graph.linear_combination([
                     (moments[j], half.clone()),
                     (moments[k], half.clone()),
                     (moments[i], -&half),
@@ -59,7 +59,7 @@ impl Moments {
     }
 
     /// About a point from which the present one is at `arm`.
-    fn moved(&self, graph: &mut Graph, arm: &Vector) -> Self {
+    fn shift_origin(&self, graph: &mut Graph, arm: &SymbolicVector) -> Self {
         let mut moved = *self;
         for i in 0..3 {
             let (j, k) = ((i + 1) % 3, (i + 2) % 3);
@@ -78,22 +78,22 @@ impl Moments {
     }
 
     /// In the frame in which the present one is turned.
-    fn turned(&self, graph: &mut Graph, turn: &Turn) -> Self {
+    fn rotate(&self, graph: &mut Graph, turn: &AxisRotation) -> Self {
         let axis = turn.axis as usize;
         let (i, j) = ((axis + 1) % 3, (axis + 2) % 3);
         let (c, s) = graph.cos_sin(&turn.sum, turn.pi12);
         let mut turned = *self;
-        turned.first = graph.turn_out(turn, &self.first);
+        turned.first = graph.rotate_out(turn, &self.first);
         // The mixed moments with the axis turn as a vector: mixed[j] belongs to axis and i, mixed[i] to axis and j.
         let mut beside = vector::ZERO;
         (beside[i], beside[j]) = (self.mixed[j], self.mixed[i]);
-        let beside = graph.turn_out(turn, &beside);
+        let beside = graph.rotate_out(turn, &beside);
         (turned.mixed[j], turned.mixed[i]) = (beside[i], beside[j]);
         // The others turn by twice the angle about their mean.
         let half = Rational::new(1, 2);
         let (x, y) = (self.square[i], self.square[j]);
-        let mean = graph.combine([(x, half.clone()), (y, half.clone())]);
-        let apart = graph.combine([(x, half.clone()), (y, -&half)]);
+        let mean = graph.linear_combination([(x, half.clone()), (y, half.clone())]);
+        let apart = graph.linear_combination([(x, half.clone()), (y, -&half)]);
         let mixed = self.mixed[axis];
         let (cosine, sine) = if turn.sum.is_empty() {
             graph.cos_sin(&turn.sum, 2 * turn.pi12)
@@ -117,20 +117,20 @@ impl Moments {
     }
 
     /// What a link carries, as its parent sees it.
-    fn to_parent(self, graph: &mut Graph, style: Style, link: &Link) -> Self {
+    fn to_parent(self, graph: &mut Graph, style: RecursionStyle, link: &TreeLink) -> Self {
         let (across, along) = style.split_position(link);
-        let mut moments = self.moved(graph, &[Graph::ZERO, Graph::ZERO, along]);
+        let mut moments = self.shift_origin(graph, &[Graph::ZERO, Graph::ZERO, along]);
         for turn in link.pre.iter().chain([&link.joint]).rev() {
-            moments = moments.turned(graph, turn);
+            moments = moments.rotate(graph, turn);
         }
-        moments.moved(graph, &across)
+        moments.shift_origin(graph, &across)
     }
 
     /// The wrench that turns the body about z with acceleration 1.
-    fn turning(&self, graph: &mut Graph) -> Wrench {
+    fn rotation_wrench(&self, graph: &mut Graph) -> SymbolicWrench {
         let [x, y, _] = self.first;
         let [yz, xz, _] = self.mixed;
-        Wrench {
+        SymbolicWrench {
             force: [graph.neg(y), x, Graph::ZERO],
             moment: [
                 graph.neg(xz),
@@ -141,9 +141,9 @@ impl Moments {
     }
 
     /// The wrench that slides it along z with acceleration 1.
-    fn sliding(&self, graph: &mut Graph) -> Wrench {
+    fn translation_wrench(&self, graph: &mut Graph) -> SymbolicWrench {
         let [x, y, _] = self.first;
-        Wrench {
+        SymbolicWrench {
             force: [Graph::ZERO, Graph::ZERO, self.mass],
             moment: [y, graph.neg(x), Graph::ZERO],
         }
@@ -153,15 +153,15 @@ impl Moments {
 /// Mass matrix of the open tree by its coordinates, by rows.
 pub(crate) fn mass_matrix(
     graph: &mut Graph,
-    tree: &Tree,
-    style: Style,
+    tree: &KinematicTree,
+    style: RecursionStyle,
     n_coordinates: usize,
-    bodies: &[(usize, Body)],
+    bodies: &[(usize, BodyInertia)],
 ) -> Vec<Vec<ExprId>> {
     let n = tree.links.len();
-    let mut composite = vec![Moments::NONE; n];
+    let mut composite = vec![CompositeInertia::NONE; n];
     for (link, body) in bodies {
-        let moments = Moments::from_body(graph, body);
+        let moments = CompositeInertia::from_body(graph, body);
         composite[*link] = composite[*link].plus(graph, &moments);
     }
     for i in (0..n).rev() {
@@ -198,7 +198,7 @@ pub(crate) fn mass_matrix(
             [turns.collect(), link.slides.clone()]
         })
         .collect();
-    let depths = Depths {
+    let depths = CarryDepths {
         moments: 0,
         forces: 0,
     };
@@ -209,12 +209,12 @@ pub(crate) fn mass_matrix(
         }
         let moments = composite[m / 2];
         let wrench = if m % 2 == 0 {
-            moments.turning(graph)
+            moments.rotation_wrench(graph)
         } else {
-            moments.sliding(graph)
+            moments.translation_wrench(graph)
         };
-        let wrench = [(m / 2, Side::Moving, wrench)];
-        let column = carry(
+        let wrench = [(m / 2, JointSide::Moving, wrench)];
+        let column = carry_wrench(
             graph,
             &apart,
             style,
@@ -223,7 +223,7 @@ pub(crate) fn mass_matrix(
             wrench,
         );
         for ((_, body), on_body) in bodies_free.iter().zip(column[2 * n..].chunks(6)) {
-            for (c, entry) in on_free_body(graph, body, on_body) {
+            for (c, entry) in free_body_forces(graph, body, on_body) {
                 for (d, g) in coordinates {
                     terms[c][*d].push((entry, g.clone()));
                     terms[*d][c].push((entry, g.clone()));
@@ -247,7 +247,7 @@ pub(crate) fn mass_matrix(
         }
     }
     for (link, body) in &bodies_free {
-        for (c, d, entry) in own_block(graph, body, &composite[*link]) {
+        for (c, d, entry) in free_body_block(graph, body, &composite[*link]) {
             terms[c][d].push((entry, Rational::ONE));
             if c != d {
                 terms[d][c].push((entry, Rational::ONE));
@@ -261,14 +261,14 @@ pub(crate) fn mass_matrix(
 }
 
 /// The coordinates whose rates are a free body's twist.
-fn of_twist(body: &FreeBody) -> [usize; 6] {
+fn twist_coordinates(body: &FreeBody) -> [usize; 6] {
     let [x, y, z] = body.position;
     let [_, qx, qy, qz] = body.quaternion;
     [x, y, z, qx, qy, qz].map(|i| i.0)
 }
 
 /// Force and moment in a free body's axes by the coordinates on which they act.
-fn on_free_body(
+fn free_body_forces(
     graph: &mut Graph,
     body: &FreeBody,
     wrench: &[ExprId],
@@ -277,14 +277,14 @@ fn on_free_body(
     let moment = std::array::from_fn(|k| wrench[3 + k]);
     let force = free::from_body(graph, body, body.linear, &force);
     let moment = free::from_body(graph, body, body.angular, &moment);
-    of_twist(body)
+    twist_coordinates(body)
         .into_iter()
         .zip(force.into_iter().chain(moment))
 }
 
 /// Entries of the mass matrix by a free body's own motion: those on and above the diagonal.
-fn own_block(graph: &mut Graph, body: &FreeBody, carried: &Moments) -> Vec<(usize, usize, ExprId)> {
-    let twist = of_twist(body);
+fn free_body_block(graph: &mut Graph, body: &FreeBody, carried: &CompositeInertia) -> Vec<(usize, usize, ExprId)> {
+    let twist = twist_coordinates(body);
     let mut entries = Vec::new();
     for (k, d) in twist.into_iter().enumerate() {
         let mut along = vector::ZERO;
@@ -309,7 +309,7 @@ fn own_block(graph: &mut Graph, body: &FreeBody, carried: &Moments) -> Vec<(usiz
             (graph.cross(&along, &carried.first), moment)
         };
         let wrench = [force, moment].concat();
-        let column = on_free_body(graph, body, &wrench);
+        let column = free_body_forces(graph, body, &wrench);
         entries.extend(column.take(k + 1).map(|(c, entry)| (c, d, entry)));
     }
     entries

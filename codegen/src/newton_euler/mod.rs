@@ -14,20 +14,20 @@ mod motion;
 mod project;
 mod rows;
 
-use crate::expr::vector::{self, Turn, Vector};
+use crate::expr::vector::{self, AxisRotation, SymbolicVector};
 use crate::expr::{ExprId, Graph};
-use crate::tree::{Link, Tree};
+use crate::tree::{TreeLink, KinematicTree};
 
-pub(crate) use backward::{Depths, backward, carry};
-pub(crate) use body::{Body, Spread, flatten_along_axes, wrenches};
+pub(crate) use backward::{CarryDepths, backward_recursion, carry_wrench};
+pub(crate) use body::{BodyInertia, InertiaDiagonal, flatten_along_axes, wrenches};
 pub(crate) use composite::mass_matrix;
-pub(crate) use joints::{Load, joint_wrenches};
-pub(crate) use motion::{Motion, forward};
+pub(crate) use joints::{JointLoad, joint_wrenches};
+pub(crate) use motion::{TreeMotion, forward_recursion};
 
 /// What a link's inertia is linear in. The first moment stands twice: as the balance of forces sees it and as the
 /// balance of moments sees it; the two agree except for lumped masses that are placed apart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum Element {
+pub(crate) enum InertiaElement {
     Mass,
     ForceMoment(usize),
     MomentMoment(usize),
@@ -38,7 +38,7 @@ pub(crate) enum Element {
 /// Number of elements.
 pub(crate) const ELEMENTS: usize = 13;
 
-impl Element {
+impl InertiaElement {
     pub(crate) fn index(self) -> usize {
         match self {
             Self::Mass => 0,
@@ -50,16 +50,16 @@ impl Element {
 }
 
 /// Inertia of one link: a factor for every [`Element`].
-pub(crate) type Inertia = [ExprId; ELEMENTS];
+pub(crate) type InertiaFactors = [ExprId; ELEMENTS];
 
 /// A force and a moment about the origin of a link, in one of the link's two frames.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Wrench {
-    pub(crate) force: Vector,
-    pub(crate) moment: Vector,
+pub(crate) struct SymbolicWrench {
+    pub(crate) force: SymbolicVector,
+    pub(crate) moment: SymbolicVector,
 }
 
-impl Wrench {
+impl SymbolicWrench {
     fn has_force(&self) -> bool {
         self.force != vector::ZERO
     }
@@ -67,14 +67,14 @@ impl Wrench {
 
 /// The frame of a wrench on a link: it turns with the joint or stands on the fixed side of it. Their origins agree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Side {
+pub(crate) enum JointSide {
     Moving,
     Fixed,
 }
 
 /// How the recursions are written; all styles give the same values at different cost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Style {
+pub(crate) struct RecursionStyle {
     /// Several parallel axes are passed at once, with the sum of their angles, rather than link by link.
     pub(crate) across_parallel_axes: bool,
     /// The acceleration of points on a joint's axis is the same on both sides of it. So that column of
@@ -84,7 +84,7 @@ pub(crate) struct Style {
     pub(crate) offset_after_turn: bool,
 }
 
-impl Style {
+impl RecursionStyle {
     /// The recursion of the textbooks.
     pub(crate) const PLAIN: Self = Self {
         across_parallel_axes: false,
@@ -93,7 +93,7 @@ impl Style {
     };
 
     /// The link before whose joint vectors are turned, on the way to `link`.
-    fn first(self, tree: &Tree, link: usize) -> usize {
+    fn first_rotated_link(self, tree: &KinematicTree, link: usize) -> usize {
         if self.across_parallel_axes {
             tree.links[link].first_parallel
         } else {
@@ -102,7 +102,7 @@ impl Style {
     }
 
     /// The turn about z from the fixed side of [`Self::first`] to the link.
-    pub(crate) fn turn(self, link: &Link) -> &Turn {
+    pub(crate) fn joint_rotation(self, link: &TreeLink) -> &AxisRotation {
         if self.across_parallel_axes {
             &link.absolute
         } else {
@@ -111,7 +111,7 @@ impl Style {
     }
 
     /// A link's position in its parent's frame, but for what lies along its own axis, and that.
-    fn split_position(self, link: &Link) -> (Vector, ExprId) {
+    fn split_position(self, link: &TreeLink) -> (SymbolicVector, ExprId) {
         if self.offset_after_turn {
             (link.across, link.along)
         } else {
@@ -121,14 +121,14 @@ impl Style {
 }
 
 /// Components behind several turns of a vector given before them.
-pub(crate) fn turn_in_all(graph: &mut Graph, turns: &[Turn], v: &Vector) -> Vector {
-    turns.iter().fold(*v, |v, turn| graph.turn_in(turn, &v))
+pub(crate) fn rotate_into_inner(graph: &mut Graph, turns: &[AxisRotation], v: &SymbolicVector) -> SymbolicVector {
+    turns.iter().fold(*v, |v, turn| graph.rotate_in(turn, &v))
 }
 
 /// Components before several turns of a vector given behind them.
-fn turn_out_all(graph: &mut Graph, turns: &[Turn], v: &Vector) -> Vector {
+fn rotate_into_outer(graph: &mut Graph, turns: &[AxisRotation], v: &SymbolicVector) -> SymbolicVector {
     turns
         .iter()
         .rev()
-        .fold(*v, |v, turn| graph.turn_out(turn, &v))
+        .fold(*v, |v, turn| graph.rotate_out(turn, &v))
 }

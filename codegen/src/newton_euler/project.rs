@@ -2,27 +2,27 @@
 //! joint i and a point on it (virtual power). Axes through one point share the moment about it, and axes and points are
 //! shared by all wrenches that are projected in the same frame.
 
-use super::rows::{ForceRows, back_along_axis};
-use super::{Style, Wrench, turn_in_all};
-use crate::expr::vector::{self, Vector};
+use super::rows::{ForceRows, moment_before_axis_offset};
+use super::{RecursionStyle, SymbolicWrench, rotate_into_inner};
+use crate::expr::vector::{self, SymbolicVector};
 use crate::expr::{ExprId, Graph};
-use crate::tree::Tree;
+use crate::tree::KinematicTree;
 
 /// Leaves the forces of a wrench at all joints above `at`.
-pub(super) fn project(
+pub(super) fn project_on_joints(
     graph: &mut Graph,
-    tree: &Tree,
-    style: Style,
+    tree: &KinematicTree,
+    style: RecursionStyle,
     at: usize,
-    wrench: &Wrench,
+    wrench: &SymbolicWrench,
     rows: &mut ForceRows,
 ) {
-    let path = tree.path(Some(at));
+    let path = tree.path_to(Some(at));
     let Some((_, above)) = path.split_last() else {
         return;
     };
-    let moment = back_along_axis(graph, style, &tree.links[at], wrench);
-    let points = points(graph, tree, &path);
+    let moment = moment_before_axis_offset(graph, style, &tree.links[at], wrench);
+    let points = axis_points(graph, tree, &path);
     let mut rest = above;
     while let Some(last) = rest.last() {
         let n = rest
@@ -33,13 +33,13 @@ pub(super) fn project(
         let (further, group) = rest.split_at(rest.len() - n);
         rest = further;
         let arm = if wrench.has_force() {
-            arm(graph, tree, style, *last, points[*last].along, &path)
+            lever_arm(graph, tree, style, *last, points[*last].along, &path)
         } else {
             vector::ZERO
         };
-        let axes: Vec<Vector> = group
+        let axes: Vec<SymbolicVector> = group
             .iter()
-            .map(|i| direction(graph, tree, style, *i, at))
+            .map(|i| axis_direction(graph, tree, style, *i, at))
             .collect();
         // One axis alone: the screw's two halves; several: the moment about their point.
         let shared = (group.len() > 1).then(|| {
@@ -62,14 +62,14 @@ pub(super) fn project(
             } else {
                 graph.dot(axis, &wrench.force)
             };
-            rows.leave(link, about, along);
+            rows.add_joint_force(link, about, along);
         }
     }
 }
 
 /// A point on a joint's axis.
 #[derive(Clone, Copy)]
-struct Point {
+struct AxisPoint {
     /// Axes with the same number go through the same point.
     group: usize,
     /// Where it lies on the axis, from the link's origin.
@@ -77,9 +77,9 @@ struct Point {
 }
 
 /// A point for every joint on a path, by link; neighbouring axes that meet share one.
-fn points(graph: &mut Graph, tree: &Tree, path: &[usize]) -> Vec<Point> {
+fn axis_points(graph: &mut Graph, tree: &KinematicTree, path: &[usize]) -> Vec<AxisPoint> {
     let mut points = vec![
-        Point {
+        AxisPoint {
             group: 0,
             along: Graph::ZERO
         };
@@ -105,7 +105,7 @@ fn points(graph: &mut Graph, tree: &Tree, path: &[usize]) -> Vec<Point> {
         match meets {
             Some((above, at, along)) => {
                 points[above].along = at;
-                points[*i] = Point {
+                points[*i] = AxisPoint {
                     group: points[above].group,
                     along,
                 };
@@ -118,34 +118,34 @@ fn points(graph: &mut Graph, tree: &Tree, path: &[usize]) -> Vec<Point> {
 }
 
 /// Direction of a joint's axis in the frame of a link below it.
-fn direction(graph: &mut Graph, tree: &Tree, style: Style, joint: usize, at: usize) -> Vector {
+fn axis_direction(graph: &mut Graph, tree: &KinematicTree, style: RecursionStyle, joint: usize, at: usize) -> SymbolicVector {
     let z = [Graph::ZERO, Graph::ZERO, Graph::ONE];
     if joint == at {
         return z;
     }
-    let first = style.first(tree, at);
+    let first = style.first_rotated_link(tree, at);
     // Parallel axes are the same in the frames of all of them.
-    if style.first(tree, joint) == first {
+    if style.first_rotated_link(tree, joint) == first {
         return z;
     }
     let Some(parent) = tree.links[first].parent else {
         return z;
     };
-    let above = direction(graph, tree, style, joint, parent);
-    let fixed = turn_in_all(graph, &tree.links[first].pre, &above);
-    graph.turn_in(style.turn(&tree.links[at]), &fixed)
+    let above = axis_direction(graph, tree, style, joint, parent);
+    let fixed = rotate_into_inner(graph, &tree.links[first].pre, &above);
+    graph.rotate_in(style.joint_rotation(&tree.links[at]), &fixed)
 }
 
 /// From a point on the axis of `joint`, given by its place along it, to the point of the last link of `path` that is
 /// reached before its offset along its own axis, in that link's frame.
-fn arm(
+fn lever_arm(
     graph: &mut Graph,
-    tree: &Tree,
-    style: Style,
+    tree: &KinematicTree,
+    style: RecursionStyle,
     joint: usize,
     along: ExprId,
     path: &[usize],
-) -> Vector {
+) -> SymbolicVector {
     let start = path.iter().position(|i| *i == joint).unwrap_or(0);
     // On the fixed side of the first of parallel joints; turned on only where these end.
     let mut v = [Graph::ZERO, Graph::ZERO, graph.neg(along)];
@@ -153,13 +153,13 @@ fn arm(
     for i in &path[start + 1..] {
         let link = &tree.links[*i];
         let (across, own) = style.split_position(link);
-        let turn = style.turn(&tree.links[above]).clone();
-        if style.first(tree, *i) == *i {
-            v = graph.turn_in(&turn, &v);
+        let turn = style.joint_rotation(&tree.links[above]).clone();
+        if style.first_rotated_link(tree, *i) == *i {
+            v = graph.rotate_in(&turn, &v);
             v = graph.add_vectors(&[v, across]);
-            v = turn_in_all(graph, &link.pre, &v);
+            v = rotate_into_inner(graph, &link.pre, &v);
         } else {
-            let across = graph.turn_out(&turn, &across);
+            let across = graph.rotate_out(&turn, &across);
             v = graph.add_vectors(&[v, across]);
         }
         if Some(i) != path.last() {
@@ -167,5 +167,5 @@ fn arm(
         }
         above = *i;
     }
-    graph.turn_in(style.turn(&tree.links[above]), &v)
+    graph.rotate_in(style.joint_rotation(&tree.links[above]), &v)
 }

@@ -2,10 +2,10 @@
 
 use modelmill_spec::FreeBody;
 
-use super::{Style, Wrench};
-use crate::expr::vector::Vector;
+use super::{RecursionStyle, SymbolicWrench};
+use crate::expr::vector::SymbolicVector;
 use crate::expr::{ExprId, Graph, Rational};
-use crate::tree::{Link, free};
+use crate::tree::{TreeLink, free};
 
 /// Generalised forces of the coordinates, as terms that are still to be added.
 pub(super) struct ForceRows(Vec<Vec<(ExprId, Rational)>>);
@@ -16,7 +16,7 @@ impl ForceRows {
     }
 
     /// Leaves a moment about a link's axis and a force along it.
-    pub(super) fn leave(&mut self, link: &Link, moment: ExprId, force: ExprId) {
+    pub(super) fn add_joint_force(&mut self, link: &TreeLink, moment: ExprId, force: ExprId) {
         for (coordinate, n) in &link.turns {
             self.0[*coordinate].push((moment, Rational::integer(i64::from(*n))));
         }
@@ -26,7 +26,7 @@ impl ForceRows {
     }
 
     /// Leaves the wrench on a free body, in its axes and about its origin.
-    pub(super) fn leave_free(&mut self, graph: &mut Graph, body: &FreeBody, wrench: &Wrench) {
+    pub(super) fn add_free_body_wrench(&mut self, graph: &mut Graph, body: &FreeBody, wrench: &SymbolicWrench) {
         let force = free::from_body(graph, body, body.linear, &wrench.force);
         let moment = free::from_body(graph, body, body.angular, &wrench.moment);
         let [_, qx, qy, qz] = body.quaternion;
@@ -36,15 +36,15 @@ impl ForceRows {
         }
     }
 
-    pub(super) fn sums(self, graph: &mut Graph) -> Vec<ExprId> {
+    pub(super) fn sum_rows(self, graph: &mut Graph) -> Vec<ExprId> {
         self.0.into_iter().map(|terms| graph.sum(&terms)).collect()
     }
 }
 
-pub(super) fn join(graph: &mut Graph, total: &mut Option<Wrench>, wrench: Wrench) {
+pub(super) fn add_wrench(graph: &mut Graph, total: &mut Option<SymbolicWrench>, wrench: SymbolicWrench) {
     *total = Some(match *total {
         None => wrench,
-        Some(there) => Wrench {
+        Some(there) => SymbolicWrench {
             force: graph.add_vectors(&[there.force, wrench.force]),
             moment: graph.add_vectors(&[there.moment, wrench.moment]),
         },
@@ -52,12 +52,12 @@ pub(super) fn join(graph: &mut Graph, total: &mut Option<Wrench>, wrench: Wrench
 }
 
 /// The moment about the point on a link's axis that its position leads to across the axis.
-pub(super) fn back_along_axis(
+pub(super) fn moment_before_axis_offset(
     graph: &mut Graph,
-    style: Style,
-    link: &Link,
-    wrench: &Wrench,
-) -> Vector {
+    style: RecursionStyle,
+    link: &TreeLink,
+    wrench: &SymbolicWrench,
+) -> SymbolicVector {
     let (_, along) = style.split_position(link);
     let [mx, my, mz] = wrench.moment;
     let (x, y) = (

@@ -12,30 +12,30 @@ use modelmill_spec::Mechanism;
 use crate::Derivation;
 use crate::DeriveError;
 use crate::expr::{Atom, ExprId, Graph, Node};
-use crate::lower::Program;
+use crate::lower::StraightLineProgram;
 use crate::lower::cost::cost;
-use crate::newton_euler::{self, Body, Element, Style};
-use crate::programs::base_atoms;
+use crate::newton_euler::{self, BodyInertia, InertiaElement, RecursionStyle};
+use crate::programs::base_parameter_atoms;
 use crate::programs::cheapest;
-use crate::programs::closing::Closing;
-use crate::regressor::Equations;
-use crate::regressor::form::{Frames, TotalForm};
-use crate::tree::expressions::Monomial;
+use crate::programs::closing::PassiveClosure;
+use crate::regressor::UnreducedEquations;
+use crate::regressor::form::{RecursionFrames, TotalForm};
+use crate::tree::expressions::ParameterMonomial;
 
 /// Straight-line programs of the equation of motion in the independent coordinates, for given p_min.
 #[derive(Clone, Debug)]
-pub struct Dynamics {
+pub struct DynamicsPrograms {
     /// M: a row and a column for every independent coordinate, row by row. Those of a quaternion's scalar part, which has no
     /// rate, hold a one on the diagonal and nothing else.
-    pub mass_matrix: Program,
+    pub mass_matrix: StraightLineProgram,
     /// c, what rates alone ask for: centrifugal and Coriolis forces.
-    pub coriolis: Program,
+    pub coriolis: StraightLineProgram,
     /// g: what weight alone asks for.
-    pub gravity: Program,
+    pub gravity: StraightLineProgram,
     /// e: what effects ask for where nothing accelerates, such as friction and springs.
-    pub effects: Program,
+    pub effects: StraightLineProgram,
     /// `c + g + e`, at a lower cost than apart, and then J: a row per drive, row by row.
-    pub bias: Program,
+    pub bias: StraightLineProgram,
 }
 
 impl Derivation {
@@ -43,10 +43,10 @@ impl Derivation {
     ///
     /// # Errors
     /// A mechanism with an effect that is not affine in the accelerations.
-    pub fn dynamics(&self) -> Result<Dynamics, DeriveError> {
+    pub fn dynamics(&self) -> Result<DynamicsPrograms, DeriveError> {
         let mut graph = self.graph.clone();
-        let base = base_atoms(&mut graph, &self.reduction);
-        let value = |m: &Monomial| base.get(m).copied().unwrap_or(Graph::ZERO);
+        let base = base_parameter_atoms(&mut graph, &self.reduction);
+        let value = |m: &ParameterMonomial| base.get(m).copied().unwrap_or(Graph::ZERO);
         dynamics(
             &mut graph,
             &self.mechanism,
@@ -60,10 +60,10 @@ impl Derivation {
 fn dynamics(
     graph: &mut Graph,
     mechanism: &Mechanism,
-    equations: &Equations,
-    closing: &Closing,
-    value: &dyn Fn(&Monomial) -> ExprId,
-) -> Result<Dynamics, DeriveError> {
+    equations: &UnreducedEquations,
+    closing: &PassiveClosure,
+    value: &dyn Fn(&ParameterMonomial) -> ExprId,
+) -> Result<DynamicsPrograms, DeriveError> {
     let projection = &equations.projection;
     let n = mechanism.coordinates.len();
     let still: Vec<ExprId> = (0..n).map(|i| graph.atom(Atom::Acceleration(i))).collect();
@@ -80,17 +80,17 @@ fn dynamics(
         at_rest.insert(graph.atom(Atom::Rate(i)), Graph::ZERO);
     }
 
-    check_affine(graph, mechanism, equations)?;
+    check_affine_in_accelerations(graph, mechanism, equations)?;
     let weight = equations.gravity;
     let none = crate::expr::vector::ZERO;
     let effects = equations.effect_forces(graph, mechanism, value)?;
-    let effects = equations.on_active(graph, &effects.on_tree, &effects.on_drives);
+    let effects = equations.project_on_active(graph, &effects.on_tree, &effects.on_drives);
     let bodies = |graph: &mut Graph,
-                  gravity: crate::expr::vector::Vector,
+                  gravity: crate::expr::vector::SymbolicVector,
                   frozen: &BTreeMap<ExprId, ExprId>,
                   more: &[ExprId]| {
         let weigh = |graph: &mut Graph, outputs: &[ExprId]| {
-            closing.weight(graph, equations, outputs, frozen)
+            closing.program_cost(graph, equations, outputs, frozen)
         };
         cheapest::best_total(
             graph,
@@ -100,7 +100,7 @@ fn dynamics(
             value,
             &weigh,
             |graph, on_tree| {
-                let outputs = equations.on_active(graph, on_tree, &[]);
+                let outputs = equations.project_on_active(graph, on_tree, &[]);
                 let outputs: Vec<ExprId> = outputs
                     .into_iter()
                     .enumerate()
@@ -118,7 +118,7 @@ fn dynamics(
     let mut program = |outputs: &[ExprId], frozen: &BTreeMap<ExprId, ExprId>| {
         closing.program_at(graph, equations, outputs, frozen)
     };
-    Ok(Dynamics {
+    Ok(DynamicsPrograms {
         mass_matrix: program(&mass_matrix, &unaccelerated),
         coriolis: program(&coriolis, &unaccelerated),
         gravity: program(&gravity, &at_rest),
@@ -128,13 +128,13 @@ fn dynamics(
 }
 
 /// Refuses effects whose force is not affine in the accelerations.
-fn check_affine(
+fn check_affine_in_accelerations(
     graph: &mut Graph,
     mechanism: &Mechanism,
-    equations: &Equations,
+    equations: &UnreducedEquations,
 ) -> Result<(), DeriveError> {
     for effect in &mechanism.effects {
-        let only = |m: &Monomial| {
+        let only = |m: &ParameterMonomial| {
             let of_effect = |t: &modelmill_spec::EffectTerm| m.0 == [(t.parameter.0, 1)];
             if effect.terms.iter().any(of_effect) {
                 Graph::ONE
@@ -190,8 +190,8 @@ fn degree_in_accelerations(graph: &Graph, roots: &[ExprId]) -> usize {
 fn mass_matrix(
     graph: &mut Graph,
     mechanism: &Mechanism,
-    equations: &Equations,
-    value: &dyn Fn(&Monomial) -> ExprId,
+    equations: &UnreducedEquations,
+    value: &dyn Fn(&ParameterMonomial) -> ExprId,
     effects: &[ExprId],
 ) -> Vec<ExprId> {
     let projection = &equations.projection;
@@ -221,29 +221,29 @@ fn mass_matrix(
             .collect();
         graph.add_all(&terms)
     };
-    let inertia = equations.inertia.total(graph, value);
+    let inertia = equations.inertia.total_inertias(graph, value);
     let is_symmetric = inertia.values().all(|inertia| {
         (0..3).all(|i| {
-            inertia[Element::ForceMoment(i).index()] == inertia[Element::MomentMoment(i).index()]
+            inertia[InertiaElement::ForceMoment(i).index()] == inertia[InertiaElement::MomentMoment(i).index()]
         })
     });
     let mut matrix = vec![vec![Graph::ZERO; n_active]; n_active];
     if is_symmetric {
-        let bodies: Vec<(usize, Body)> = inertia
+        let bodies: Vec<(usize, BodyInertia)> = inertia
             .iter()
-            .map(|(link, inertia)| (*link, Body::new(inertia)))
+            .map(|(link, inertia)| (*link, BodyInertia::new(inertia)))
             .collect();
-        let style = Style {
+        let style = RecursionStyle {
             offset_after_turn: true,
-            ..Style::PLAIN
+            ..RecursionStyle::PLAIN
         };
         let mut least = usize::MAX;
         for fixed_axes in [false, true] {
             let gravity = &crate::expr::vector::ZERO;
-            let frames = Frames::new(graph, &equations.tree, gravity, style, fixed_axes);
-            let bodies: Vec<(usize, Body)> = bodies
+            let frames = RecursionFrames::new(graph, &equations.tree, gravity, style, fixed_axes);
+            let bodies: Vec<(usize, BodyInertia)> = bodies
                 .iter()
-                .map(|(link, body)| (*link, frames.turned(graph, *link, body)))
+                .map(|(link, body)| (*link, frames.rotate_body(graph, *link, body)))
                 .collect();
             let of_tree = newton_euler::mass_matrix(graph, &frames.tree, style, n, &bodies);
             let mut found = vec![vec![Graph::ZERO; n_active]; n_active];
@@ -268,10 +268,10 @@ fn mass_matrix(
     if !is_symmetric {
         let form = TotalForm::PLAIN;
         let tree = &equations.tree;
-        let frames = Frames::new(graph, tree, &crate::expr::vector::ZERO, form.style, false);
+        let frames = RecursionFrames::new(graph, tree, &crate::expr::vector::ZERO, form.style, false);
         let wrenches = form.wrenches(graph, &equations.inertia, &equations.tree, &frames, value);
-        let on_tree = newton_euler::backward(graph, tree, form.style, n, wrenches);
-        let bodies = equations.on_active(graph, &on_tree, &[]);
+        let on_tree = newton_euler::backward_recursion(graph, tree, form.style, n, wrenches);
+        let bodies = equations.project_on_active(graph, &on_tree, &[]);
         forces = forces
             .iter()
             .zip(bodies)

@@ -5,9 +5,9 @@ use std::collections::BTreeMap;
 use modelmill_spec::Mechanism;
 
 use crate::expr::{Atom, ExprId, Graph};
-use crate::lower::{OperationCount, Stage};
+use crate::lower::{OperationCount, ProgramStage};
 use crate::programs::cheapest;
-use crate::tree::expressions::Monomial;
+use crate::tree::expressions::ParameterMonomial;
 use crate::{Derivation, DeriveError, lower};
 
 /// Operations per state after a pass and all before it.
@@ -38,7 +38,7 @@ impl Derivation {
         let lowering = lowering
             .map(|(last, used)| (lower::PASSES[last].name, all_forms, &lower::PASSES[used]));
         for (pass, of_forms, of_lowering) in forms.chain(lowering) {
-            let [inverse_dynamics, regressor] = counted(self, of_forms, of_lowering)?;
+            let [inverse_dynamics, regressor] = count_operations(self, of_forms, of_lowering)?;
             counts.push(PassCount {
                 pass,
                 inverse_dynamics,
@@ -50,35 +50,35 @@ impl Derivation {
 }
 
 /// Operations of inverse dynamics and base regressor with so many passes of the recursions and these of lowering.
-fn counted(
+fn count_operations(
     derivation: &Derivation,
     of_forms: usize,
-    of_lowering: &'static [lower::Pass],
+    of_lowering: &'static [lower::LoweringPass],
 ) -> Result<[OperationCount; 2], DeriveError> {
     let mut graph = derivation.graph.clone();
     let (graph, mechanism): (&mut Graph, &Mechanism) = (&mut graph, &derivation.mechanism);
     let (equations, reduction) = (&derivation.equations, &derivation.reduction);
     let mut closing = derivation.closing.clone();
     closing.limit_passes(of_lowering);
-    let retained: Vec<Monomial> = reduction
+    let retained: Vec<ParameterMonomial> = reduction
         .retained
         .iter()
         .map(|k| reduction.products[*k].clone())
         .collect();
-    let base: BTreeMap<Monomial, ExprId> = retained
+    let base: BTreeMap<ParameterMonomial, ExprId> = retained
         .iter()
         .enumerate()
         .map(|(k, m)| (m.clone(), graph.atom(Atom::Base(k))))
         .collect();
-    let value = |m: &Monomial| base.get(m).copied().unwrap_or(Graph::ZERO);
+    let value = |m: &ParameterMonomial| base.get(m).copied().unwrap_or(Graph::ZERO);
     let nothing = BTreeMap::new();
     let weigh =
-        |graph: &mut Graph, outputs: &[ExprId]| closing.weight(graph, equations, outputs, &nothing);
-    let forces = cheapest::total(graph, mechanism, equations, &value, of_forms, &weigh)?;
-    let columns = cheapest::columns(graph, mechanism, equations, &retained, of_forms, &weigh)?;
+        |graph: &mut Graph, outputs: &[ExprId]| closing.program_cost(graph, equations, outputs, &nothing);
+    let forces = cheapest::cheapest_total(graph, mechanism, equations, &value, of_forms, &weigh)?;
+    let columns = cheapest::cheapest_columns(graph, mechanism, equations, &retained, of_forms, &weigh)?;
     let regressor: Vec<ExprId> = columns.into_iter().flatten().collect();
     Ok([forces, regressor].map(|outputs| {
         let program = closing.program(graph, equations, &outputs);
-        program.count(Stage::State)
+        program.count_operations(ProgramStage::State)
     }))
 }

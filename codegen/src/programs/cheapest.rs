@@ -8,29 +8,29 @@ use modelmill_spec::Mechanism;
 use crate::DeriveError;
 use crate::expr::vector;
 use crate::expr::{ExprId, Graph};
-use crate::newton_euler::{self, Depths, Style};
-use crate::regressor::Equations;
-use crate::regressor::form::{ColumnForm, Frames, TotalForm};
-use crate::tree::Tree;
-use crate::tree::expressions::Monomial;
+use crate::newton_euler::{self, CarryDepths, RecursionStyle};
+use crate::regressor::UnreducedEquations;
+use crate::regressor::form::{ColumnForm, RecursionFrames, TotalForm};
+use crate::tree::KinematicTree;
+use crate::tree::expressions::ParameterMonomial;
 
 /// A change of a form.
-type Change<F> = Box<dyn Fn(F) -> F>;
+type FormChange<F> = Box<dyn Fn(F) -> F>;
 /// Families of changes.
-type Pass<F> = Vec<Vec<Change<F>>>;
+type ChangeFamilies<F> = Vec<Vec<FormChange<F>>>;
 
 /// What outputs cost.
-pub(crate) type Weigh<'a> = &'a dyn Fn(&mut Graph, &[ExprId]) -> usize;
+pub(crate) type CostFunction<'a> = &'a dyn Fn(&mut Graph, &[ExprId]) -> usize;
 
 /// Ways to write equations, one step after the other; a step that does not make them cheaper is taken back.
 ///
 /// `write` gives the outputs of a form; `steps` holds for every pass the families of changes that it tries on the
 /// best form before it; the changes of a family go one way, and once they make it worse the rest is not tried.
-fn improve<F: Copy>(
+fn search_cheapest_form<F: Copy>(
     graph: &mut Graph,
     plain: F,
-    steps: &[Pass<F>],
-    weigh: Weigh<'_>,
+    steps: &[ChangeFamilies<F>],
+    weigh: CostFunction<'_>,
     mut write: impl FnMut(&mut Graph, F) -> Result<Vec<ExprId>, DeriveError>,
 ) -> Result<Vec<ExprId>, DeriveError> {
     let (mut form, mut best) = (plain, write(graph, plain)?);
@@ -62,19 +62,19 @@ fn improve<F: Copy>(
 
 /// The frames that have been written already.
 #[derive(Default)]
-struct Written(Vec<((Style, bool), Frames)>);
+struct FrameCache(Vec<((RecursionStyle, bool), RecursionFrames)>);
 
-impl Written {
-    fn frames(
+impl FrameCache {
+    fn frames_for(
         &mut self,
         graph: &mut Graph,
-        equations: &Equations,
-        gravity: &vector::Vector,
-        key: (Style, bool),
-    ) -> &Frames {
+        equations: &UnreducedEquations,
+        gravity: &vector::SymbolicVector,
+        key: (RecursionStyle, bool),
+    ) -> &RecursionFrames {
         let at = self.0.iter().position(|(k, _)| *k == key);
         let at = at.unwrap_or_else(|| {
-            let frames = Frames::new(graph, &equations.tree, gravity, key.0, key.1);
+            let frames = RecursionFrames::new(graph, &equations.tree, gravity, key.0, key.1);
             self.0.push((key, frames));
             self.0.len() - 1
         });
@@ -92,18 +92,18 @@ pub(crate) const PASSES: [&str; 5] = [
 ];
 
 /// The columns of some products, each by its drives, in the form that costs least after the first `n_passes` passes.
-pub(crate) fn columns(
+pub(crate) fn cheapest_columns(
     graph: &mut Graph,
     mechanism: &Mechanism,
-    equations: &Equations,
-    products: &[Monomial],
+    equations: &UnreducedEquations,
+    products: &[ParameterMonomial],
     n_passes: usize,
-    weigh: Weigh<'_>,
+    weigh: CostFunction<'_>,
 ) -> Result<Vec<Vec<ExprId>>, DeriveError> {
     let tree = &equations.tree;
-    let depths = (0..tree.links.len()).map(|i| tree.path(Some(i)).len());
+    let depths = (0..tree.links.len()).map(|i| tree.path_to(Some(i)).len());
     let deepest = depths.max().unwrap_or(0);
-    let styled = |change: fn(Style) -> Style| -> ColumnChange {
+    let styled = |change: fn(RecursionStyle) -> RecursionStyle| -> ColumnChange {
         Box::new(move |form| ColumnForm {
             style: change(form.style),
             ..form
@@ -111,14 +111,14 @@ pub(crate) fn columns(
     };
     let in_fixed_axes: ColumnChange = Box::new(|form| ColumnForm {
         fixed_axes: true,
-        style: Style {
+        style: RecursionStyle {
             across_parallel_axes: false,
             ..form.style
         },
         ..form
     });
-    let [across, axis_column, offset_after_turn] = styles().map(styled);
-    let mut steps: Vec<Pass<ColumnForm>> = vec![
+    let [across, axis_column, offset_after_turn] = style_changes().map(styled);
+    let mut steps: Vec<ChangeFamilies<ColumnForm>> = vec![
         vec![vec![across], vec![in_fixed_axes]],
         vec![vec![axis_column]],
         vec![vec![offset_after_turn]],
@@ -129,14 +129,14 @@ pub(crate) fn columns(
     })]]);
     let to = |moments, forces| -> ColumnChange {
         Box::new(move |form| ColumnForm {
-            depths: Depths { moments, forces },
+            depths: CarryDepths { moments, forces },
             ..form
         })
     };
     // Frames near the base are cheap to reach and save little.
     let both = (2.max(deepest / 2)..=deepest).map(|depth| to(depth, depth));
     let moments: ColumnChange = Box::new(|form| ColumnForm {
-        depths: Depths {
+        depths: CarryDepths {
             forces: 0,
             ..form.depths
         },
@@ -147,11 +147,11 @@ pub(crate) fn columns(
         steps[0].clear();
     }
     steps.truncate(n_passes);
-    let mut written = Written::default();
+    let mut written = FrameCache::default();
     let n_drives = mechanism.drives.len();
-    let outputs = improve(graph, ColumnForm::PLAIN, &steps, weigh, |graph, form| {
+    let outputs = search_cheapest_form(graph, ColumnForm::PLAIN, &steps, weigh, |graph, form| {
         let key = (form.style, form.fixed_axes);
-        let frames = written.frames(graph, equations, &equations.gravity, key);
+        let frames = written.frames_for(graph, equations, &equations.gravity, key);
         let columns = equations.columns_of(graph, mechanism, frames, products, form)?;
         Ok(columns.into_iter().flatten().collect())
     })?;
@@ -159,20 +159,20 @@ pub(crate) fn columns(
 }
 
 /// The inverse dynamics in the form that costs least after the first `n_passes` passes.
-pub(crate) fn total(
+pub(crate) fn cheapest_total(
     graph: &mut Graph,
     mechanism: &Mechanism,
-    equations: &Equations,
-    value: &dyn Fn(&Monomial) -> ExprId,
+    equations: &UnreducedEquations,
+    value: &dyn Fn(&ParameterMonomial) -> ExprId,
     n_passes: usize,
-    weigh: Weigh<'_>,
+    weigh: CostFunction<'_>,
 ) -> Result<Vec<ExprId>, DeriveError> {
-    let mut steps = total_steps(&equations.tree);
+    let mut steps = total_form_steps(&equations.tree);
     steps.truncate(n_passes);
-    let mut written = Written::default();
-    improve(graph, TotalForm::PLAIN, &steps, weigh, |graph, form| {
+    let mut written = FrameCache::default();
+    search_cheapest_form(graph, TotalForm::PLAIN, &steps, weigh, |graph, form| {
         let key = (form.style, form.fixed_axes);
-        let frames = written.frames(graph, equations, &equations.gravity, key);
+        let frames = written.frames_for(graph, equations, &equations.gravity, key);
         equations.inverse_dynamics(graph, mechanism, frames, value, form)
     })
 }
@@ -181,40 +181,40 @@ pub(crate) fn total(
 pub(crate) fn best_total(
     graph: &mut Graph,
     mechanism: &Mechanism,
-    equations: &Equations,
-    gravity: vector::Vector,
-    value: &dyn Fn(&Monomial) -> ExprId,
-    weigh: Weigh<'_>,
+    equations: &UnreducedEquations,
+    gravity: vector::SymbolicVector,
+    value: &dyn Fn(&ParameterMonomial) -> ExprId,
+    weigh: CostFunction<'_>,
     mut finish: impl FnMut(&mut Graph, &[ExprId]) -> Vec<ExprId>,
 ) -> Result<Vec<ExprId>, DeriveError> {
     let n = mechanism.coordinates.len();
-    let mut written = Written::default();
-    improve(
+    let mut written = FrameCache::default();
+    search_cheapest_form(
         graph,
         TotalForm::PLAIN,
-        &total_steps(&equations.tree),
+        &total_form_steps(&equations.tree),
         weigh,
         |graph, form| {
             let key = (form.style, form.fixed_axes);
-            let frames = written.frames(graph, equations, &gravity, key);
+            let frames = written.frames_for(graph, equations, &gravity, key);
             let wrenches = form.wrenches(graph, &equations.inertia, &equations.tree, frames, value);
-            let on_tree = newton_euler::backward(graph, &frames.tree, form.style, n, wrenches);
+            let on_tree = newton_euler::backward_recursion(graph, &frames.tree, form.style, n, wrenches);
             Ok(finish(graph, &on_tree))
         },
     )
 }
 
-type ColumnChange = Change<ColumnForm>;
-type TotalChange = Change<TotalForm>;
+type ColumnChange = FormChange<ColumnForm>;
+type TotalChange = FormChange<TotalForm>;
 
 /// Whether there is a link whose joint is parallel to its parent's.
-fn has_parallel_axes(tree: &Tree) -> bool {
+fn has_parallel_axes(tree: &KinematicTree) -> bool {
     let mut links = tree.links.iter().enumerate();
     links.any(|(i, link)| link.first_parallel != i)
 }
 
-fn total_steps(tree: &Tree) -> Vec<Pass<TotalForm>> {
-    let styled = |change: fn(Style) -> Style| -> TotalChange {
+fn total_form_steps(tree: &KinematicTree) -> Vec<ChangeFamilies<TotalForm>> {
+    let styled = |change: fn(RecursionStyle) -> RecursionStyle| -> TotalChange {
         Box::new(move |form| TotalForm {
             style: change(form.style),
             ..form
@@ -222,14 +222,14 @@ fn total_steps(tree: &Tree) -> Vec<Pass<TotalForm>> {
     };
     let in_fixed_axes: TotalChange = Box::new(|form| TotalForm {
         fixed_axes: true,
-        style: Style {
+        style: RecursionStyle {
             across_parallel_axes: false,
             ..form.style
         },
         ..form
     });
-    let [across, axis_column, offset_after_turn] = styles().map(styled);
-    let mut steps: Vec<Pass<TotalForm>> = vec![
+    let [across, axis_column, offset_after_turn] = style_changes().map(styled);
+    let mut steps: Vec<ChangeFamilies<TotalForm>> = vec![
         vec![vec![across], vec![in_fixed_axes]],
         vec![vec![axis_column]],
         vec![vec![offset_after_turn]],
@@ -249,17 +249,17 @@ fn total_steps(tree: &Tree) -> Vec<Pass<TotalForm>> {
 }
 
 /// The changes of style, in the order of [`PASSES`]; parallel axes are passed at once only where axes turn.
-fn styles() -> [fn(Style) -> Style; 3] {
+fn style_changes() -> [fn(RecursionStyle) -> RecursionStyle; 3] {
     [
-        |style| Style {
+        |style| RecursionStyle {
             across_parallel_axes: true,
             ..style
         },
-        |style| Style {
+        |style| RecursionStyle {
             axis_column: true,
             ..style
         },
-        |style| Style {
+        |style| RecursionStyle {
             offset_after_turn: true,
             ..style
         },

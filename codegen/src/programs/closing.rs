@@ -6,43 +6,43 @@ use std::collections::BTreeMap;
 use modelmill_spec::Mechanism;
 
 use crate::DeriveError;
-use crate::expr::{AngleSum, Atom, ExprId, Graph, Node, nominal_value};
-use crate::loops::branches::closed_form;
-use crate::loops::magnitude::{self, Size};
-use crate::loops::solve_step::Plan;
-use crate::loops::solved::{times, turn};
+use crate::expr::{AtomAngleSum, Atom, ExprId, Graph, Node, nominal_value};
+use crate::loops::branches::closed_form_plan;
+use crate::loops::magnitude::{self, LoopSize};
+use crate::loops::solve_step::LoopPlan;
+use crate::loops::solved::{multiply_angle, rotate_vector};
 use crate::lower::SINGULAR;
 use crate::lower::cost::cost;
-use crate::lower::{By, Definition, PASSES, Pass, Program, Request, lower_by};
-use crate::regressor::Equations;
+use crate::lower::{AtomRule, AtomDefinition, PASSES, LoweringPass, StraightLineProgram, LoweringRequest, lower_with_passes};
+use crate::regressor::UnreducedEquations;
 use crate::tree::checks;
 
 /// Puts the passive coordinates' closed form, rates and accelerations in place.
 #[derive(Clone)]
-pub(crate) struct Closing {
+pub(crate) struct PassiveClosure {
     /// The order in which the loops are solved, if they have closed forms.
-    plan: Option<Plan>,
+    plan: Option<LoopPlan>,
     /// How passive angles are computed, where their values are asked for or follow others.
-    definitions: Vec<Definition>,
+    definitions: Vec<AtomDefinition>,
     reachable: Vec<ExprId>,
     /// Nodes replaced by the position's closed form.
     position: BTreeMap<ExprId, ExprId>,
     /// Sums of angles whose cosine and sine are known, and what every passive angle is made of.
     solved: Vec<[ExprId; 2]>,
-    angle_of: BTreeMap<usize, AngleParts>,
+    angle_of: BTreeMap<usize, ResolvedAngle>,
     /// Determinants, with the magnitudes of their terms.
     regular: Vec<(ExprId, ExprId)>,
-    size: Size,
+    size: LoopSize,
     /// Whether effects may have no finite value at some states.
     may_be_undefined: bool,
     /// The passes of lowering that are used.
-    passes: &'static [Pass],
+    passes: &'static [LoweringPass],
 }
 
 /// An angle as a sum of known angles, a multiple of pi/12, and solved angles by position.
 #[derive(Clone, Debug, Default)]
-struct AngleParts {
-    known: AngleSum,
+struct ResolvedAngle {
+    known: AtomAngleSum,
     pi12: i32,
     solved: Vec<(usize, i32)>,
 }
@@ -56,33 +56,33 @@ fn quarter_turns(angle: f64) -> i32 {
     quarters
 }
 
-impl Closing {
+impl PassiveClosure {
     pub(crate) fn new(
         graph: &mut Graph,
         mechanism: &Mechanism,
-        equations: &Equations,
+        equations: &UnreducedEquations,
     ) -> Result<Self, DeriveError> {
         let mut closing = Self {
-            plan: closed_form(graph, mechanism, &equations.projection.loops),
+            plan: closed_form_plan(graph, mechanism, &equations.projection.loops),
             definitions: Vec::new(),
             reachable: Vec::new(),
             position: BTreeMap::new(),
             solved: Vec::new(),
             angle_of: BTreeMap::new(),
             regular: Vec::new(),
-            size: Size::from_residual(graph, mechanism, &equations.projection.loops.residual),
+            size: LoopSize::from_residual(graph, mechanism, &equations.projection.loops.residual),
             may_be_undefined: checks::may_be_undefined(mechanism),
             passes: &PASSES,
         };
         for id in &equations.projection.determinants {
-            let limit = SINGULAR * magnitude::at_nominal(graph, mechanism, &[*id]);
+            let limit = SINGULAR * magnitude::nominal_magnitude(graph, mechanism, &[*id]);
             let is_small = |value: f64| value.abs() <= limit;
             if nominal_value(graph, mechanism, *id).is_some_and(is_small)
-                && magnitude::digits_left(graph, mechanism, *id).is_none_or(|left| left <= SINGULAR)
+                && magnitude::significant_digits(graph, mechanism, *id).is_none_or(|left| left <= SINGULAR)
             {
                 return Err(DeriveError::SingularNominal);
             }
-            let size = closing.size.of_determinant(graph, mechanism, *id, SINGULAR);
+            let size = closing.size.determinant_magnitude(graph, mechanism, *id, SINGULAR);
             closing.regular.push((*id, size));
         }
         let Some(plan) = closing.plan.clone() else {
@@ -103,8 +103,8 @@ impl Closing {
             for ((coordinate, _), value) in step.solved.values.iter().zip(&closed[2 * n_angles..]) {
                 let atom = Atom::Coordinate(*coordinate);
                 if mechanism.coordinates[*coordinate].motion.is_angle() {
-                    let by = By::Value(*value);
-                    closing.definitions.push(Definition { atom, by });
+                    let by = AtomRule::Value(*value);
+                    closing.definitions.push(AtomDefinition { atom, rule: by });
                 } else {
                     closing.position.insert(graph.atom(atom), *value);
                 }
@@ -112,15 +112,15 @@ impl Closing {
             closing
                 .reachable
                 .extend(step.solved.root.iter().map(|_| closed[closed.len() - 1]));
-            let angles: Vec<AngleSum> = step
+            let angles: Vec<AtomAngleSum> = step
                 .solved
                 .angles
                 .iter()
                 .map(|(angle, _)| angle.clone())
                 .collect();
-            closing.resolve(step.unknown.clone(), &angles, first);
+            closing.resolve_angles(step.unknown.clone(), &angles, first);
             for relation in &step.solved.relations {
-                let parts = closing.split(&relation.sum, relation.pi12);
+                let parts = closing.resolve_sum(&relation.sum, relation.pi12);
                 closing.angle_of.insert(relation.coordinate, parts);
             }
         }
@@ -138,13 +138,13 @@ impl Closing {
                 if closing.definitions.iter().any(|d| d.atom == atom) {
                     continue;
                 }
-                let [cosine, sine] = closing.cos_sin(graph, &AngleSum::new([(atom, 1)]));
+                let [cosine, sine] = closing.cos_sin(graph, &AtomAngleSum::new([(atom, 1)]));
                 let quarters = quarter_turns(mechanism.coordinates[*p].nominal);
-                let back = graph.cos_sin(&AngleSum::NONE, -6 * quarters);
-                let [cosine, sine] = turn(graph, [back.0, back.1], [cosine, sine]);
-                closing.definitions.push(Definition {
+                let back = graph.cos_sin(&AtomAngleSum::NONE, -6 * quarters);
+                let [cosine, sine] = rotate_vector(graph, [back.0, back.1], [cosine, sine]);
+                closing.definitions.push(AtomDefinition {
                     atom,
-                    by: By::Turn {
+                    rule: AtomRule::Turn {
                         quarters,
                         sine,
                         cosine,
@@ -156,27 +156,27 @@ impl Closing {
     }
 
     /// Guards further determinants.
-    pub(crate) fn guard(&mut self, graph: &mut Graph, mechanism: &Mechanism, more: &[ExprId]) {
+    pub(crate) fn add_guards(&mut self, graph: &mut Graph, mechanism: &Mechanism, more: &[ExprId]) {
         for id in more {
             if self.regular.iter().all(|(known, _)| known != id) {
-                let size = self.size.of_determinant(graph, mechanism, *id, SINGULAR);
+                let size = self.size.determinant_magnitude(graph, mechanism, *id, SINGULAR);
                 self.regular.push((*id, size));
             }
         }
     }
 
     /// Uses some passes of lowering only, to see what the others do.
-    pub(crate) fn limit_passes(&mut self, passes: &'static [Pass]) {
+    pub(crate) fn limit_passes(&mut self, passes: &'static [LoweringPass]) {
         self.passes = passes;
     }
 
     /// How every loop is solved in closed form, if all of them are.
-    pub(crate) fn plan(&self) -> Option<&Plan> {
+    pub(crate) fn plan(&self) -> Option<&LoopPlan> {
         self.plan.as_ref()
     }
 
     /// Writes every unknown angle as a sum of solved angles and known coordinates.
-    fn resolve(&mut self, mut unknown: Vec<usize>, angles: &[AngleSum], first: usize) {
+    fn resolve_angles(&mut self, mut unknown: Vec<usize>, angles: &[AtomAngleSum], first: usize) {
         let mut progress = true;
         while progress {
             progress = false;
@@ -190,9 +190,9 @@ impl Closing {
                     continue;
                 };
                 // q = sign * (solved - rest)
-                let rest = self.split(&angle.plus(&AngleSum::new([(*atom, *sign)]), -1), 0);
-                let mut parts = AngleParts {
-                    known: AngleSum::NONE.plus(&rest.known, -sign),
+                let rest = self.resolve_sum(&angle.plus(&AtomAngleSum::new([(*atom, *sign)]), -1), 0);
+                let mut parts = ResolvedAngle {
+                    known: AtomAngleSum::NONE.plus(&rest.known, -sign),
                     pi12: -sign * rest.pi12,
                     solved: rest
                         .solved
@@ -209,8 +209,8 @@ impl Closing {
     }
 
     /// A sum of angles with its passive coordinates put by what they are made of.
-    fn split(&self, sum: &AngleSum, pi12: i32) -> AngleParts {
-        let mut known = AngleSum::NONE;
+    fn resolve_sum(&self, sum: &AtomAngleSum, pi12: i32) -> ResolvedAngle {
+        let mut known = AtomAngleSum::NONE;
         let mut pi12 = pi12;
         let mut solved: BTreeMap<usize, i32> = BTreeMap::new();
         for (atom, n) in sum.terms() {
@@ -223,10 +223,10 @@ impl Closing {
                         *solved.entry(*piece).or_insert(0) += m * n;
                     }
                 }
-                _ => known = known.plus(&AngleSum::new([(*atom, 1)]), *n),
+                _ => known = known.plus(&AtomAngleSum::new([(*atom, 1)]), *n),
             }
         }
-        AngleParts {
+        ResolvedAngle {
             known,
             pi12,
             solved: solved.into_iter().filter(|(_, n)| *n != 0).collect(),
@@ -234,13 +234,13 @@ impl Closing {
     }
 
     /// Cosine and sine of a sum of angles, by the addition theorem.
-    fn cos_sin(&self, graph: &mut Graph, sum: &AngleSum) -> [ExprId; 2] {
-        let parts = self.split(sum, 0);
+    fn cos_sin(&self, graph: &mut Graph, sum: &AtomAngleSum) -> [ExprId; 2] {
+        let parts = self.resolve_sum(sum, 0);
         let (c, s) = graph.cos_sin(&parts.known, parts.pi12);
         let mut total = [c, s];
         for (piece, n) in parts.solved {
-            let turned = times(graph, self.solved[piece], n.into());
-            total = turn(graph, total, turned);
+            let turned = multiply_angle(graph, self.solved[piece], n.into());
+            total = rotate_vector(graph, total, turned);
         }
         total
     }
@@ -248,7 +248,7 @@ impl Closing {
     /// Replaces passive positions by their closed form.
     fn close_position(&self, graph: &mut Graph, roots: &[ExprId]) -> Vec<ExprId> {
         let mut replacements = self.position.clone();
-        let trigonometric: Vec<(Node, AngleSum)> = graph
+        let trigonometric: Vec<(Node, AtomAngleSum)> = graph
             .nodes_of(roots)
             .filter_map(|node| match node {
                 Node::Sin(angle) | Node::Cos(angle)
@@ -273,18 +273,18 @@ impl Closing {
     }
 
     /// The definitions of atoms that some expressions need, directly or by way of other definitions.
-    fn definitions(&self, graph: &Graph, roots: &[ExprId]) -> Vec<Definition> {
+    fn definitions(&self, graph: &Graph, roots: &[ExprId]) -> Vec<AtomDefinition> {
         let mut used = graph.atoms(roots);
         used.extend(graph.atoms(&self.reachable));
-        let (mut found, mut left): (Vec<Definition>, _) = (Vec::new(), self.definitions.clone());
+        let (mut found, mut left): (Vec<AtomDefinition>, _) = (Vec::new(), self.definitions.clone());
         loop {
-            let (next, rest): (Vec<Definition>, Vec<Definition>) =
+            let (next, rest): (Vec<AtomDefinition>, Vec<AtomDefinition>) =
                 left.into_iter().partition(|d| used.contains(&d.atom));
             if next.is_empty() {
                 return found;
             }
             for definition in &next {
-                used.extend(graph.atoms(&definition.by.operands()));
+                used.extend(graph.atoms(&definition.rule.operands()));
             }
             found.extend(next);
             left = rest;
@@ -295,18 +295,18 @@ impl Closing {
     pub(crate) fn program(
         &self,
         graph: &mut Graph,
-        equations: &Equations,
+        equations: &UnreducedEquations,
         outputs: &[ExprId],
-    ) -> Program {
+    ) -> StraightLineProgram {
         self.program_at(graph, equations, outputs, &BTreeMap::new())
     }
 
     /// What a program of some expressions costs. Expressions of an open chain are counted as they stand, since closing
     /// does nothing to them and lowering finds little; that saves nearly all of the time.
-    pub(crate) fn weight(
+    pub(crate) fn program_cost(
         &self,
         graph: &mut Graph,
-        equations: &Equations,
+        equations: &UnreducedEquations,
         outputs: &[ExprId],
         known: &BTreeMap<ExprId, ExprId>,
     ) -> usize {
@@ -321,10 +321,10 @@ impl Closing {
     pub(crate) fn program_at(
         &self,
         graph: &mut Graph,
-        equations: &Equations,
+        equations: &UnreducedEquations,
         outputs: &[ExprId],
         known: &BTreeMap<ExprId, ExprId>,
-    ) -> Program {
+    ) -> StraightLineProgram {
         let projection = &equations.projection;
         let passive_rates = graph.substitute(&projection.passive_rates, known);
         let mut rates: BTreeMap<ExprId, ExprId> = projection
@@ -357,10 +357,10 @@ impl Closing {
                 varies.then(|| (base, graph.scale(*size, &factor.abs().recip())))
             })
             .collect();
-        lower_by(
+        lower_with_passes(
             graph,
             self.passes,
-            &Request {
+            &LoweringRequest {
                 may_be_undefined: self.may_be_undefined,
                 outputs,
                 reachable: &self.reachable,

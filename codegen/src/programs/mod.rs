@@ -13,12 +13,12 @@ use modelmill_spec::Mechanism;
 
 use crate::DeriveError;
 use crate::expr::{Atom, ExprId, Graph};
-use crate::loops::magnitude::Size;
-use crate::lower::{Program, Request, lower};
-use crate::programs::closing::Closing;
-use crate::reduce::{Reduction, base};
-use crate::regressor::Equations;
-use crate::tree::expressions::Monomial;
+use crate::loops::magnitude::LoopSize;
+use crate::lower::{StraightLineProgram, LoweringRequest, lower};
+use crate::programs::closing::PassiveClosure;
+use crate::reduce::{BaseReduction, base};
+use crate::regressor::UnreducedEquations;
+use crate::tree::expressions::ParameterMonomial;
 
 /// How the passive coordinates are found.
 #[derive(Clone, Debug)]
@@ -35,46 +35,46 @@ pub enum PassivePosition {
 #[derive(Clone, Debug)]
 pub struct LoopPrograms {
     /// Residuals, then their Jacobian by the passive coordinates row by row.
-    pub residual: Program,
+    pub residual: StraightLineProgram,
     /// What residuals, passive and active coordinates are held against, one after the other.
-    pub scales: Program,
+    pub scales: StraightLineProgram,
 }
 
 /// Straight-line programs; outputs in the order given.
 #[derive(Clone, Debug)]
-pub struct Programs {
+pub struct ModelPrograms {
     /// How the passive coordinates are found.
     pub passive_position: PassivePosition,
     /// Passive coordinates, their rates, their accelerations.
-    pub passive: Program,
+    pub passive: StraightLineProgram,
     /// H: rows of drives, columns of p_g, row by row.
-    pub full_regressor: Program,
+    pub full_regressor: StraightLineProgram,
     /// H_min: rows of drives, columns of p_min, row by row.
-    pub regressor: Program,
+    pub regressor: StraightLineProgram,
     /// Forces of the drives for given p_min.
-    pub inverse_dynamics: Program,
+    pub inverse_dynamics: StraightLineProgram,
     /// p_min of given parameters and constants; all of it is fixed.
-    pub base_parameters: Program,
+    pub base_parameters: StraightLineProgram,
     /// Coordinates and rates of the drives, then their Jacobian by the active coordinates, row by row.
-    pub drives: Program,
+    pub drives: StraightLineProgram,
     /// How large the loops are beside those of the file's constants, if coordinates in them are lengths; fixed.
-    pub scale: Option<Program>,
+    pub scale: Option<StraightLineProgram>,
 }
 
 /// `passes` says how many of [`cheapest::PASSES`] look for cheaper forms.
 pub(crate) fn programs(
     graph: &mut Graph,
     mechanism: &Mechanism,
-    equations: &Equations,
-    reduction: &Reduction,
-    closing: &Closing,
+    equations: &UnreducedEquations,
+    reduction: &BaseReduction,
+    closing: &PassiveClosure,
     passes: usize,
-) -> Result<Programs, DeriveError> {
+) -> Result<ModelPrograms, DeriveError> {
     let n_drives = mechanism.drives.len();
 
-    let base = base_atoms(graph, reduction);
-    let base_value = |m: &Monomial| base.get(m).copied().unwrap_or(Graph::ZERO);
-    let retained: Vec<Monomial> = (reduction.retained.iter())
+    let base = base_parameter_atoms(graph, reduction);
+    let base_value = |m: &ParameterMonomial| base.get(m).copied().unwrap_or(Graph::ZERO);
+    let retained: Vec<ParameterMonomial> = (reduction.retained.iter())
         .map(|k| reduction.products[*k].clone())
         .collect();
     let row_by_row = |columns: &[Vec<ExprId>]| -> Vec<ExprId> {
@@ -110,25 +110,25 @@ pub(crate) fn programs(
     } else {
         let mut outputs = projection.loops.residual.clone();
         outputs.extend(projection.residual_jacobian.iter().flatten());
-        let scales = scales::scales(graph, mechanism, &projection.loops);
+        let scales = scales::residual_scales(graph, mechanism, &projection.loops);
         PassivePosition::Newton(Box::new(LoopPrograms {
-            residual: plain(graph, &outputs),
-            scales: plain(graph, &scales),
+            residual: plain_program(graph, &outputs),
+            scales: plain_program(graph, &scales),
         }))
     };
-    let base_expressions = base::expressions(graph, reduction);
-    let base_parameters = plain(graph, &base_expressions);
+    let base_expressions = base::base_expressions(graph, reduction);
+    let base_parameters = plain_program(graph, &base_expressions);
     let nothing = BTreeMap::new();
     let weigh =
-        |graph: &mut Graph, outputs: &[ExprId]| closing.weight(graph, equations, outputs, &nothing);
-    let regressor = cheapest::columns(graph, mechanism, equations, &retained, passes, &weigh)?;
+        |graph: &mut Graph, outputs: &[ExprId]| closing.program_cost(graph, equations, outputs, &nothing);
+    let regressor = cheapest::cheapest_columns(graph, mechanism, equations, &retained, passes, &weigh)?;
     let regressor = row_by_row(&regressor);
     let inverse_dynamics =
-        cheapest::total(graph, mechanism, equations, &base_value, passes, &weigh)?;
+        cheapest::cheapest_total(graph, mechanism, equations, &base_value, passes, &weigh)?;
     let slides = mechanism.coordinates.iter().any(|c| c.motion.is_length());
     let scale = (slides && !projection.loops.residual.is_empty()).then(|| {
-        let scale = Size::from_residual(graph, mechanism, &projection.loops.residual).scale(graph);
-        plain(graph, &[scale])
+        let scale = LoopSize::from_residual(graph, mechanism, &projection.loops.residual).relative_scale(graph);
+        plain_program(graph, &[scale])
     });
     let n_motion = drives.len();
     let together = [drives.as_slice(), &inverse_dynamics].concat();
@@ -143,7 +143,7 @@ pub(crate) fn programs(
             drives = same;
         }
     }
-    Ok(Programs {
+    Ok(ModelPrograms {
         passive_position,
         passive: program(&passive),
         full_regressor: program(&row_by_row(&all)),
@@ -156,7 +156,7 @@ pub(crate) fn programs(
 }
 
 /// The base parameters by the products that they stand for; all other products are zero.
-pub(crate) fn base_atoms(graph: &mut Graph, reduction: &Reduction) -> BTreeMap<Monomial, ExprId> {
+pub(crate) fn base_parameter_atoms(graph: &mut Graph, reduction: &BaseReduction) -> BTreeMap<ParameterMonomial, ExprId> {
     let retained = reduction.retained.iter().enumerate();
     retained
         .map(|(k, product)| {
@@ -167,8 +167,8 @@ pub(crate) fn base_atoms(graph: &mut Graph, reduction: &Reduction) -> BTreeMap<M
 }
 
 /// A program of expressions as they stand, without guards.
-fn plain(graph: &mut Graph, outputs: &[ExprId]) -> Program {
-    let request = Request {
+fn plain_program(graph: &mut Graph, outputs: &[ExprId]) -> StraightLineProgram {
+    let request = LoweringRequest {
         may_be_undefined: false,
         outputs,
         reachable: &[],

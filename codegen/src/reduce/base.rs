@@ -4,53 +4,53 @@ use std::collections::BTreeSet;
 
 use modelmill_spec::Mechanism;
 
-use super::rational_function::{Polynomial, RationalFunction, Variable};
-use super::reduction::Reduction;
-use crate::expr::print::{Formula, Function};
+use super::rational_function::{TrigonometricPolynomial, RationalFunction, FactorVariable};
+use super::reduction::BaseReduction;
+use crate::expr::print::{PrintedFormula, FormulaFunction};
 use crate::expr::{Atom, ExprId, Graph, Rational};
-use crate::tree::expressions::Monomial;
+use crate::tree::expressions::ParameterMonomial;
 
 /// Name of the base parameter at position `k`.
-pub(crate) fn name(k: usize) -> String {
+pub(crate) fn base_parameter_name(k: usize) -> String {
     format!("p{}_min", k + 1)
 }
 
 /// Base parameter `k` written out term by term: what a script reads. It refers to [`sums`].
-pub(crate) fn written_out(mechanism: &Mechanism, reduction: &Reduction, k: usize) -> Formula {
+pub(crate) fn expanded_formula(mechanism: &Mechanism, reduction: &BaseReduction, k: usize) -> PrintedFormula {
     let mut terms = vec![product_formula(
         mechanism,
         &reduction.products[reduction.retained[k]],
     )];
     for (at, line) in reduction.dependencies.iter().enumerate() {
         for (_, factor) in line.equals.iter().filter(|(at, _)| *at == k) {
-            let factors = lumped(mechanism, reduction, at);
-            terms.extend(factor.expanded_times(mechanism, &factors));
+            let factors = lumped_formulas(mechanism, reduction, at);
+            terms.extend(factor.expanded_terms(mechanism, &factors));
         }
     }
-    Formula::sum(terms)
+    PrintedFormula::sum(terms)
 }
 
 /// What dependent products stand for that others go by: the product itself and theirs, as Gautier and Khalil (1990) group
 /// link by link. Each with its name, after those that it needs.
-pub(crate) fn sums(mechanism: &Mechanism, reduction: &Reduction) -> Vec<(String, Formula)> {
-    let outer_first = reduction.inner_first().into_iter().rev();
+pub(crate) fn dependent_sums(mechanism: &Mechanism, reduction: &BaseReduction) -> Vec<(String, PrintedFormula)> {
+    let outer_first = reduction.lines_in_dependency_order().into_iter().rev();
     let sum = |line: usize| {
         let name = sum_name(mechanism, reduction, line)?;
         let product = reduction.dependencies[line].product;
         let mut terms = vec![product_formula(mechanism, &reduction.products[product])];
         for (outer, dependency) in reduction.dependencies.iter().enumerate() {
             for (_, factor) in dependency.via.iter().filter(|(p, _)| *p == product) {
-                let factors = lumped(mechanism, reduction, outer);
-                terms.extend(factor.expanded_times(mechanism, &factors));
+                let factors = lumped_formulas(mechanism, reduction, outer);
+                terms.extend(factor.expanded_terms(mechanism, &factors));
             }
         }
-        Some((name, Formula::sum(terms)))
+        Some((name, PrintedFormula::sum(terms)))
     };
     outer_first.filter_map(sum).collect()
 }
 
 /// The name of the sum that a dependent product stands for, if others go by it.
-fn sum_name(mechanism: &Mechanism, reduction: &Reduction, line: usize) -> Option<String> {
+fn sum_name(mechanism: &Mechanism, reduction: &BaseReduction, line: usize) -> Option<String> {
     let product = reduction.dependencies[line].product;
     let mut via = reduction.dependencies.iter().flat_map(|line| &line.via);
     if !via.any(|(p, _)| *p == product) {
@@ -67,10 +67,10 @@ fn sum_name(mechanism: &Mechanism, reduction: &Reduction, line: usize) -> Option
 }
 
 /// What a dependent product brings into others: its sum, or the product itself.
-pub(crate) fn lumped(mechanism: &Mechanism, reduction: &Reduction, line: usize) -> Vec<Formula> {
+pub(crate) fn lumped_formulas(mechanism: &Mechanism, reduction: &BaseReduction, line: usize) -> Vec<PrintedFormula> {
     match sum_name(mechanism, reduction, line) {
-        Some(name) => vec![Formula::name(name)],
-        None => factors(
+        Some(name) => vec![PrintedFormula::name(name)],
+        None => parameter_factors(
             mechanism,
             &reduction.products[reduction.dependencies[line].product],
         ),
@@ -78,17 +78,17 @@ pub(crate) fn lumped(mechanism: &Mechanism, reduction: &Reduction, line: usize) 
 }
 
 /// What base parameters divide by: a function of the constants that may vanish.
-pub(crate) struct Denominator {
-    pub(crate) value: Formula,
+pub(crate) struct BaseDenominator {
+    pub(crate) value: PrintedFormula,
     /// The sum of the magnitudes of its terms, sines and cosines taken as 1.
-    pub(crate) size: Formula,
+    pub(crate) size: PrintedFormula,
     /// As people read it.
     pub(crate) text: String,
 }
 
 /// Every denominator of eq. (16), powers of a constant by the constant itself.
-pub(crate) fn denominators(mechanism: &Mechanism, reduction: &Reduction) -> Vec<Denominator> {
-    let mut found: BTreeSet<Polynomial> = BTreeSet::new();
+pub(crate) fn denominators(mechanism: &Mechanism, reduction: &BaseReduction) -> Vec<BaseDenominator> {
+    let mut found: BTreeSet<TrigonometricPolynomial> = BTreeSet::new();
     let lines = reduction.dependencies.iter();
     for (_, factor) in lines.flat_map(|line| line.equals.iter().chain(&line.via)) {
         if factor.denominator.len() > 1 {
@@ -96,63 +96,63 @@ pub(crate) fn denominators(mechanism: &Mechanism, reduction: &Reduction) -> Vec<
             continue;
         }
         let variables = factor.denominator.keys().flatten().map(|(v, _)| *v);
-        let variables = variables.filter(|v| !matches!(v, Variable::Root(_)));
-        found.extend(variables.map(|v| Polynomial::from([(vec![(v, 1)], Rational::ONE)])));
+        let variables = variables.filter(|v| !matches!(v, FactorVariable::Root(_)));
+        found.extend(variables.map(|v| TrigonometricPolynomial::from([(vec![(v, 1)], Rational::ONE)])));
     }
-    let one = || Polynomial::from([(Vec::new(), Rational::ONE)]);
-    let denominator = |p: Polynomial| Denominator {
-        size: Formula::sum(p.iter().map(|(powers, k)| {
-            let magnitude = |v: Variable| match v {
-                Variable::Cos(_) | Variable::Sin(_) => None,
-                Variable::Constant(_) => {
+    let one = || TrigonometricPolynomial::from([(Vec::new(), Rational::ONE)]);
+    let denominator = |p: TrigonometricPolynomial| BaseDenominator {
+        size: PrintedFormula::sum(p.iter().map(|(powers, k)| {
+            let magnitude = |v: FactorVariable| match v {
+                FactorVariable::Cos(_) | FactorVariable::Sin(_) => None,
+                FactorVariable::Constant(_) => {
                     let operand = vec![v.formula(mechanism)];
-                    Some(Formula::Apply(Function::Abs, operand))
+                    Some(PrintedFormula::Apply(FormulaFunction::Abs, operand))
                 }
-                Variable::Root(_) => Some(v.formula(mechanism)),
+                FactorVariable::Root(_) => Some(v.formula(mechanism)),
             };
             let factors = powers.iter().filter_map(|(v, n)| {
                 let power = i32::try_from(*n).unwrap_or(i32::MAX);
                 Some(magnitude(*v)?.power(power))
             });
-            Formula::product(k.abs(), factors.collect::<Vec<_>>())
+            PrintedFormula::product(k.abs(), factors.collect::<Vec<_>>())
         })),
         text: RationalFunction::new(p.clone(), one())
             .formula(mechanism)
             .text(),
-        value: RationalFunction::new(p, one()).expanded(mechanism),
+        value: RationalFunction::new(p, one()).expanded_formula(mechanism),
     };
     found.into_iter().map(denominator).collect()
 }
 
-fn factors(mechanism: &Mechanism, product: &Monomial) -> Vec<Formula> {
+fn parameter_factors(mechanism: &Mechanism, product: &ParameterMonomial) -> Vec<PrintedFormula> {
     product
         .0
         .iter()
         .map(|(p, n)| {
-            let name = Formula::name(&*mechanism.parameters[*p].name);
+            let name = PrintedFormula::name(&*mechanism.parameters[*p].name);
             name.power(i32::try_from(*n).unwrap_or(i32::MAX))
         })
         .collect()
 }
 
 /// A product of parameters as a formula.
-pub(crate) fn product_formula(mechanism: &Mechanism, product: &Monomial) -> Formula {
-    Formula::product(Rational::ONE, factors(mechanism, product))
+pub(crate) fn product_formula(mechanism: &Mechanism, product: &ParameterMonomial) -> PrintedFormula {
+    PrintedFormula::product(Rational::ONE, parameter_factors(mechanism, product))
 }
 
 /// The base parameters as expressions of the graph: eq. (7) carried out.
-pub(crate) fn expressions(graph: &mut Graph, reduction: &Reduction) -> Vec<ExprId> {
+pub(crate) fn base_expressions(graph: &mut Graph, reduction: &BaseReduction) -> Vec<ExprId> {
     let mut terms: Vec<Vec<ExprId>> = reduction
         .retained
         .iter()
-        .map(|k| vec![product(graph, &reduction.products[*k])])
+        .map(|k| vec![product_expression(graph, &reduction.products[*k])])
         .collect();
     // What each dependent product is worth with those that go by it, outer ones first.
     let lines = &reduction.dependencies;
     let mut worth: Vec<Vec<ExprId>> = (lines.iter())
-        .map(|line| vec![product(graph, &reduction.products[line.product])])
+        .map(|line| vec![product_expression(graph, &reduction.products[line.product])])
         .collect();
-    for i in reduction.inner_first().into_iter().rev() {
+    for i in reduction.lines_in_dependency_order().into_iter().rev() {
         let value = graph.add_all(&worth[i]);
         for (k, factor) in &lines[i].equals {
             let factor = factor.expression(graph);
@@ -167,7 +167,7 @@ pub(crate) fn expressions(graph: &mut Graph, reduction: &Reduction) -> Vec<ExprI
 }
 
 /// A product of parameters as an expression.
-pub(crate) fn product(graph: &mut Graph, product: &Monomial) -> ExprId {
+pub(crate) fn product_expression(graph: &mut Graph, product: &ParameterMonomial) -> ExprId {
     let factors: Vec<_> = product
         .0
         .iter()
@@ -180,7 +180,7 @@ pub(crate) fn product(graph: &mut Graph, product: &Monomial) -> ExprId {
 }
 
 /// Unit of a product of parameters.
-pub(crate) fn unit(mechanism: &Mechanism, product: &Monomial) -> String {
+pub(crate) fn product_unit(mechanism: &Mechanism, product: &ParameterMonomial) -> String {
     let factors: Vec<(&str, i32)> = product
         .0
         .iter()

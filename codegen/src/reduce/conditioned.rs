@@ -9,16 +9,16 @@
 
 use std::collections::BTreeMap;
 
-use modelmill_algebra::field::Stream;
+use modelmill_algebra::field::RandomStream;
 use modelmill_spec::Mechanism;
 use nalgebra::DMatrix;
 
-use super::numeric::{REACH, sample};
-use super::reduction::Reduction;
+use super::numeric::{REACH, sample_observations};
+use super::reduction::BaseReduction;
 use crate::expr::independent::SEED;
 use crate::expr::{ExprId, Graph};
-use crate::loops::numeric_poses::symmetric;
-use crate::regressor::projection::Projection;
+use crate::loops::numeric_poses::uniform_symmetric;
+use crate::regressor::projection::LoopProjection;
 
 /// Largest factor that calls for no exchange, each column measured by the longest of a parameter of its unit: bases that
 /// are sound stay far below, and a base within it loses three digits of sixteen.
@@ -32,7 +32,7 @@ const BESIDE: f64 = 1e-5;
 const MADE_UP: f64 = 1e-6;
 
 /// Columns of the regressor.
-pub(super) struct Columns<'a> {
+pub(super) struct RegressorColumns<'a> {
     /// What stands in them, drive by drive.
     pub(super) values: &'a [Vec<ExprId>],
     /// SI units of their products.
@@ -44,7 +44,7 @@ pub(super) struct Columns<'a> {
 const CERTAIN: f64 = 1e-7;
 
 /// Another choice of retained columns.
-pub(super) struct Exchange {
+pub(super) struct ColumnExchange {
     pub(super) retained: Vec<usize>,
     /// Whether the factors that asked for it are known to some digits. Where retained columns all but depend on each other at
     /// the file's values, they may be rounding alone, and the true ones of reasonable size.
@@ -52,32 +52,32 @@ pub(super) struct Exchange {
 }
 
 /// The retained columns, some exchanged for dependent ones; `None` if all can stay. Columns in `named` stay in any case.
-pub(super) fn exchanged(
+pub(super) fn exchange_columns(
     graph: &mut Graph,
     mechanism: &Mechanism,
-    projection: &Projection,
-    columns: &Columns<'_>,
+    projection: &LoopProjection,
+    columns: &RegressorColumns<'_>,
     retained: &[usize],
     dependent: &[usize],
     named: &[usize],
-) -> Option<Exchange> {
+) -> Option<ColumnExchange> {
     if dependent.is_empty() {
         return None;
     }
-    let moved = beside(mechanism);
+    let moved = perturb_constants(mechanism);
     let n_rows = columns.values.len() + columns.values.len() / 2;
     let mut sampled = |mechanism: &Mechanism| {
-        let w = sample(graph, mechanism, projection, columns.values, n_rows, REACH).ok()?;
-        Factors::new(&w, columns.units, retained, dependent)
+        let w = sample_observations(graph, mechanism, projection, columns.values, n_rows, REACH).ok()?;
+        DependenceFactors::new(&w, columns.units, retained, dependent)
     };
     let mut factors = sampled(&moved).or_else(|| sampled(mechanism))?;
     let fixed: Vec<bool> = retained.iter().map(|k| named.contains(k)).collect();
     let mut has_changed = false;
-    while let Some((i, j)) = factors.largest(&fixed) {
-        factors.exchange(i, j);
+    while let Some((i, j)) = factors.largest_factor(&fixed) {
+        factors.exchange_pair(i, j);
         has_changed = true;
     }
-    has_changed.then_some(Exchange {
+    has_changed.then_some(ColumnExchange {
         retained: factors.retained,
         is_certain: factors.least_kept > CERTAIN,
     })
@@ -87,16 +87,16 @@ pub(super) fn exchanged(
 pub(super) fn is_moderate(
     graph: &mut Graph,
     mechanism: &Mechanism,
-    projection: &Projection,
-    columns: &Columns<'_>,
-    reduction: &Reduction,
+    projection: &LoopProjection,
+    columns: &RegressorColumns<'_>,
+    reduction: &BaseReduction,
     shown: &[usize],
 ) -> bool {
     let n_rows = columns.values.len() + columns.values.len() / 2;
-    let Ok(w) = sample(graph, mechanism, projection, columns.values, n_rows, REACH) else {
+    let Ok(w) = sample_observations(graph, mechanism, projection, columns.values, n_rows, REACH) else {
         return false;
     };
-    let shares = shares(&w, columns.units);
+    let shares = relative_column_sizes(&w, columns.units);
     let share = |product: usize| shares[shown[product]];
     let constants: Vec<f64> = mechanism.constants.iter().map(|c| c.value).collect();
     let lines = reduction.factors(&constants);
@@ -109,7 +109,7 @@ pub(super) fn is_moderate(
 }
 
 /// The size of each column beside the longest of a parameter of its unit.
-fn shares(w: &DMatrix<f64>, units: &[String]) -> Vec<f64> {
+fn relative_column_sizes(w: &DMatrix<f64>, units: &[String]) -> Vec<f64> {
     let mut longest: BTreeMap<&str, f64> = BTreeMap::new();
     for (column, unit) in w.column_iter().zip(units) {
         let most = longest.entry(unit).or_default();
@@ -122,9 +122,9 @@ fn shares(w: &DMatrix<f64>, units: &[String]) -> Vec<f64> {
 }
 
 /// The mechanism with constants a little beside its own.
-fn beside(mechanism: &Mechanism) -> Mechanism {
+fn perturb_constants(mechanism: &Mechanism) -> Mechanism {
     let mut moved = mechanism.clone();
-    let mut stream = Stream::new(SEED);
+    let mut stream = RandomStream::new(SEED);
     for constant in &mut moved.constants {
         let size = if constant.is_angle {
             1.0
@@ -136,13 +136,13 @@ fn beside(mechanism: &Mechanism) -> Mechanism {
         } else {
             constant.value.abs()
         };
-        constant.value += BESIDE * size * symmetric(&mut stream);
+        constant.value += BESIDE * size * uniform_symmetric(&mut stream);
     }
     moved
 }
 
 /// Dependent columns by retained ones, each measured by the longest of its unit.
-struct Factors {
+struct DependenceFactors {
     retained: Vec<usize>,
     dependent: Vec<usize>,
     values: DMatrix<f64>,
@@ -150,7 +150,7 @@ struct Factors {
     least_kept: f64,
 }
 
-impl Factors {
+impl DependenceFactors {
     /// `None` where the sampled columns are no numbers, or where retained columns do not make up the others.
     fn new(
         w: &DMatrix<f64>,
@@ -185,7 +185,7 @@ impl Factors {
             return None;
         }
         // A column that all but vanishes is written by others with large factors, and others by it.
-        let shares = shares(w, units);
+        let shares = relative_column_sizes(w, units);
         for (j, mut column) in values.column_iter_mut().enumerate() {
             for (factor, k) in column.iter_mut().zip(retained) {
                 *factor *= shares[dependent[j]] / shares[*k];
@@ -200,7 +200,7 @@ impl Factors {
     }
 
     /// Where the largest factor beyond measure stands.
-    fn largest(&self, fixed: &[bool]) -> Option<(usize, usize)> {
+    fn largest_factor(&self, fixed: &[bool]) -> Option<(usize, usize)> {
         let (mut found, mut most) = (None, MOST_GROWTH);
         for j in 0..self.values.ncols() {
             for i in (0..self.values.nrows()).filter(|i| !fixed[*i]) {
@@ -213,7 +213,7 @@ impl Factors {
     }
 
     /// Retained column `i` and dependent column `j` change places.
-    fn exchange(&mut self, i: usize, j: usize) {
+    fn exchange_pair(&mut self, i: usize, j: usize) {
         std::mem::swap(&mut self.retained[i], &mut self.dependent[j]);
         let pivot = self.values[(i, j)];
         let row = self.values.row(i) / pivot;

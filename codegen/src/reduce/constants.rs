@@ -2,15 +2,15 @@
 
 use std::collections::BTreeSet;
 
-use super::oracle::Occurrence;
+use super::oracle::ConstantOccurrence;
 use crate::expr::{Atom, ExprId, Graph, Node, Unary};
 
 /// In which ways the constants occur in the columns and in the loops.
-pub(super) fn occurrences(
+pub(super) fn constant_occurrences(
     graph: &Graph,
     outputs: &[ExprId],
     residual: &[ExprId],
-) -> Vec<Occurrence> {
+) -> Vec<ConstantOccurrence> {
     let mut roots = outputs.to_vec();
     roots.extend(residual);
     let mut found = BTreeSet::new();

@@ -1,20 +1,20 @@
 //! Which columns depend on which, and the proof that the dependences hold.
 
-use modelmill_algebra::field::{Element, MODULUS, PRIMES, Stream};
+use modelmill_algebra::field::{FieldElement, MODULUS, PRIMES, RandomStream};
 use modelmill_spec::Mechanism;
 
-use super::reduction::{Dependency, Method, Reduction};
-use super::relations::{self, ColumnRelation, Written};
+use super::reduction::{ColumnDependency, ReductionMethod, BaseReduction};
+use super::relations::{self, ColumnRelation, DependentColumn};
 use super::sample::SampledRegressor;
 use crate::DeriveError;
-use crate::tree::expressions::Monomial;
+use crate::tree::expressions::ParameterMonomial;
 
 /// With how many sets of constants the result is shown, and at how many points of motion for each.
 const CONFIRMED_WITH: usize = 4;
 const CONFIRMED_AT: usize = 2;
 
 /// Which columns depend on which, as seen for one random set of constants; columns by position among the effective ones.
-pub(super) struct Dependences {
+pub(super) struct DependenceStructure {
     /// Columns that are not identically zero.
     pub(super) shown: Vec<usize>,
     /// Retained columns, sorted.
@@ -29,16 +29,16 @@ pub(super) struct Dependences {
     pub(super) n_points: usize,
 }
 
-impl Dependences {
-    pub(super) fn find(
+impl DependenceStructure {
+    pub(super) fn find_dependences(
         regressor: &SampledRegressor,
         order: &[usize],
-        stream: &mut Stream,
+        stream: &mut RandomStream,
     ) -> Result<Self, DeriveError> {
         let n = regressor.n_columns;
         let constants = regressor.sampler.constants::<MODULUS>(stream)?;
-        let (echelon, n_points) = regressor.echelon(&constants, order, None, stream)?;
-        let shown: Vec<usize> = (0..n).filter(|k| echelon.is_seen(*k)).collect();
+        let (echelon, n_points) = regressor.reduced_rows(&constants, order, None, stream)?;
+        let shown: Vec<usize> = (0..n).filter(|k| echelon.has_nonzero_value(*k)).collect();
         let mut pivots = echelon.pivots.clone();
         pivots.sort_unstable();
         let dependent: Vec<usize> = shown
@@ -49,12 +49,12 @@ impl Dependences {
         let wanted = dependent
             .iter()
             .flat_map(|j| pivots.iter().map(move |p| (*j, *p)))
-            .filter(|(j, p)| echelon.entry(*p, *j).is_some_and(|x| x != Element::ZERO))
+            .filter(|(j, p)| echelon.entry(*p, *j).is_some_and(|x| x != FieldElement::ZERO))
             .collect();
         let order: Vec<usize> = (order.iter().copied())
             .filter(|k| shown.contains(k))
             .collect();
-        let relations = relations::find(&echelon, &order, &dependent);
+        let relations = relations::find_relations(&echelon, &order, &dependent);
         Ok(Self {
             shown,
             pivots,
@@ -68,20 +68,20 @@ impl Dependences {
     pub(super) fn reduction(
         &self,
         mechanism: &Mechanism,
-        candidates: &[Monomial],
-        name: &dyn Fn(usize) -> Monomial,
-        lines: Vec<Written>,
-    ) -> Result<Reduction, DeriveError> {
+        candidates: &[ParameterMonomial],
+        name: &dyn Fn(usize) -> ParameterMonomial,
+        lines: Vec<DependentColumn>,
+    ) -> Result<BaseReduction, DeriveError> {
         let position = |k: usize| {
             self.shown
                 .iter()
                 .position(|x| *x == k)
                 .expect("a column with an effect is shown")
         };
-        let mut dependencies: Vec<Dependency> = self
+        let mut dependencies: Vec<ColumnDependency> = self
             .dependent
             .iter()
-            .map(|j| Dependency {
+            .map(|j| ColumnDependency {
                 product: position(*j),
                 equals: Vec::new(),
                 via: Vec::new(),
@@ -91,7 +91,7 @@ impl Dependences {
             let j = written.column;
             let line = (self.dependent.iter().position(|x| *x == j))
                 .expect("a written column is dependent");
-            for (p, factor) in written.by {
+            for (p, factor) in written.factors {
                 let factor = factor.ok_or_else(|| DeriveError::FactorNotRecovered {
                     product: name(j).text(mechanism),
                     retained: name(p).text(mechanism),
@@ -102,8 +102,8 @@ impl Dependences {
                 }
             }
         }
-        let products: Vec<Monomial> = self.shown.iter().map(|k| name(*k)).collect();
-        Ok(Reduction {
+        let products: Vec<ParameterMonomial> = self.shown.iter().map(|k| name(*k)).collect();
+        Ok(BaseReduction {
             without_effect: candidates
                 .iter()
                 .filter(|c| !products.contains(c))
@@ -112,7 +112,7 @@ impl Dependences {
             retained: self.pivots.iter().map(|p| position(*p)).collect(),
             products,
             dependencies,
-            method: Method::Exact {
+            method: ReductionMethod::Exact {
                 confirmed_at: CONFIRMED_WITH * CONFIRMED_AT,
                 at_values: mechanism.is_at_values,
             },
@@ -120,21 +120,21 @@ impl Dependences {
     }
 }
 
-impl Reduction {
+impl BaseReduction {
     /// Shows `H p_g = H_min p_min` for random parameters at fresh points of motion with fresh constants.
-    pub(super) fn confirm(
+    pub(super) fn confirm_reduction(
         &self,
         regressor: &SampledRegressor,
         shown: &[usize],
-        stream: &mut Stream,
+        stream: &mut RandomStream,
     ) -> Result<(), DeriveError> {
         /// A field that had no part in finding it.
         const FRESH: u64 = PRIMES[PRIMES.len() - 1];
         for _ in 0..CONFIRMED_WITH {
             let constants = regressor.sampler.constants::<FRESH>(stream)?;
-            let parameters: Vec<Element<FRESH>> =
-                self.products.iter().map(|_| stream.element()).collect();
-            let mut base: Vec<Element<FRESH>> =
+            let parameters: Vec<FieldElement<FRESH>> =
+                self.products.iter().map(|_| stream.next_element()).collect();
+            let mut base: Vec<FieldElement<FRESH>> =
                 self.retained.iter().map(|k| parameters[*k]).collect();
             let factors = self
                 .factors_by(&|factor| factor.value(&constants))
@@ -145,9 +145,9 @@ impl Reduction {
                 }
             }
             for _ in 0..CONFIRMED_AT {
-                for row in regressor.point(&constants, stream)? {
-                    let sum = |terms: &mut dyn Iterator<Item = (usize, Element<FRESH>)>| {
-                        terms.fold(Element::ZERO, |s, (k, p)| s + row[k] * p)
+                for row in regressor.draw_rows(&constants, stream)? {
+                    let sum = |terms: &mut dyn Iterator<Item = (usize, FieldElement<FRESH>)>| {
+                        terms.fold(FieldElement::ZERO, |s, (k, p)| s + row[k] * p)
                     };
                     let full = sum(&mut shown.iter().copied().zip(parameters.iter().copied()));
                     let reduced = sum(&mut self

@@ -1,12 +1,12 @@
 //! The factors of eq. (6) as rational functions of the constants: reconstructed from points of motion for relations that
 //! are as simple as can be found, put together from there.
 
-use modelmill_algebra::field::{Element, Stream};
+use modelmill_algebra::field::{FieldElement, RandomStream};
 
-use super::dependences::Dependences;
-use super::oracle::{Budget, Occurrence, Oracle};
-use super::reconstruct::{self, Survey};
-use super::relations::{self, ColumnRelation, Related, Written};
+use super::dependences::DependenceStructure;
+use super::oracle::{OperationBudget, ConstantOccurrence, PrimeFieldOracle};
+use super::reconstruct::{self, DependenceSurvey};
+use super::relations::{self, ColumnRelation, SolvedRelations, DependentColumn};
 use super::sample::SampledRegressor;
 use crate::DeriveError;
 use crate::expr::FieldPoint;
@@ -21,24 +21,24 @@ const FEW: usize = 12;
 const MOST_TERMS: usize = 5_000;
 
 /// The dependent columns by others; factors that resist are `None`.
-pub(super) fn find(
-    dependences: &Dependences,
+pub(super) fn find_factors(
+    dependences: &DependenceStructure,
     regressor: &SampledRegressor,
-    variables: &[Occurrence],
+    variables: &[ConstantOccurrence],
     roots: &[i64],
     operations: u64,
-    stream: &mut Stream,
-) -> Result<Vec<Written>, DeriveError> {
+    stream: &mut RandomStream,
+) -> Result<Vec<DependentColumn>, DeriveError> {
     if dependences.wanted.is_empty() {
         return Ok(Vec::new());
     }
     let direct: Vec<ColumnRelation> = (dependences.relations.iter())
-        .filter(|relation| relation.is_direct())
+        .filter(|relation| relation.has_retained_only())
         .cloned()
         .collect();
-    let mut budget = Budget::new(operations);
+    let mut budget = OperationBudget::new(operations);
     let mut by = |relations: &[ColumnRelation]| {
-        by_relations(
+        factors_by_relations(
             relations,
             dependences,
             regressor,
@@ -57,73 +57,73 @@ pub(super) fn find(
 
 /// How many factors on retained columns have a sum in a denominator.
 pub(super) fn n_quotients(
-    dependences: &Dependences,
+    dependences: &DependenceStructure,
     regressor: &SampledRegressor,
-    variables: &[Occurrence],
-    stream: &mut Stream,
+    variables: &[ConstantOccurrence],
+    stream: &mut RandomStream,
 ) -> Result<usize, DeriveError> {
-    let direct = dependences.relations.iter().filter(|r| r.is_direct());
+    let direct = dependences.relations.iter().filter(|r| r.has_retained_only());
     let direct: Vec<ColumnRelation> = direct.cloned().collect();
-    let mut oracle = FromMotion {
+    let mut oracle = MotionFactorOracle {
         regressor,
         dependences,
         relations: &direct,
         sampling: stream.clone(),
-        budget: &mut Budget::new(MOST_OPERATIONS),
+        budget: &mut OperationBudget::new(MOST_OPERATIONS),
     };
     reconstruct::n_quotients(&mut oracle, variables, stream)
 }
 
 /// The dependent columns by some relations, those to retained columns among them.
-fn by_relations(
+fn factors_by_relations(
     all: &[ColumnRelation],
-    dependences: &Dependences,
+    dependences: &DependenceStructure,
     regressor: &SampledRegressor,
-    variables: &[Occurrence],
+    variables: &[ConstantOccurrence],
     roots: &[i64],
-    budget: &mut Budget,
-    stream: &mut Stream,
-) -> Result<Vec<Written>, DeriveError> {
-    let mut found = |chosen: Vec<ColumnRelation>, stream: &mut Stream| {
-        let mut oracle = FromMotion {
+    budget: &mut OperationBudget,
+    stream: &mut RandomStream,
+) -> Result<Vec<DependentColumn>, DeriveError> {
+    let mut found = |chosen: Vec<ColumnRelation>, stream: &mut RandomStream| {
+        let mut oracle = MotionFactorOracle {
             regressor,
             dependences,
             relations: &chosen,
             sampling: stream.clone(),
             budget: &mut *budget,
         };
-        let mut survey = Survey::new(&mut oracle, variables, roots, stream)?;
+        let mut survey = DependenceSurvey::new(&mut oracle, variables, roots, stream)?;
         let wanted: Vec<(usize, bool)> = (chosen.iter())
-            .flat_map(|r| std::iter::repeat_n(r.is_direct(), r.len()))
+            .flat_map(|r| std::iter::repeat_n(r.has_retained_only(), r.len()))
             .enumerate()
             .collect();
-        let factors = survey.functions(&mut oracle, &wanted, stream)?;
-        Ok::<_, DeriveError>(Related::new(chosen.iter(), factors))
+        let factors = survey.reconstruct_functions(&mut oracle, &wanted, stream)?;
+        Ok::<_, DeriveError>(SolvedRelations::new(chosen.iter(), factors))
     };
     // Near relations come right behind those to retained columns.
-    let nearest = (0..all.len()).filter(|i| all.get(i + 1).is_none_or(ColumnRelation::is_direct));
+    let nearest = (0..all.len()).filter(|i| all.get(i + 1).is_none_or(ColumnRelation::has_retained_only));
     let mut related = found(nearest.map(|i| all[i].clone()).collect(), stream)?;
     // What is near need not be simple: where the first joints of an arm do not feel all of a link, relations between links
     // divide by sines of twists, and those to retained columns do not.
     let is_long = related.is_complete() && related.n_terms() > MOST_TERMS;
-    let unwieldy = related.unwieldy();
+    let unwieldy = related.unwieldy_columns();
     let direct: Vec<ColumnRelation> = (all.iter())
-        .filter(|r| r.is_direct() && unwieldy.contains(&r.column))
+        .filter(|r| r.has_retained_only() && unwieldy.contains(&r.column))
         .filter(|r| !is_long || r.len() <= FEW)
         .cloned()
         .collect();
-    if !direct.is_empty() && !related.is_lost() {
+    if !direct.is_empty() && !related.has_unknown_factor() {
         related.replace(found(direct, stream)?);
     }
     if is_long {
-        return Ok(related.written());
+        return Ok(related.into_dependent_columns());
     }
-    let mut written = related.written_out(&dependences.wanted, roots);
+    let mut written = related.expanded_factors(&dependences.wanted, roots);
     let missing: Vec<usize> = (0..written.len())
         .filter(|k| written[*k].is_none())
         .collect();
     if !missing.is_empty() && related.is_complete() {
-        let mut rest = FromRelations {
+        let mut rest = RelationFactorOracle {
             related: &related,
             regressor,
             wanted: missing.iter().map(|k| dependences.wanted[*k]).collect(),
@@ -135,46 +135,46 @@ fn by_relations(
         }
     }
     let pairs = dependences.wanted.iter().zip(written);
-    let line = |((column, p), factor): (&(usize, usize), _)| Written {
+    let line = |((column, p), factor): (&(usize, usize), _)| DependentColumn {
         column: *column,
-        by: vec![(*p, factor)],
+        factors: vec![(*p, factor)],
     };
     Ok(pairs.map(line).collect())
 }
 
 /// The factors of relations, from points of motion.
-struct FromMotion<'a> {
+struct MotionFactorOracle<'a> {
     regressor: &'a SampledRegressor,
-    dependences: &'a Dependences,
+    dependences: &'a DependenceStructure,
     relations: &'a [ColumnRelation],
-    sampling: Stream,
-    budget: &'a mut Budget,
+    sampling: RandomStream,
+    budget: &'a mut OperationBudget,
 }
 
-impl Oracle for FromMotion<'_> {
+impl PrimeFieldOracle for MotionFactorOracle<'_> {
     fn constants<const P: u64>(
         &self,
-        stream: &mut Stream,
-    ) -> Result<FieldPoint<Element<P>>, DeriveError> {
+        stream: &mut RandomStream,
+    ) -> Result<FieldPoint<FieldElement<P>>, DeriveError> {
         self.regressor.sampler.constants(stream)
     }
 
     fn values<const P: u64>(
         &mut self,
-        constants: &FieldPoint<Element<P>>,
-    ) -> Result<Vec<Element<P>>, DeriveError> {
+        constants: &FieldPoint<FieldElement<P>>,
+    ) -> Result<Vec<FieldElement<P>>, DeriveError> {
         let rank = self.dependences.pivots.len();
         let at_once = rank * rank * self.regressor.n_columns;
         let one_by_one: usize = self.relations.iter().map(|r| (r.len() + 1).pow(3)).sum();
-        self.spend(at_once.min(one_by_one))?;
+        self.charge(at_once.min(one_by_one))?;
         if one_by_one < at_once {
             let mut rows = Vec::new();
             for _ in 0..self.dependences.n_points {
-                rows.extend(self.regressor.point(constants, &mut self.sampling)?);
+                rows.extend(self.regressor.draw_rows(constants, &mut self.sampling)?);
             }
             return relations::values_from_rows(self.relations, &rows);
         }
-        let (echelon, _) = self.regressor.echelon(
+        let (echelon, _) = self.regressor.reduced_rows(
             constants,
             &self.dependences.pivots,
             Some(rank),
@@ -183,38 +183,38 @@ impl Oracle for FromMotion<'_> {
         relations::values(self.relations, &echelon)
     }
 
-    fn spend(&mut self, operations: usize) -> Result<(), DeriveError> {
+    fn charge(&mut self, operations: usize) -> Result<(), DeriveError> {
         self.budget.spend(operations)
     }
 }
 
 /// Wanted factors from relations, all of which must be known: much cheaper than from points of motion.
-struct FromRelations<'a> {
-    related: &'a Related,
+struct RelationFactorOracle<'a> {
+    related: &'a SolvedRelations,
     regressor: &'a SampledRegressor,
     /// Which ones.
     wanted: Vec<(usize, usize)>,
-    budget: &'a mut Budget,
+    budget: &'a mut OperationBudget,
 }
 
-impl Oracle for FromRelations<'_> {
+impl PrimeFieldOracle for RelationFactorOracle<'_> {
     fn constants<const P: u64>(
         &self,
-        stream: &mut Stream,
-    ) -> Result<FieldPoint<Element<P>>, DeriveError> {
+        stream: &mut RandomStream,
+    ) -> Result<FieldPoint<FieldElement<P>>, DeriveError> {
         self.regressor.sampler.constants(stream)
     }
 
     fn values<const P: u64>(
         &mut self,
-        constants: &FieldPoint<Element<P>>,
-    ) -> Result<Vec<Element<P>>, DeriveError> {
-        self.spend(1000 * self.wanted.len())?;
+        constants: &FieldPoint<FieldElement<P>>,
+    ) -> Result<Vec<FieldElement<P>>, DeriveError> {
+        self.charge(1000 * self.wanted.len())?;
         let values = self.related.values(&self.wanted, constants);
         values.ok_or(DeriveError::RankChanged)
     }
 
-    fn spend(&mut self, operations: usize) -> Result<(), DeriveError> {
+    fn charge(&mut self, operations: usize) -> Result<(), DeriveError> {
         self.budget.spend(operations)
     }
 }
@@ -228,8 +228,8 @@ mod tests {
     use super::*;
     use crate::expr::independent::SEED;
     use crate::expr::{ExprId, Graph};
-    use crate::reduce::constants::{occurrences, root_radicands};
-    use crate::reduce::sample::sampled;
+    use crate::reduce::constants::{constant_occurrences, root_radicands};
+    use crate::reduce::sample::sample_regressor;
 
     /// An arm of revolute joints, each with a length, a twist and an offset of its own.
     fn twisted(n: usize) -> Mechanism {
@@ -255,16 +255,16 @@ mod tests {
         modelmill_spec::load(
             "twisted.toml",
             &text,
-            &modelmill_boundary::files::Memory::default(),
+            &modelmill_boundary::files::MemoryFiles::default(),
         )
         .unwrap_or_else(|failure| panic!("{failure}"))
         .mechanism
     }
 
     /// Factors by near relations where they pay, and by relations to retained columns alone.
-    fn both(mechanism: &Mechanism, operations: u64) -> Result<[Vec<Written>; 2], DeriveError> {
+    fn both(mechanism: &Mechanism, operations: u64) -> Result<[Vec<DependentColumn>; 2], DeriveError> {
         let mut graph = Graph::new();
-        let equations = crate::regressor::equations(&mut graph, mechanism)?;
+        let equations = crate::regressor::unreduced_equations(&mut graph, mechanism)?;
         let columns: Vec<&Vec<ExprId>> = (equations.columns.iter())
             .filter(|column| column.iter().any(|x| *x != Graph::ZERO))
             .collect();
@@ -272,14 +272,14 @@ mod tests {
         let outputs: Vec<ExprId> = (0..projection.drives.len())
             .flat_map(|d| columns.iter().map(move |column| column[d]))
             .collect();
-        let regressor = sampled(&mut graph, mechanism, projection, &outputs, columns.len())?;
-        let mut stream = Stream::new(SEED);
+        let regressor = sample_regressor(&mut graph, mechanism, projection, &outputs, columns.len())?;
+        let mut stream = RandomStream::new(SEED);
         let order: Vec<usize> = (0..columns.len()).collect();
-        let mut dependences = Dependences::find(&regressor, &order, &mut stream)?;
-        let variables = occurrences(&graph, &outputs, &projection.loops.residual);
+        let mut dependences = DependenceStructure::find_dependences(&regressor, &order, &mut stream)?;
+        let variables = constant_occurrences(&graph, &outputs, &projection.loops.residual);
         let roots = root_radicands(&graph, &outputs, &projection.loops.residual);
-        let mut factors = |dependences: &Dependences| {
-            find(
+        let mut factors = |dependences: &DependenceStructure| {
+            find_factors(
                 dependences,
                 &regressor,
                 &variables,
@@ -290,17 +290,17 @@ mod tests {
         };
         let near = factors(&dependences)?;
         assert!(
-            dependences.relations.iter().any(|r| !r.is_direct()),
+            dependences.relations.iter().any(|r| !r.has_retained_only()),
             "nothing is near"
         );
-        dependences.relations.retain(ColumnRelation::is_direct);
+        dependences.relations.retain(ColumnRelation::has_retained_only);
         Ok([near, factors(&dependences)?])
     }
 
     #[test]
     fn factors_put_together_from_near_ones_are_those_that_are_found_at_once() {
         let [near, direct] = both(&twisted(4), MOST_OPERATIONS).unwrap();
-        let all = direct.iter().flat_map(|line| &line.by);
+        let all = direct.iter().flat_map(|line| &line.factors);
         assert!(all.clone().count() > 50 && all.clone().all(|(_, factor)| factor.is_some()));
         assert_eq!(near, direct);
     }

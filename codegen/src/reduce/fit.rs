@@ -3,20 +3,20 @@
 use std::collections::BTreeMap;
 
 use modelmill_algebra::eliminate;
-use modelmill_algebra::field::{Element, MODULUS, PRIMES, Stream};
-use modelmill_algebra::lift::lift;
+use modelmill_algebra::field::{FieldElement, MODULUS, PRIMES, RandomStream};
+use modelmill_algebra::lift::reconstruct_rational;
 
-use super::oracle::{Occurrence, Oracle};
-use super::rational_function::{Polynomial, Powers, RationalFunction, Variable, monomial_value};
-use super::support::support;
+use super::oracle::{ConstantOccurrence, PrimeFieldOracle};
+use super::rational_function::{TrigonometricPolynomial, PowerProduct, RationalFunction, FactorVariable, monomial_value};
+use super::support::nonzero_monomials;
 use crate::DeriveError;
 use crate::expr::{FieldPoint, Rational};
 
 /// What is known about one function before its coefficients are.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Shape {
+pub(super) struct FunctionShape {
     /// Degrees of numerator and denominator in each constant that matters; in half the tangent for angles.
-    pub(super) degrees: BTreeMap<Occurrence, (usize, usize)>,
+    pub(super) degrees: BTreeMap<ConstantOccurrence, (usize, usize)>,
     /// Degrees in all lengths together.
     pub(super) total: Option<(usize, usize)>,
     /// Some degree could not be found.
@@ -24,40 +24,40 @@ pub(super) struct Shape {
 }
 
 /// Random points of one field with the values of all functions, shared between the fits.
-struct Samples<const P: u64> {
-    points: Vec<(FieldPoint<Element<P>>, Vec<Element<P>>)>,
+struct FieldSamples<const P: u64> {
+    points: Vec<(FieldPoint<FieldElement<P>>, Vec<FieldElement<P>>)>,
 }
 
 /// An ansatz for one function.
-struct Ansatz {
+struct RationalAnsatz {
     function: usize,
-    numerator: Vec<Powers>,
-    denominator: Vec<Powers>,
+    numerator: Vec<PowerProduct>,
+    denominator: Vec<PowerProduct>,
     n_points: usize,
 }
 
 /// A field in which an ansatz can be solved; solutions are residues, scaled so that the last coefficient of the
 /// denominator is 1. `None` where a root or an inverse is missing.
-trait Solve<O> {
+trait AnsatzSolver<O> {
     fn modulus(&self) -> u64;
     fn solutions(
         &mut self,
-        ansatz: &Ansatz,
+        ansatz: &RationalAnsatz,
         oracle: &mut O,
-        stream: &mut Stream,
+        stream: &mut RandomStream,
     ) -> Result<Option<Vec<Vec<u64>>>, DeriveError>;
 }
 
-impl<O: Oracle, const P: u64> Solve<O> for Samples<P> {
+impl<O: PrimeFieldOracle, const P: u64> AnsatzSolver<O> for FieldSamples<P> {
     fn modulus(&self) -> u64 {
         P
     }
 
     fn solutions(
         &mut self,
-        ansatz: &Ansatz,
+        ansatz: &RationalAnsatz,
         oracle: &mut O,
-        stream: &mut Stream,
+        stream: &mut RandomStream,
     ) -> Result<Option<Vec<Vec<u64>>>, DeriveError> {
         while self.points.len() < ansatz.n_points {
             let point = oracle.constants(stream)?;
@@ -65,7 +65,7 @@ impl<O: Oracle, const P: u64> Solve<O> for Samples<P> {
             self.points.push((point, values));
         }
         let n_top = ansatz.numerator.len();
-        let rows: Option<Vec<Vec<Element<P>>>> = self.points[..ansatz.n_points]
+        let rows: Option<Vec<Vec<FieldElement<P>>>> = self.points[..ansatz.n_points]
             .iter()
             .map(|(point, values)| {
                 let value = values[ansatz.function];
@@ -79,13 +79,13 @@ impl<O: Oracle, const P: u64> Solve<O> for Samples<P> {
             .collect();
         let Some(rows) = rows else { return Ok(None) };
         let n_unknowns = n_top + ansatz.denominator.len();
-        oracle.spend(rows.len() * n_unknowns * n_unknowns)?;
+        oracle.charge(rows.len() * n_unknowns * n_unknowns)?;
         let solutions = eliminate::null_space(rows, n_unknowns);
         Ok(Some(
             solutions
                 .into_iter()
                 .filter_map(|x| {
-                    let last = x[n_top..].iter().rev().find(|x| **x != Element::ZERO)?;
+                    let last = x[n_top..].iter().rev().find(|x| **x != FieldElement::ZERO)?;
                     let scale = last.inverse()?;
                     Some(x.iter().map(|x| (*x * scale).representative()).collect())
                 })
@@ -95,31 +95,31 @@ impl<O: Oracle, const P: u64> Solve<O> for Samples<P> {
 }
 
 /// All fields, with what was sampled in each.
-pub(super) struct Fields<O>(Vec<Box<dyn Solve<O>>>);
+pub(super) struct PrimeFields<O>(Vec<Box<dyn AnsatzSolver<O>>>);
 
-impl<O: Oracle> Fields<O> {
+impl<O: PrimeFieldOracle> PrimeFields<O> {
     pub(super) fn new() -> Self {
-        fn field<O: Oracle, const P: u64>() -> Box<dyn Solve<O>> {
-            Box::new(Samples::<P> { points: Vec::new() })
+        fn boxed_field<O: PrimeFieldOracle, const P: u64>() -> Box<dyn AnsatzSolver<O>> {
+            Box::new(FieldSamples::<P> { points: Vec::new() })
         }
         const { assert!(PRIMES[0] == MODULUS) };
         Self(vec![
-            field::<O, { PRIMES[0] }>(),
-            field::<O, { PRIMES[1] }>(),
-            field::<O, { PRIMES[2] }>(),
-            field::<O, { PRIMES[3] }>(),
-            field::<O, { PRIMES[4] }>(),
-            field::<O, { PRIMES[5] }>(),
-            field::<O, { PRIMES[6] }>(),
+            boxed_field::<O, { PRIMES[0] }>(),
+            boxed_field::<O, { PRIMES[1] }>(),
+            boxed_field::<O, { PRIMES[2] }>(),
+            boxed_field::<O, { PRIMES[3] }>(),
+            boxed_field::<O, { PRIMES[4] }>(),
+            boxed_field::<O, { PRIMES[5] }>(),
+            boxed_field::<O, { PRIMES[6] }>(),
         ])
     }
 
     /// Coefficients that solve an ansatz, over the rationals.
-    fn solve(
+    fn solve_ansatz(
         &mut self,
-        ansatz: &Ansatz,
+        ansatz: &RationalAnsatz,
         oracle: &mut O,
-        stream: &mut Stream,
+        stream: &mut RandomStream,
     ) -> Result<Option<Vec<Rational>>, DeriveError> {
         let mut residues: Vec<Vec<(u64, u64)>> = Vec::new();
         for field in &mut self.0 {
@@ -134,7 +134,7 @@ impl<O: Oracle> Fields<O> {
             for (all, residue) in residues.iter_mut().zip(solution) {
                 all.push((modulus, residue));
             }
-            let lifted: Option<Vec<Rational>> = residues.iter().map(|r| lift(r)).collect();
+            let lifted: Option<Vec<Rational>> = residues.iter().map(|r| reconstruct_rational(r)).collect();
             if lifted.is_some() {
                 return Ok(lifted);
             }
@@ -143,16 +143,16 @@ impl<O: Oracle> Fields<O> {
     }
 }
 
-impl Shape {
+impl FunctionShape {
     /// Coefficients of numerator and denominator from `numerator - value * denominator = 0` at many points.
-    pub(super) fn fit<O: Oracle>(
+    pub(super) fn fit_function<O: PrimeFieldOracle>(
         &self,
-        fields: &mut Fields<O>,
+        fields: &mut PrimeFields<O>,
         oracle: &mut O,
         origin: &FieldPoint,
         function: usize,
         roots: &[i64],
-        stream: &mut Stream,
+        stream: &mut RandomStream,
     ) -> Result<Option<RationalFunction>, DeriveError> {
         const MOST_UNKNOWNS: usize = 400;
         if self.lost {
@@ -170,7 +170,7 @@ impl Shape {
             return Ok(None);
         }
         let root_powers = root_products(roots);
-        let with_roots = |monomials: Vec<Powers>| -> Vec<Powers> {
+        let with_roots = |monomials: Vec<PowerProduct>| -> Vec<PowerProduct> {
             monomials
                 .iter()
                 .flat_map(|m| {
@@ -201,9 +201,9 @@ impl Shape {
                 if !roots.is_empty() {
                     continue;
                 }
-                let variables: Vec<Occurrence> = self.degrees.keys().copied().collect();
+                let variables: Vec<ConstantOccurrence> = self.degrees.keys().copied().collect();
                 let all = [numerator.as_slice(), denominator.as_slice()];
-                let found = support(
+                let found = nonzero_monomials(
                     oracle,
                     origin,
                     function,
@@ -218,15 +218,15 @@ impl Shape {
             let unknowns = numerator.len() + denominator.len();
             // Roots take either sign by chance; every combination of signs must come up.
             let n_points = unknowns + 4 + 20 * (root_powers.len() - 1);
-            let ansatz = Ansatz {
+            let ansatz = RationalAnsatz {
                 function,
                 numerator,
                 denominator,
                 n_points,
             };
-            if let Some(coefficients) = fields.solve(&ansatz, oracle, stream)? {
+            if let Some(coefficients) = fields.solve_ansatz(&ansatz, oracle, stream)? {
                 let (top, bottom) = coefficients.split_at(ansatz.numerator.len());
-                let polynomial = |monomials: &[Powers], values: &[Rational]| -> Polynomial {
+                let polynomial = |monomials: &[PowerProduct], values: &[Rational]| -> TrigonometricPolynomial {
                     monomials
                         .iter()
                         .zip(values)
@@ -244,9 +244,9 @@ impl Shape {
     }
 
     /// Monomials that the numerator or denominator may have.
-    fn monomials(&self, numerator: bool, angle_bound: usize) -> Vec<Powers> {
+    fn monomials(&self, numerator: bool, angle_bound: usize) -> Vec<PowerProduct> {
         let pick = |(n, d): (usize, usize)| if numerator { n } else { d };
-        let mut monomials: Vec<(Powers, usize)> = vec![(Powers::new(), 0)];
+        let mut monomials: Vec<(PowerProduct, usize)> = vec![(PowerProduct::new(), 0)];
         for ((index, in_angle), degrees) in &self.degrees {
             let mut extended = Vec::new();
             if *in_angle {
@@ -255,8 +255,8 @@ impl Shape {
                     for cosine in 0..=bound {
                         for sine in 0..=1.min(bound - cosine) {
                             let mut powers = powers.clone();
-                            push_power(&mut powers, Variable::Cos(*index), cosine);
-                            push_power(&mut powers, Variable::Sin(*index), sine);
+                            push_power(&mut powers, FactorVariable::Cos(*index), cosine);
+                            push_power(&mut powers, FactorVariable::Sin(*index), sine);
                             extended.push((powers, *total));
                         }
                     }
@@ -267,7 +267,7 @@ impl Shape {
                     for exponent in 0..=pick(*degrees) {
                         if total + exponent <= bound {
                             let mut powers = powers.clone();
-                            push_power(&mut powers, Variable::Constant(*index), exponent);
+                            push_power(&mut powers, FactorVariable::Constant(*index), exponent);
                             extended.push((powers, total + exponent));
                         }
                     }
@@ -275,7 +275,7 @@ impl Shape {
             }
             monomials = extended;
         }
-        let mut powers: Vec<Powers> = monomials.into_iter().map(|(p, _)| p).collect();
+        let mut powers: Vec<PowerProduct> = monomials.into_iter().map(|(p, _)| p).collect();
         for p in &mut powers {
             p.sort_unstable();
         }
@@ -283,20 +283,20 @@ impl Shape {
     }
 }
 
-fn push_power(powers: &mut Powers, variable: Variable, exponent: usize) {
+fn push_power(powers: &mut PowerProduct, variable: FactorVariable, exponent: usize) {
     if exponent > 0 {
         powers.push((variable, u32::try_from(exponent).expect("a small degree")));
     }
 }
 
 /// 1 and every product of different roots.
-fn root_products(roots: &[i64]) -> Vec<Powers> {
-    roots.iter().fold(vec![Powers::new()], |products, root| {
+fn root_products(roots: &[i64]) -> Vec<PowerProduct> {
+    roots.iter().fold(vec![PowerProduct::new()], |products, root| {
         let with = products.iter().map(|p| {
             p.iter()
                 .copied()
-                .chain([(Variable::Root(*root), 1)])
-                .collect::<Powers>()
+                .chain([(FactorVariable::Root(*root), 1)])
+                .collect::<PowerProduct>()
         });
         products.iter().cloned().chain(with).collect()
     })

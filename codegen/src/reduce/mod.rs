@@ -23,21 +23,21 @@ mod sample;
 mod states;
 mod support;
 
-use modelmill_algebra::field::Stream;
+use modelmill_algebra::field::RandomStream;
 use modelmill_spec::Mechanism;
 
-pub use rational_function::{Polynomial, Powers, RationalFunction, Variable};
-pub use reduction::{Dependency, Method, Reduction};
+pub use rational_function::{TrigonometricPolynomial, PowerProduct, RationalFunction, FactorVariable};
+pub use reduction::{ColumnDependency, ReductionMethod, BaseReduction};
 
 use crate::DeriveError;
 use crate::expr::independent::SEED;
 use crate::expr::{ExprId, Graph};
-use crate::regressor::Equations;
-use crate::tree::expressions::Monomial;
-use constants::{occurrences, root_radicands};
-use dependences::Dependences;
-use preference::{Preference, preference};
-use sample::sampled;
+use crate::regressor::UnreducedEquations;
+use crate::tree::expressions::ParameterMonomial;
+use constants::{constant_occurrences, root_radicands};
+use dependences::DependenceStructure;
+use preference::{RetentionPreference, retention_preference};
+use sample::sample_regressor;
 
 /// Reduces the columns `columns[k][d]` (product by drive) to a base.
 ///
@@ -46,9 +46,9 @@ use sample::sampled;
 pub(crate) fn reduce(
     graph: &mut Graph,
     mechanism: &Mechanism,
-    equations: &Equations,
-) -> Result<Reduction, DeriveError> {
-    let Equations {
+    equations: &UnreducedEquations,
+) -> Result<BaseReduction, DeriveError> {
+    let UnreducedEquations {
         projection,
         products: candidates,
         columns,
@@ -57,7 +57,7 @@ pub(crate) fn reduce(
     let effective: Vec<usize> = (0..columns.len())
         .filter(|k| columns[*k].iter().any(|x| *x != Graph::ZERO))
         .collect();
-    let preference = preference(graph, mechanism, equations, &effective);
+    let preference = retention_preference(graph, mechanism, equations, &effective);
     let outputs: Vec<ExprId> = (0..projection.drives.len())
         .flat_map(|d| effective.iter().map(move |k| columns[*k][d]))
         .collect();
@@ -72,7 +72,7 @@ pub(crate) fn reduce(
     let exact = exact.and_then(|found| {
         // Loops are sampled on their algebraic variety; machines live on the branch of the nominal pose.
         let is_contradicted = !projection.loops.closures.is_empty()
-            && numeric::contradicts(graph, mechanism, projection, candidates, columns, &found);
+            && numeric::is_contradicted(graph, mechanism, projection, candidates, columns, &found);
         if is_contradicted {
             Err(DeriveError::NotConfirmed)
         } else {
@@ -102,21 +102,21 @@ pub(crate) fn reduce(
 fn reduce_exactly(
     graph: &mut Graph,
     mechanism: &Mechanism,
-    equations: &Equations,
+    equations: &UnreducedEquations,
     effective: &[usize],
-    preference: &Preference,
+    preference: &RetentionPreference,
     outputs: &[ExprId],
-) -> Result<Reduction, DeriveError> {
+) -> Result<BaseReduction, DeriveError> {
     let (projection, candidates) = (&equations.projection, &equations.products);
-    let regressor = sampled(graph, mechanism, projection, outputs, effective.len())?;
-    let mut stream = Stream::new(SEED);
+    let regressor = sample_regressor(graph, mechanism, projection, outputs, effective.len())?;
+    let mut stream = RandomStream::new(SEED);
     let roots = root_radicands(graph, outputs, &projection.loops.residual);
-    let variables = occurrences(graph, outputs, &projection.loops.residual);
+    let variables = constant_occurrences(graph, outputs, &projection.loops.residual);
     let mut order = &preference.declared;
-    let mut dependences = Dependences::find(&regressor, order, &mut stream)?;
+    let mut dependences = DependenceStructure::find_dependences(&regressor, order, &mut stream)?;
     if preference.own_first != preference.declared {
-        let other = Dependences::find(&regressor, &preference.own_first, &mut stream)?;
-        let mut n_quotients = |dependences: &Dependences| {
+        let other = DependenceStructure::find_dependences(&regressor, &preference.own_first, &mut stream)?;
+        let mut n_quotients = |dependences: &DependenceStructure| {
             factors::n_quotients(dependences, &regressor, &variables, &mut stream)
         };
         if other.pivots != dependences.pivots && n_quotients(&other)? < n_quotients(&dependences)? {
@@ -127,15 +127,15 @@ fn reduce_exactly(
         .map(|k| equations.columns[*k].clone())
         .collect();
     let units: Vec<String> = (effective.iter())
-        .map(|k| base::unit(mechanism, &candidates[*k]))
+        .map(|k| base::product_unit(mechanism, &candidates[*k]))
         .collect();
-    let written = conditioned::Columns {
+    let written = conditioned::RegressorColumns {
         values: &columns,
         units: &units,
     };
     let names = |k: usize| candidates[effective[k]].clone();
-    let reduced = |dependences: &Dependences, stream: &mut Stream| {
-        let factors = factors::find(
+    let reduced = |dependences: &DependenceStructure, stream: &mut RandomStream| {
+        let factors = factors::find_factors(
             dependences,
             &regressor,
             &variables,
@@ -144,10 +144,10 @@ fn reduce_exactly(
             stream,
         )?;
         let reduction = dependences.reduction(mechanism, candidates, &names, factors)?;
-        reduction.confirm(&regressor, &dependences.shown, stream)?;
+        reduction.confirm_reduction(&regressor, &dependences.shown, stream)?;
         Ok(reduction)
     };
-    let better = conditioned::exchanged(
+    let better = conditioned::exchange_columns(
         graph,
         mechanism,
         projection,
@@ -167,25 +167,25 @@ fn reduce_exactly(
         }
         let (first, rest): (Vec<usize>, Vec<usize>) =
             order.iter().partition(|k| exchange.retained.contains(k));
-        dependences = Dependences::find(&regressor, &[first, rest].concat(), &mut stream)?;
+        dependences = DependenceStructure::find_dependences(&regressor, &[first, rest].concat(), &mut stream)?;
     }
     reduced(&dependences, &mut stream)
 }
 
 /// The products that are wanted and have an effect, all retained.
-pub(crate) fn unreduced(equations: &Equations, wanted: &dyn Fn(&Monomial) -> bool) -> Reduction {
+pub(crate) fn without_reduction(equations: &UnreducedEquations, wanted: &dyn Fn(&ParameterMonomial) -> bool) -> BaseReduction {
     let is_zero = |column: &Vec<ExprId>| column.iter().all(|x| *x == Graph::ZERO);
-    let pick = |zero: bool| -> Vec<Monomial> {
+    let pick = |zero: bool| -> Vec<ParameterMonomial> {
         let pairs = equations.products.iter().zip(&equations.columns);
         let found = pairs.filter(|(product, column)| wanted(product) && is_zero(column) == zero);
         found.map(|(product, _)| product.clone()).collect()
     };
     let products = pick(false);
-    Reduction {
+    BaseReduction {
         retained: (0..products.len()).collect(),
         without_effect: pick(true),
         products,
         dependencies: Vec::new(),
-        method: Method::Unreduced,
+        method: ReductionMethod::Unreduced,
     }
 }

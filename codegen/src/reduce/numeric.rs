@@ -5,21 +5,21 @@
 //! machine numbers resolve. So states come from a walk along the whole motion, have some 130 digits, and are on all loops.
 //! The factors hold for the file's values alone; results say so, with what they leave at further states.
 
-use modelmill_algebra::digits::Digits;
-use modelmill_algebra::field::Stream;
+use modelmill_algebra::digits::BigFloat;
+use modelmill_algebra::field::RandomStream;
 use modelmill_spec::Mechanism;
 use nalgebra::DMatrix;
 
 use super::base;
-use super::recognise::{Constants, metres};
-use super::reduction::{Dependency, Method, Reduction};
-use super::states::States;
+use super::recognise::{FileConstants, length_exponent};
+use super::reduction::{ColumnDependency, ReductionMethod, BaseReduction};
+use super::states::WalkSampler;
 use crate::DeriveError;
 use crate::expr::independent::SEED;
-use crate::expr::{Atom, ExprId, F64, Graph, Tape};
-use crate::loops::numeric_poses::{NumericLoops, symmetric};
-use crate::regressor::projection::Projection;
-use crate::tree::expressions::Monomial;
+use crate::expr::{Atom, ExprId, FloatDomain, Graph, EvaluationTape};
+use crate::loops::numeric_poses::{NumericLoops, uniform_symmetric};
+use crate::regressor::projection::LoopProjection;
+use crate::tree::expressions::ParameterMonomial;
 
 /// A column counts as dependent where others leave less than this of it, relative to its size; and as none where it is smaller
 /// than this, relative to the largest. So does a column at a pose in machine numbers.
@@ -42,38 +42,38 @@ const ROUNDS: usize = 4;
 pub(super) fn reduce(
     graph: &mut Graph,
     mechanism: &Mechanism,
-    projection: &Projection,
-    candidates: &[Monomial],
+    projection: &LoopProjection,
+    candidates: &[ParameterMonomial],
     columns: &[Vec<ExprId>],
     order: &[usize],
     because: DeriveError,
-) -> Result<Reduction, DeriveError> {
-    let mut states = States::new(graph, mechanism, projection, columns)?;
+) -> Result<BaseReduction, DeriveError> {
+    let mut states = WalkSampler::new(graph, mechanism, projection, columns)?;
     let n_rows = columns.len() + columns.len() / 4 + 20;
     let values: Vec<f64> = mechanism.constants.iter().map(|c| c.value).collect();
-    let mut rows = states.rows(n_rows)?;
+    let mut rows = states.next_rows(n_rows)?;
     for _ in 0..ROUNDS {
-        let w = Columns::new(&rows, columns.len());
-        let limit = DEPENDENT.max(PER_OFF * states.off());
+        let w = ObservationColumns::new(&rows, columns.len());
+        let limit = DEPENDENT.max(PER_OFF * states.closure_error());
         // Masses and their moments are compared at the length of the largest loop.
         let sized = |k: usize| {
-            let metres = metres(&base::unit(mechanism, &candidates[k])).unwrap_or(2);
-            w.norms[k] / states.length().powi(2 - metres)
+            let metres = length_exponent(&base::product_unit(mechanism, &candidates[k])).unwrap_or(2);
+            w.norms[k] / states.loop_size().powi(2 - metres)
         };
         let sizes: Vec<f64> = (0..columns.len()).map(sized).collect();
         let largest = sizes.iter().fold(0.0, |a: f64, b| a.max(*b));
         let is_effective = |k: &usize| sizes[*k] > limit * largest;
         let tried: Vec<usize> = order.iter().copied().filter(is_effective).collect();
-        let base = Base::new(&w, &tried, limit);
+        let base = NumericBase::new(&w, &tried, limit);
         // What contributes less than is dropped is rounding.
         let rounding = (1e3 * base.most_dropped).clamp(1e-60, 1e-9);
-        let (mut found, effective) = written(mechanism, candidates, &w, &tried, &base, rounding);
-        let further = states.rows(n_rows)?;
-        let residual = Columns::new(&further, columns.len()).left(&found, &effective, &values);
+        let (mut found, effective) = numeric_reduction(mechanism, candidates, &w, &tried, &base, rounding);
+        let further = states.next_rows(n_rows)?;
+        let residual = ObservationColumns::new(&further, columns.len()).largest_residual(&found, &effective, &values);
         // Terms that count as rounding are left out, each by itself.
         let left_out = rounding * base.kept.len() as f64;
-        if residual <= SHOWN.max(SHOWN_PER_OFF * states.off()).max(left_out) {
-            found.method = Method::Numeric {
+        if residual <= SHOWN.max(SHOWN_PER_OFF * states.closure_error()).max(left_out) {
+            found.method = ReductionMethod::Numeric {
                 least_kept: base.least_kept,
                 most_dropped: base.most_dropped,
                 residual,
@@ -89,14 +89,14 @@ pub(super) fn reduce(
 
 /// What was found as dependences of columns that have an effect, with the positions of these; factors as a person would write
 /// them.
-fn written(
+fn numeric_reduction(
     mechanism: &Mechanism,
-    candidates: &[Monomial],
-    w: &Columns,
+    candidates: &[ParameterMonomial],
+    w: &ObservationColumns,
     tried: &[usize],
-    base: &Base,
+    base: &NumericBase,
     rounding: f64,
-) -> (Reduction, Vec<usize>) {
+) -> (BaseReduction, Vec<usize>) {
     let mut effective = tried.to_vec();
     effective.sort_unstable();
     let at = |k: usize| {
@@ -113,29 +113,29 @@ fn written(
             .position(|x| *x == k)
             .expect("a kept column is kept")
     };
-    let constants = Constants::new(mechanism, rounding.min(1e-10));
-    let mut dependencies: Vec<Dependency> = Vec::new();
+    let constants = FileConstants::new(mechanism, rounding.min(1e-10));
+    let mut dependencies: Vec<ColumnDependency> = Vec::new();
     for j in tried.iter().copied().filter(|j| !base.kept.contains(j)) {
-        let factors = base.kept.iter().zip(base.factors(j));
+        let factors = base.kept.iter().zip(base.column_factors(j));
         let mut equals: Vec<_> = factors
             .filter(|(k, f)| f.abs().to_f64() * w.norms[**k] > rounding * w.norms[j])
             .map(|(k, f)| {
                 (
                     retained_at(*k),
-                    constants.factor(&f, &candidates[j], &candidates[*k]),
+                    constants.recognise_factor(&f, &candidates[j], &candidates[*k]),
                 )
             })
             .collect();
         equals.sort_by_key(|(k, _)| *k);
-        dependencies.push(Dependency {
+        dependencies.push(ColumnDependency {
             product: at(j),
             equals,
             via: Vec::new(),
         });
     }
     dependencies.sort_by_key(|line| line.product);
-    let products: Vec<Monomial> = effective.iter().map(|k| candidates[*k].clone()).collect();
-    let found = Reduction {
+    let products: Vec<ParameterMonomial> = effective.iter().map(|k| candidates[*k].clone()).collect();
+    let found = BaseReduction {
         without_effect: candidates
             .iter()
             .filter(|c| !products.contains(c))
@@ -144,20 +144,20 @@ fn written(
         retained: sorted.iter().map(|k| at(*k)).collect(),
         products,
         dependencies,
-        method: Method::Unreduced,
+        method: ReductionMethod::Unreduced,
     };
     (found, effective)
 }
 
 /// Columns of W.
-struct Columns {
-    values: Vec<Vec<Digits>>,
+struct ObservationColumns {
+    values: Vec<Vec<BigFloat>>,
     norms: Vec<f64>,
 }
 
-impl Columns {
-    fn new(rows: &[Vec<Digits>], n: usize) -> Self {
-        let values: Vec<Vec<Digits>> = (0..n)
+impl ObservationColumns {
+    fn new(rows: &[Vec<BigFloat>], n: usize) -> Self {
+        let values: Vec<Vec<BigFloat>> = (0..n)
             .map(|k| rows.iter().map(|row| row[k].clone()).collect())
             .collect();
         Self {
@@ -167,7 +167,7 @@ impl Columns {
     }
 
     /// The most that dependences leave of a column, relative to their terms.
-    fn left(&self, found: &Reduction, effective: &[usize], constants: &[f64]) -> f64 {
+    fn largest_residual(&self, found: &BaseReduction, effective: &[usize], constants: &[f64]) -> f64 {
         let lines = found.dependencies.iter().zip(found.factors(constants));
         let shares = lines.map(|(line, factors)| {
             let product = effective[line.product];
@@ -176,8 +176,8 @@ impl Columns {
             for (k, factor) in factors {
                 let kept = effective[found.retained[k]];
                 size += factor.abs() * self.norms[kept];
-                let factor = Digits::from_f64(-factor).expect("a factor is a number");
-                add(&mut left, &factor, &self.values[kept]);
+                let factor = BigFloat::from_f64(-factor).expect("a factor is a number");
+                add_multiple(&mut left, &factor, &self.values[kept]);
             }
             norm(&left) / size
         });
@@ -185,7 +185,7 @@ impl Columns {
     }
 }
 
-fn norm(column: &[Digits]) -> f64 {
+fn norm(column: &[BigFloat]) -> f64 {
     column
         .iter()
         .map(|x| x.to_f64().powi(2))
@@ -193,32 +193,32 @@ fn norm(column: &[Digits]) -> f64 {
         .sqrt()
 }
 
-fn dot(a: &[Digits], b: &[Digits]) -> Digits {
+fn dot(a: &[BigFloat], b: &[BigFloat]) -> BigFloat {
     let products = a.iter().zip(b).map(|(a, b)| a * b);
-    products.fold(Digits::zero(), |sum, term| &sum + &term)
+    products.fold(BigFloat::zero(), |sum, term| &sum + &term)
 }
 
 /// `column + factor * other`
-fn add(column: &mut [Digits], factor: &Digits, other: &[Digits]) {
+fn add_multiple(column: &mut [BigFloat], factor: &BigFloat, other: &[BigFloat]) {
     for (x, y) in column.iter_mut().zip(other) {
         *x = &*x + &(factor * y);
     }
 }
 
 /// Columns that are kept, and what all others are beside them.
-struct Base {
+struct NumericBase {
     /// In the order in which they were taken.
     kept: Vec<usize>,
     /// What the others leave of the kept column that is nearest to being dependent, and of the dropped one that is furthest.
     least_kept: f64,
     most_dropped: f64,
     /// Of each column the shares along what was left of each kept one when that was taken.
-    shares: Vec<Vec<Digits>>,
+    shares: Vec<Vec<BigFloat>>,
 }
 
-impl Base {
+impl NumericBase {
     /// The first columns of which much is left beside those before, then those of which most is left, down to `limit`.
-    fn new(w: &Columns, tried: &[usize], limit: f64) -> Self {
+    fn new(w: &ObservationColumns, tried: &[usize], limit: f64) -> Self {
         const MUCH: f64 = 1e-3;
         let mut left = w.values.clone();
         let mut base = Self {
@@ -244,14 +244,14 @@ impl Base {
             let square = dot(&direction, &direction);
             for (j, _) in open.into_iter().filter(|(j, _)| *j != pivot) {
                 let share = dot(&direction, &left[j]) / square.clone();
-                add(&mut left[j], &-&share, &direction);
+                add_multiple(&mut left[j], &-&share, &direction);
                 base.shares[j].push(share);
             }
         }
     }
 
     /// A dropped column by the kept ones.
-    fn factors(&self, j: usize) -> Vec<Digits> {
+    fn column_factors(&self, j: usize) -> Vec<BigFloat> {
         let mut factors = self.shares[j].clone();
         for m in (0..factors.len()).rev() {
             for i in 0..m {
@@ -265,17 +265,17 @@ impl Base {
 
 /// Whether dependences that were found elsewhere fail on the model file's values around the nominal pose. Where no pose
 /// is found they do not.
-pub(super) fn contradicts(
+pub(super) fn is_contradicted(
     graph: &mut Graph,
     mechanism: &Mechanism,
-    projection: &Projection,
-    candidates: &[Monomial],
+    projection: &LoopProjection,
+    candidates: &[ParameterMonomial],
     columns: &[Vec<ExprId>],
-    found: &Reduction,
+    found: &BaseReduction,
 ) -> bool {
     /// Far above rounding in poses that are followed, far below what a wrong dependence makes.
     const WRONG: f64 = 1e-6;
-    let Ok(w) = sample(graph, mechanism, projection, columns, 0, REACH) else {
+    let Ok(w) = sample_observations(graph, mechanism, projection, columns, 0, REACH) else {
         return false;
     };
     let constants: Vec<f64> = mechanism.constants.iter().map(|c| c.value).collect();
@@ -305,10 +305,10 @@ pub(super) fn contradicts(
 }
 
 /// W of eq. (9) at random states around the nominal pose, with some more rows than are wanted.
-pub(super) fn sample(
+pub(super) fn sample_observations(
     graph: &mut Graph,
     mechanism: &Mechanism,
-    projection: &Projection,
+    projection: &LoopProjection,
     columns: &[Vec<ExprId>],
     wanted: usize,
     farthest: f64,
@@ -323,8 +323,8 @@ pub(super) fn sample(
         &projection.passive_accelerations,
         &outputs,
     ]
-    .map(|roots| Tape::new(graph, roots));
-    let mut stream = Stream::new(SEED);
+    .map(|roots| EvaluationTape::new(graph, roots));
+    let mut stream = RandomStream::new(SEED);
     let n_coordinates = mechanism.coordinates.len();
     let mut rows: Vec<f64> = Vec::new();
     let wanted = wanted.div_ceil(n_drives.max(1)) + 10;
@@ -335,20 +335,20 @@ pub(super) fn sample(
             reach = (reach / 2.0).max(farthest / f64::from(1_u32 << HALVINGS));
         }
         tries += 1;
-        let Some(q) = loops.random(reach, &mut stream) else {
+        let Some(q) = loops.random_pose(reach, &mut stream) else {
             continue;
         };
         let mut moving = |most: f64| -> Vec<f64> {
             (0..n_coordinates)
-                .map(|i| most * loops.unit(i) * symmetric(&mut stream))
+                .map(|i| most * loops.coordinate_unit(i) * uniform_symmetric(&mut stream))
                 .collect()
         };
         let (mut qd, mut qdd) = (moving(2.0), moving(5.0));
         let load: Vec<f64> = (0..n_drives)
-            .map(|_| 100.0 * symmetric(&mut stream))
+            .map(|_| 100.0 * uniform_symmetric(&mut stream))
             .collect();
-        let evaluate = |tape: &Tape, qd: &[f64], qdd: &[f64]| {
-            tape.evaluate(&F64(|atom: Atom| match atom {
+        let evaluate = |tape: &EvaluationTape, qd: &[f64], qdd: &[f64]| {
+            tape.evaluate(&FloatDomain(|atom: Atom| match atom {
                 Atom::Constant(i) => mechanism.constants[i].value,
                 Atom::Parameter(i) => mechanism.parameters[i].nominal,
                 Atom::Coordinate(i) => q[i],
@@ -392,7 +392,7 @@ pub(super) fn sample(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::regressor::equations;
+    use crate::regressor::unreduced_equations;
     use crate::review::tests::model;
 
     /// Where an exact base is known the numeric one has as many columns, with factors that are constants of the file.
@@ -411,9 +411,9 @@ mod tests {
         ] {
             let mechanism = model(name);
             let mut graph = Graph::new();
-            let found = equations(&mut graph, &mechanism).expect("equations");
+            let found = unreduced_equations(&mut graph, &mechanism).expect("equations");
             let exact = crate::reduce::reduce(&mut graph, &mechanism, &found).expect("a base");
-            assert!(matches!(exact.method, Method::Exact { .. }), "{name}");
+            assert!(matches!(exact.method, ReductionMethod::Exact { .. }), "{name}");
             let order: Vec<usize> = (0..found.columns.len())
                 .filter(|k| found.columns[*k].iter().any(|x| *x != Graph::ZERO))
                 .collect();
@@ -428,7 +428,7 @@ mod tests {
             )
             .expect("a base");
             assert_eq!(numeric.retained.len(), exact.retained.len(), "{name}");
-            let Method::Numeric {
+            let ReductionMethod::Numeric {
                 least_kept,
                 most_dropped,
                 residual,
@@ -450,7 +450,7 @@ mod tests {
             assert!(text.contains(old), "{name} has no {old}");
             text = text.replace(old, new);
         }
-        let memory = modelmill_boundary::files::Memory::default();
+        let memory = modelmill_boundary::files::MemoryFiles::default();
         match modelmill_spec::load(name, &text, &memory) {
             Ok(loaded) => loaded.mechanism,
             Err(failure) => panic!("{}", failure.render(false)),
@@ -468,7 +468,7 @@ mod tests {
         ] {
             let found = crate::derive(&judged(name, &[])).expect("a derivation");
             assert_eq!(found.reduction.retained.len(), rank, "{name}");
-            let Method::Numeric {
+            let ReductionMethod::Numeric {
                 least_kept,
                 most_dropped,
                 residual,
@@ -502,7 +502,7 @@ mod tests {
         )];
         let found = crate::derive(&judged("bricard_regular", &rounded)).expect("a derivation");
         assert_eq!(found.reduction.retained.len(), 19);
-        let Method::Numeric { residual, .. } = found.reduction.method else {
+        let ReductionMethod::Numeric { residual, .. } = found.reduction.method else {
             panic!("{:?}", found.reduction.method);
         };
         assert!(residual > 1e-12 && residual < 1e-6, "{residual:.1e}");

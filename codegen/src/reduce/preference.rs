@@ -10,13 +10,13 @@ use std::collections::BTreeMap;
 use modelmill_spec::Mechanism;
 
 use crate::expr::{ExprId, Graph, Node, Rational};
-use crate::newton_euler::Inertia;
-use crate::regressor::Equations;
-use crate::tree::Tree;
-use crate::tree::expressions::Monomial;
+use crate::newton_euler::InertiaFactors;
+use crate::regressor::UnreducedEquations;
+use crate::tree::KinematicTree;
+use crate::tree::expressions::ParameterMonomial;
 
 /// Positions among the effective products, most preferred first.
-pub(super) struct Preference {
+pub(super) struct RetentionPreference {
     /// In the order of eq. (5).
     pub(super) declared: Vec<usize>,
     /// Masses at a distance behind their links' own products.
@@ -25,19 +25,19 @@ pub(super) struct Preference {
     pub(super) n_named: usize,
 }
 
-pub(super) fn preference(
+pub(super) fn retention_preference(
     graph: &Graph,
     mechanism: &Mechanism,
-    equations: &Equations,
+    equations: &UnreducedEquations,
     effective: &[usize],
-) -> Preference {
+) -> RetentionPreference {
     let product = |k: usize| &equations.products[effective[k]];
     let mut order: Vec<usize> = mechanism
         .retain
         .iter()
         .filter_map(|powers| {
-            let wanted = powers.iter().fold(Monomial::default(), |m, (p, n)| {
-                m.times(&Monomial(vec![(p.0, *n)]))
+            let wanted = powers.iter().fold(ParameterMonomial::default(), |m, (p, n)| {
+                m.times(&ParameterMonomial(vec![(p.0, *n)]))
             });
             (0..effective.len()).find(|k| *product(*k) == wanted)
         })
@@ -48,8 +48,8 @@ pub(super) fn preference(
             named.push(k);
         }
     }
-    let carried: Vec<Carried> = (0..effective.len())
-        .map(|k| Carried::new(graph, equations, product(k)))
+    let carried: Vec<ProductBodies> = (0..effective.len())
+        .map(|k| ProductBodies::new(graph, equations, product(k)))
         .collect();
     let mut last_own: BTreeMap<usize, usize> = BTreeMap::new();
     for (k, one) in carried.iter().enumerate() {
@@ -67,7 +67,7 @@ pub(super) fn preference(
         let after = own.copied().max().filter(|_| one.is_distant).unwrap_or(0);
         (after.max(k), one.is_distant, k)
     });
-    Preference {
+    RetentionPreference {
         declared,
         own_first: [named.as_slice(), &others].concat(),
         n_named: named.len(),
@@ -75,27 +75,27 @@ pub(super) fn preference(
 }
 
 /// On which bodies a product has inertia.
-struct Carried {
+struct ProductBodies {
     /// Links that move relative to their parents; what hangs on them without a joint is theirs.
     bodies: Vec<usize>,
     /// Whether some of it depends on where the product sits on them.
     is_distant: bool,
 }
 
-impl Carried {
-    fn new(graph: &Graph, equations: &Equations, product: &Monomial) -> Self {
+impl ProductBodies {
+    fn new(graph: &Graph, equations: &UnreducedEquations, product: &ParameterMonomial) -> Self {
         let (mut bodies, mut is_distant) = (Vec::new(), false);
-        for (link, inertia) in equations.inertia.by_link(product) {
+        for (link, inertia) in equations.inertia.link_inertias(product) {
             let (body, is_at_origin) = body_of(&equations.tree, link);
             bodies.extend(body);
-            is_distant |= !(is_at_origin && is_own(graph, inertia));
+            is_distant |= !(is_at_origin && is_direct_parameter(graph, inertia));
         }
         Self { bodies, is_distant }
     }
 }
 
 /// The moving link to which a link is fixed, and whether their origins are the same.
-fn body_of(tree: &Tree, mut link: usize) -> (Option<usize>, bool) {
+fn body_of(tree: &KinematicTree, mut link: usize) -> (Option<usize>, bool) {
     let mut is_at_origin = true;
     loop {
         let here = &tree.links[link];
@@ -111,10 +111,10 @@ fn body_of(tree: &Tree, mut link: usize) -> (Option<usize>, bool) {
 }
 
 /// Whether an inertia is that of a parameter about the origin: all that it holds is one number, but for signs.
-fn is_own(graph: &Graph, inertia: &Inertia) -> bool {
+fn is_direct_parameter(graph: &Graph, inertia: &InertiaFactors) -> bool {
     let mut sizes = Vec::new();
     for factor in inertia.iter().filter(|factor| **factor != Graph::ZERO) {
-        match number(graph, *factor) {
+        match number_magnitude(graph, *factor) {
             Some(number) => sizes.push(number),
             None => return false,
         }
@@ -123,7 +123,7 @@ fn is_own(graph: &Graph, inertia: &Inertia) -> bool {
 }
 
 /// The size of a number.
-fn number(graph: &Graph, id: ExprId) -> Option<Rational> {
+fn number_magnitude(graph: &Graph, id: ExprId) -> Option<Rational> {
     match graph.node(id) {
         Node::Rational(value) if value.is_negative() => Some(-value),
         Node::Rational(value) => Some(value.clone()),

@@ -2,19 +2,19 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use modelmill_algebra::field::Element;
+use modelmill_algebra::field::FieldElement;
 
 use num_rational::BigRational;
 use num_traits::{ToPrimitive, Zero};
 
-use crate::expr::{AngleSum, Atom, ExprId, FieldPoint, Graph, Rational};
+use crate::expr::{AtomAngleSum, Atom, ExprId, FieldPoint, Graph, Rational};
 
 /// What is left of a sum's terms, relative to their sizes, below which it is added up exactly.
 const CANCELLED: f64 = 1e-3;
 
 /// What a factor may depend on: a constant, or the cosine or sine of a constant angle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Variable {
+pub enum FactorVariable {
     /// A constant of the model file.
     Constant(usize),
     /// Cosine of a constant angle.
@@ -25,15 +25,15 @@ pub enum Variable {
     Root(i64),
 }
 
-impl Variable {
+impl FactorVariable {
     /// Its value at a point of the field.
-    pub(crate) fn value<const P: u64>(self, point: &FieldPoint<Element<P>>) -> Option<Element<P>> {
+    pub(crate) fn value<const P: u64>(self, point: &FieldPoint<FieldElement<P>>) -> Option<FieldElement<P>> {
         match self {
             Self::Constant(i) => point.values.get(&Atom::Constant(i)).copied(),
             Self::Cos(i) => point.angles.get(&Atom::Constant(i)).map(|cs| cs.0),
             Self::Sin(i) => point.angles.get(&Atom::Constant(i)).map(|cs| cs.1),
             Self::Root(n) => {
-                crate::expr::Domain::unary(point, crate::expr::Unary::Sqrt, &Element::from_i64(n))
+                crate::expr::EvaluationDomain::unary(point, crate::expr::Unary::Sqrt, &FieldElement::from_i64(n))
             }
         }
     }
@@ -52,8 +52,8 @@ impl Variable {
     pub fn expression(self, graph: &mut Graph) -> ExprId {
         match self {
             Self::Constant(i) => graph.atom(Atom::Constant(i)),
-            Self::Cos(i) => graph.cos_sin(&AngleSum::new([(Atom::Constant(i), 1)]), 0).0,
-            Self::Sin(i) => graph.cos_sin(&AngleSum::new([(Atom::Constant(i), 1)]), 0).1,
+            Self::Cos(i) => graph.cos_sin(&AtomAngleSum::new([(Atom::Constant(i), 1)]), 0).0,
+            Self::Sin(i) => graph.cos_sin(&AtomAngleSum::new([(Atom::Constant(i), 1)]), 0).1,
             Self::Root(n) => {
                 let radicand = graph.integer(n);
                 graph.unary(crate::expr::Unary::Sqrt, radicand)
@@ -63,28 +63,28 @@ impl Variable {
 }
 
 /// A product of powers of variables, sorted, without zero exponents.
-pub type Powers = Vec<(Variable, u32)>;
+pub type PowerProduct = Vec<(FactorVariable, u32)>;
 
 /// A polynomial with rational coefficients, none of them zero.
-pub type Polynomial = BTreeMap<Powers, Rational>;
+pub type TrigonometricPolynomial = BTreeMap<PowerProduct, Rational>;
 
 /// A quotient of two polynomials in the constants, in lowest terms up to common factors of several terms.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RationalFunction {
     /// Numerator; empty for 0.
-    pub numerator: Polynomial,
+    pub numerator: TrigonometricPolynomial,
     /// Denominator with coprime integer coefficients, the first of them positive.
-    pub denominator: Polynomial,
+    pub denominator: TrigonometricPolynomial,
 }
 
 impl RationalFunction {
     /// A number.
     pub fn constant(value: Rational) -> Self {
-        let one = BTreeMap::from([(Powers::new(), Rational::ONE)]);
+        let one = BTreeMap::from([(PowerProduct::new(), Rational::ONE)]);
         let numerator = if value.is_zero() {
             BTreeMap::new()
         } else {
-            BTreeMap::from([(Powers::new(), value)])
+            BTreeMap::from([(PowerProduct::new(), value)])
         };
         Self {
             numerator,
@@ -93,7 +93,7 @@ impl RationalFunction {
     }
 
     /// Normalises a quotient; the denominator must not be zero.
-    pub(crate) fn new(mut numerator: Polynomial, mut denominator: Polynomial) -> Self {
+    pub(crate) fn new(mut numerator: TrigonometricPolynomial, mut denominator: TrigonometricPolynomial) -> Self {
         assert!(!denominator.is_empty(), "a denominator is not zero");
         if numerator.is_empty() {
             return Self::constant(Rational::ZERO);
@@ -109,7 +109,7 @@ impl RationalFunction {
                     .collect()
             })
             .unwrap_or_default();
-        let strip = |p: Polynomial| -> Polynomial {
+        let strip = |p: TrigonometricPolynomial| -> TrigonometricPolynomial {
             p.into_iter()
                 .map(|(powers, k)| {
                     let rest = powers
@@ -154,8 +154,8 @@ impl RationalFunction {
         }
         match (
             self.numerator.len(),
-            self.numerator.get(&Powers::new()),
-            self.denominator.get(&Powers::new()),
+            self.numerator.get(&PowerProduct::new()),
+            self.denominator.get(&PowerProduct::new()),
         ) {
             (1, Some(n), Some(d)) if self.denominator.len() == 1 => Some(n * &d.recip()),
             _ => None,
@@ -163,7 +163,7 @@ impl RationalFunction {
     }
 
     /// Its value at a point of the field; `None` where the denominator vanishes.
-    pub(crate) fn value<const P: u64>(&self, point: &FieldPoint<Element<P>>) -> Option<Element<P>> {
+    pub(crate) fn value<const P: u64>(&self, point: &FieldPoint<FieldElement<P>>) -> Option<FieldElement<P>> {
         let denominator = polynomial_value(&self.denominator, point)?.inverse()?;
         Some(polynomial_value(&self.numerator, point)? * denominator)
     }
@@ -171,7 +171,7 @@ impl RationalFunction {
     /// Its value for constants in floating point, by index. Sums whose terms all but cancel are added up exactly: quotients
     /// of them are large, and would have lost their digits twice over.
     pub fn value_f64(&self, constants: &[f64]) -> f64 {
-        let evaluate = |p: &Polynomial| -> f64 {
+        let evaluate = |p: &TrigonometricPolynomial| -> f64 {
             let (mut sum, mut size) = (0.0, 0.0);
             for (powers, k) in p {
                 let term = powers.iter().fold(k.to_f64(), |product, (v, n)| {
@@ -199,7 +199,7 @@ impl RationalFunction {
 
     /// As an expression of the graph.
     pub fn expression(&self, graph: &mut Graph) -> ExprId {
-        let mut build = |p: &Polynomial| {
+        let mut build = |p: &TrigonometricPolynomial| {
             let terms: Vec<_> = p
                 .iter()
                 .map(|(powers, k)| {
@@ -228,17 +228,17 @@ fn from_f64(value: f64) -> BigRational {
 }
 
 /// The exact value of a polynomial for exact constants; sines, cosines and roots are those of floating point.
-fn polynomial_exact(p: &Polynomial, constants: &[BigRational]) -> BigRational {
+fn polynomial_exact(p: &TrigonometricPolynomial, constants: &[BigRational]) -> BigRational {
     let mut sum = BigRational::zero();
     for (powers, k) in p {
         let mut product = k.to_big();
         for (v, n) in powers {
             let angle = |i: &usize| constants[*i].to_f64().unwrap_or(f64::NAN);
             let value = match v {
-                Variable::Constant(i) => constants[*i].clone(),
-                Variable::Cos(i) => from_f64(angle(i).cos()),
-                Variable::Sin(i) => from_f64(angle(i).sin()),
-                Variable::Root(r) => from_f64((*r as f64).sqrt()),
+                FactorVariable::Constant(i) => constants[*i].clone(),
+                FactorVariable::Cos(i) => from_f64(angle(i).cos()),
+                FactorVariable::Sin(i) => from_f64(angle(i).sin()),
+                FactorVariable::Root(r) => from_f64((*r as f64).sqrt()),
             };
             product *= num_traits::pow(value, *n as usize);
         }
@@ -249,31 +249,31 @@ fn polynomial_exact(p: &Polynomial, constants: &[BigRational]) -> BigRational {
 
 /// The same polynomial with even powers of a cosine as powers of the sine where that has fewer terms:
 /// `L^2 - L^2*cos(beta)^2` is `L^2*sin(beta)^2`.
-fn with_fewest_terms(mut p: Polynomial) -> Polynomial {
+fn with_fewest_terms(mut p: TrigonometricPolynomial) -> TrigonometricPolynomial {
     let angles: BTreeSet<usize> = p
         .keys()
         .flatten()
         .filter_map(|(v, _)| match v {
-            Variable::Cos(i) => Some(*i),
+            FactorVariable::Cos(i) => Some(*i),
             _ => None,
         })
         .collect();
     for i in angles {
-        let mut in_sines = Polynomial::new();
+        let mut in_sines = TrigonometricPolynomial::new();
         for (powers, k) in &p {
-            let power_of = |v: Variable| {
+            let power_of = |v: FactorVariable| {
                 let found = powers.iter().find(|(w, _)| *w == v);
                 found.map_or(0, |(_, n)| *n)
             };
-            let (cosines, sines) = (power_of(Variable::Cos(i)), power_of(Variable::Sin(i)));
+            let (cosines, sines) = (power_of(FactorVariable::Cos(i)), power_of(FactorVariable::Sin(i)));
             // cos^2n = (1 - sin^2)^n, term by term with alternating binomial coefficients.
             let n = cosines / 2;
             let mut coefficient = k.clone();
             for j in 0..=n {
-                let mut term: BTreeMap<Variable, u32> = powers.iter().copied().collect();
-                term.insert(Variable::Cos(i), cosines % 2);
-                term.insert(Variable::Sin(i), sines + 2 * j);
-                let term: Powers = term.into_iter().filter(|(_, n)| *n > 0).collect();
+                let mut term: BTreeMap<FactorVariable, u32> = powers.iter().copied().collect();
+                term.insert(FactorVariable::Cos(i), cosines % 2);
+                term.insert(FactorVariable::Sin(i), sines + 2 * j);
+                let term: PowerProduct = term.into_iter().filter(|(_, n)| *n > 0).collect();
                 let sum = in_sines.entry(term).or_insert(Rational::ZERO);
                 *sum = &*sum + &coefficient;
                 coefficient = &coefficient * &Rational::new(-i64::from(n - j), i64::from(j) + 1);
@@ -288,19 +288,19 @@ fn with_fewest_terms(mut p: Polynomial) -> Polynomial {
 }
 
 pub(crate) fn monomial_value<const P: u64>(
-    powers: &Powers,
-    point: &FieldPoint<Element<P>>,
-) -> Option<Element<P>> {
-    powers.iter().try_fold(Element::ONE, |product, (v, n)| {
+    powers: &PowerProduct,
+    point: &FieldPoint<FieldElement<P>>,
+) -> Option<FieldElement<P>> {
+    powers.iter().try_fold(FieldElement::ONE, |product, (v, n)| {
         Some(product * v.value(point)?.power(u64::from(*n)))
     })
 }
 
 fn polynomial_value<const P: u64>(
-    p: &Polynomial,
-    point: &FieldPoint<Element<P>>,
-) -> Option<Element<P>> {
-    p.iter().try_fold(Element::ZERO, |sum, (powers, k)| {
-        Some(sum + Element::from_rational(k)? * monomial_value(powers, point)?)
+    p: &TrigonometricPolynomial,
+    point: &FieldPoint<FieldElement<P>>,
+) -> Option<FieldElement<P>> {
+    p.iter().try_fold(FieldElement::ZERO, |sum, (powers, k)| {
+        Some(sum + FieldElement::from_rational(k)? * monomial_value(powers, point)?)
     })
 }

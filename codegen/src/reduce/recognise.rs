@@ -2,14 +2,14 @@
 //!
 //! Of all that equal a number in all its digits and have its unit the shortest is taken; what has none is rounded.
 
-use modelmill_algebra::digits::Digits;
+use modelmill_algebra::digits::BigFloat;
 use modelmill_spec::Mechanism;
 use num_traits::ToPrimitive;
 
 use super::base;
-use super::rational_function::{Polynomial, Powers, RationalFunction, Variable};
+use super::rational_function::{TrigonometricPolynomial, PowerProduct, RationalFunction, FactorVariable};
 use crate::expr::Rational;
-use crate::tree::expressions::Monomial;
+use crate::tree::expressions::ParameterMonomial;
 
 const LARGEST_DENOMINATOR: i64 = 24;
 const LARGEST_NUMERATOR: f64 = 1000.0;
@@ -22,40 +22,40 @@ const MOST_IN_THREES: usize = 12;
 const MOST_IN_PAIRS: usize = 60;
 
 /// Constants of a model file, alone and a few together.
-pub(super) struct Constants<'a> {
+pub(super) struct FileConstants<'a> {
     mechanism: &'a Mechanism,
-    powers: Vec<Power>,
+    powers: Vec<ConstantPower>,
     /// How far a number may be from what it is taken for, relative to it.
     rounding: f64,
 }
 
 /// A product of powers of constants.
-struct Power {
-    above: Vec<Variable>,
-    below: Vec<Variable>,
-    value: Digits,
+struct ConstantPower {
+    above: Vec<FactorVariable>,
+    below: Vec<FactorVariable>,
+    value: BigFloat,
     rough: f64,
     /// Its unit as a power of metres.
     metres: i32,
 }
 
-impl Power {
+impl ConstantPower {
     fn is_one(&self) -> bool {
         self.above.is_empty() && self.below.is_empty()
     }
 }
 
-impl<'a> Constants<'a> {
+impl<'a> FileConstants<'a> {
     pub(super) fn new(mechanism: &'a Mechanism, rounding: f64) -> Self {
-        let one = Power {
+        let one = ConstantPower {
             above: Vec::new(),
             below: Vec::new(),
-            value: Digits::integer(1),
+            value: BigFloat::integer(1),
             rough: 1.0,
             metres: 0,
         };
         let mut powers = vec![one];
-        let lengths: Vec<(Variable, Digits, i32)> = (mechanism.constants.iter().enumerate())
+        let lengths: Vec<(FactorVariable, BigFloat, i32)> = (mechanism.constants.iter().enumerate())
             .filter(|(_, c)| !c.is_angle && c.value != 0.0)
             .filter_map(|(i, c)| {
                 let metres = match c.unit.as_str() {
@@ -63,21 +63,21 @@ impl<'a> Constants<'a> {
                     "1" => 0,
                     _ => return None,
                 };
-                Some((Variable::Constant(i), Digits::as_written(c.value)?, metres))
+                Some((FactorVariable::Constant(i), BigFloat::from_shortest_decimal(c.value)?, metres))
             })
             .collect();
         let mut push = |above: &[usize], below: &[usize]| {
-            let of = |chosen: &[usize]| -> Vec<Variable> {
+            let of = |chosen: &[usize]| -> Vec<FactorVariable> {
                 chosen.iter().map(|i| lengths[*i].0).collect()
             };
             let product = |chosen: &[usize]| {
                 chosen
                     .iter()
-                    .fold(Digits::integer(1), |product, i| &product * &lengths[*i].1)
+                    .fold(BigFloat::integer(1), |product, i| &product * &lengths[*i].1)
             };
             let metres = |chosen: &[usize]| chosen.iter().map(|i| lengths[*i].2).sum::<i32>();
             let value = product(above) / product(below);
-            powers.push(Power {
+            powers.push(ConstantPower {
                 above: of(above),
                 below: of(below),
                 rough: value.to_f64(),
@@ -119,19 +119,19 @@ impl<'a> Constants<'a> {
     }
 
     /// The factor of the column of `kept` in that of `product`.
-    pub(super) fn factor(
+    pub(super) fn recognise_factor(
         &self,
-        value: &Digits,
-        product: &Monomial,
-        kept: &Monomial,
+        value: &BigFloat,
+        product: &ParameterMonomial,
+        kept: &ParameterMonomial,
     ) -> RationalFunction {
-        let [of_product, of_kept] = [product, kept].map(|of| base::unit(self.mechanism, of));
+        let [of_product, of_kept] = [product, kept].map(|of| base::product_unit(self.mechanism, of));
         // The column of a product has its inverse unit.
         let wanted = if of_product == of_kept {
             Some(0)
         } else {
-            metres(&of_product)
-                .zip(metres(&of_kept))
+            length_exponent(&of_product)
+                .zip(length_exponent(&of_kept))
                 .map(|(a, b)| b - a)
         };
         let fitting = self.powers.iter().filter(|p| match wanted {
@@ -145,13 +145,13 @@ impl<'a> Constants<'a> {
             Some((length, number, power))
         });
         match found.min_by_key(|(length, _, _)| *length) {
-            Some((_, number, power)) => written(number, power),
-            None => decimal(value.to_f64()),
+            Some((_, number, power)) => to_rational_function(number, power),
+            None => decimal_function(value.to_f64()),
         }
     }
 
     /// `value` over `power`, if that is a small rational.
-    fn small_rational(&self, value: &Digits, power: &Power) -> Option<Rational> {
+    fn small_rational(&self, value: &BigFloat, power: &ConstantPower) -> Option<Rational> {
         const ROUGH: f64 = 1e-9;
         let ratio = value.to_f64() / power.rough;
         (1..=LARGEST_DENOMINATOR).find_map(|below| {
@@ -164,15 +164,15 @@ impl<'a> Constants<'a> {
                 return None;
             }
             let number = Rational::new(above.to_i64()?, below);
-            let off = &(&Digits::from_rational(&number) * &power.value) - value;
+            let off = &(&BigFloat::from_rational(&number) * &power.value) - value;
             (off.to_f64().abs() <= self.rounding * value.to_f64().abs()).then_some(number)
         })
     }
 }
 
-fn written(number: Rational, power: &Power) -> RationalFunction {
-    let powers = |of: &[Variable]| {
-        let mut powers = Powers::new();
+fn to_rational_function(number: Rational, power: &ConstantPower) -> RationalFunction {
+    let powers = |of: &[FactorVariable]| {
+        let mut powers = PowerProduct::new();
         for variable in of {
             match powers.iter_mut().find(|(v, _)| v == variable) {
                 Some((_, n)) => *n += 1,
@@ -183,13 +183,13 @@ fn written(number: Rational, power: &Power) -> RationalFunction {
         powers
     };
     RationalFunction::new(
-        Polynomial::from([(powers(&power.above), number)]),
-        Polynomial::from([(powers(&power.below), Rational::ONE)]),
+        TrigonometricPolynomial::from([(powers(&power.above), number)]),
+        TrigonometricPolynomial::from([(powers(&power.below), Rational::ONE)]),
     )
 }
 
 /// The power of metres in the unit of a mass or one of its moments.
-pub(super) fn metres(unit: &str) -> Option<i32> {
+pub(super) fn length_exponent(unit: &str) -> Option<i32> {
     match unit {
         "kg" => Some(0),
         "kg m" => Some(1),
@@ -200,7 +200,7 @@ pub(super) fn metres(unit: &str) -> Option<i32> {
 
 /// A number with thirteen significant digits, as an exact rational, so that everything behind treats it like any other
 /// factor.
-fn decimal(value: f64) -> RationalFunction {
+fn decimal_function(value: f64) -> RationalFunction {
     const DIGITS: i32 = 12;
     let written = format!("{value:.12e}");
     let rational = written.split_once('e').and_then(|(mantissa, exponent)| {

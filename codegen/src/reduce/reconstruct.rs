@@ -1,11 +1,11 @@
 //! Rational functions from their values in prime fields: which constants a factor depends on, its degree in each and
 //! in all together, then its coefficients from one linear system (`fit`). Long coefficients take several fields.
 
-use modelmill_algebra::field::{Element, Stream};
+use modelmill_algebra::field::{FieldElement, RandomStream};
 use modelmill_algebra::univariate;
 
-use super::fit::{Fields, Shape};
-use super::oracle::{Occurrence, Oracle};
+use super::fit::{PrimeFields, FunctionShape};
+use super::oracle::{ConstantOccurrence, PrimeFieldOracle};
 use super::rational_function::RationalFunction;
 use crate::DeriveError;
 use crate::expr::{Atom, FieldPoint};
@@ -17,47 +17,47 @@ const MOST_POINTS: usize = 26;
 ///
 /// A function that resists (of a degree beyond all reason, or not rational) comes back as `None`, and with it all others:
 /// what they are would not be used.
-pub(crate) fn reconstruct<O: Oracle>(
+pub(crate) fn reconstruct<O: PrimeFieldOracle>(
     oracle: &mut O,
-    constants: &[Occurrence],
+    constants: &[ConstantOccurrence],
     roots: &[i64],
-    stream: &mut Stream,
+    stream: &mut RandomStream,
 ) -> Result<Vec<Option<RationalFunction>>, DeriveError> {
-    let mut survey = Survey::new(oracle, constants, roots, stream)?;
+    let mut survey = DependenceSurvey::new(oracle, constants, roots, stream)?;
     let all: Vec<(usize, bool)> = (0..survey.shapes.len()).map(|k| (k, true)).collect();
-    survey.functions(oracle, &all, stream)
+    survey.reconstruct_functions(oracle, &all, stream)
 }
 
 /// Which functions depend on which constants, and what was sampled for that.
-pub(super) struct Survey<O> {
+pub(super) struct DependenceSurvey<O> {
     roots: Vec<i64>,
-    constants: Vec<Occurrence>,
+    constants: Vec<ConstantOccurrence>,
     origin: FieldPoint,
-    at_origin: Vec<Element>,
-    moved: Vec<Moved>,
-    shapes: Vec<Shape>,
-    fields: Fields<O>,
+    at_origin: Vec<FieldElement>,
+    moved: Vec<VariedConstant>,
+    shapes: Vec<FunctionShape>,
+    fields: PrimeFields<O>,
 }
 
-impl<O: Oracle> Survey<O> {
+impl<O: PrimeFieldOracle> DependenceSurvey<O> {
     /// Moves one constant after the other.
     pub(super) fn new(
         oracle: &mut O,
-        constants: &[Occurrence],
+        constants: &[ConstantOccurrence],
         roots: &[i64],
-        stream: &mut Stream,
+        stream: &mut RandomStream,
     ) -> Result<Self, DeriveError> {
         let origin = oracle.constants(stream)?;
         let at_origin = oracle.values(&origin)?;
         let elsewhere = oracle.constants(stream)?;
         let elsewhere = oracle.values(&elsewhere)?;
         let n = at_origin.len();
-        let mut shapes: Vec<Shape> = vec![Shape::default(); n];
+        let mut shapes: Vec<FunctionShape> = vec![FunctionShape::default(); n];
         let varying: Vec<usize> = (0..n).filter(|k| at_origin[*k] != elsewhere[*k]).collect();
         let moved = if varying.is_empty() {
             Vec::new()
         } else {
-            moved(oracle, &origin, &at_origin, constants, &mut shapes, stream)?
+            vary_constants(oracle, &origin, &at_origin, constants, &mut shapes, stream)?
         };
         Ok(Self {
             roots: roots.to_vec(),
@@ -66,22 +66,22 @@ impl<O: Oracle> Survey<O> {
             at_origin,
             moved,
             shapes,
-            fields: Fields::new(),
+            fields: PrimeFields::new(),
         })
     }
 
     /// Some of the functions, each with whether the others are useless without it: where such a one resists, all that come
     /// after it are `None` too.
-    pub(super) fn functions(
+    pub(super) fn reconstruct_functions(
         &mut self,
         oracle: &mut O,
         wanted: &[(usize, bool)],
-        stream: &mut Stream,
+        stream: &mut RandomStream,
     ) -> Result<Vec<Option<RationalFunction>>, DeriveError> {
         let (origin, shapes) = (&self.origin, &mut self.shapes);
         let indices: Vec<usize> = wanted.iter().map(|(k, _)| *k).collect();
-        for group in apart(&self.moved, &indices, shapes) {
-            probe(
+        for group in independent_groups(&self.moved, &indices, shapes) {
+            probe_degrees(
                 oracle,
                 origin,
                 &self.at_origin,
@@ -95,7 +95,7 @@ impl<O: Oracle> Survey<O> {
         let mut found = Vec::with_capacity(wanted.len());
         for (k, is_needed) in wanted {
             let function =
-                shapes[*k].fit(&mut self.fields, oracle, origin, *k, &self.roots, stream)?;
+                shapes[*k].fit_function(&mut self.fields, oracle, origin, *k, &self.roots, stream)?;
             let resists = function.is_none();
             found.push(function);
             if resists && *is_needed {
@@ -108,27 +108,27 @@ impl<O: Oracle> Survey<O> {
 }
 
 /// One constant moved away from the origin.
-struct Moved {
-    constant: Occurrence,
+struct VariedConstant {
+    constant: ConstantOccurrence,
     /// Where it stands then, and the values of all functions.
-    at: Element,
-    values: Vec<Element>,
+    at: FieldElement,
+    values: Vec<FieldElement>,
 }
 
 /// Moves one constant after the other; every function gets the constants on which it depends, of degrees not yet known.
-fn moved<O: Oracle>(
+fn vary_constants<O: PrimeFieldOracle>(
     oracle: &mut O,
     origin: &FieldPoint,
-    at_origin: &[Element],
-    constants: &[Occurrence],
-    shapes: &mut [Shape],
-    stream: &mut Stream,
-) -> Result<Vec<Moved>, DeriveError> {
+    at_origin: &[FieldElement],
+    constants: &[ConstantOccurrence],
+    shapes: &mut [FunctionShape],
+    stream: &mut RandomStream,
+) -> Result<Vec<VariedConstant>, DeriveError> {
     let mut all = Vec::with_capacity(constants.len());
     for &constant in constants {
         let mut point = origin.clone();
-        let at = stream.element();
-        set(&mut point, constant, at);
+        let at = stream.next_element();
+        set_constant(&mut point, constant, at);
         let values = oracle.values(&point)?;
         let mut has_effect = false;
         for (k, shape) in shapes.iter_mut().enumerate() {
@@ -138,7 +138,7 @@ fn moved<O: Oracle>(
             }
         }
         if has_effect {
-            all.push(Moved {
+            all.push(VariedConstant {
                 constant,
                 at,
                 values,
@@ -150,15 +150,15 @@ fn moved<O: Oracle>(
 
 /// Constants in groups such that none of some functions depends on two of one group: they may be varied at once. Those of
 /// different joints of an arm mostly are such.
-fn apart<'a>(moved: &'a [Moved], functions: &[usize], shapes: &[Shape]) -> Vec<Vec<&'a Moved>> {
-    let mut groups: Vec<Vec<&Moved>> = Vec::new();
+fn independent_groups<'a>(moved: &'a [VariedConstant], functions: &[usize], shapes: &[FunctionShape]) -> Vec<Vec<&'a VariedConstant>> {
+    let mut groups: Vec<Vec<&VariedConstant>> = Vec::new();
     for one in moved {
         let depends = |k: &usize| shapes[*k].degrees.contains_key(&one.constant);
         let own: Vec<usize> = functions.iter().copied().filter(depends).collect();
         if own.is_empty() {
             continue;
         }
-        let meet = |other: &Moved| {
+        let meet = |other: &VariedConstant| {
             let depends = |k: &usize| shapes[*k].degrees.contains_key(&other.constant);
             own.iter().any(depends)
         };
@@ -172,14 +172,14 @@ fn apart<'a>(moved: &'a [Moved], functions: &[usize], shapes: &[Shape]) -> Vec<V
 }
 
 /// Degrees in each constant of a group, with all others at the origin.
-fn probe<O: Oracle>(
+fn probe_degrees<O: PrimeFieldOracle>(
     oracle: &mut O,
     origin: &FieldPoint,
-    at_origin: &[Element],
-    group: &[&Moved],
+    at_origin: &[FieldElement],
+    group: &[&VariedConstant],
     functions: &[usize],
-    shapes: &mut [Shape],
-    stream: &mut Stream,
+    shapes: &mut [FunctionShape],
+    stream: &mut RandomStream,
 ) -> Result<(), DeriveError> {
     // Every function with the position in the group of the one constant on which it depends.
     let mut open: Vec<(usize, usize)> = Vec::new();
@@ -189,13 +189,13 @@ fn probe<O: Oracle>(
         open.extend(depends.map(|k| (k, i)));
     }
     // Places of each constant: different ones, since lengths that are equal may be special.
-    let mut places: Vec<Vec<Element>> = group.iter().map(|one| vec![one.at]).collect();
-    let mut sampled: Vec<Vec<Element>> = Vec::new();
+    let mut places: Vec<Vec<FieldElement>> = group.iter().map(|one| vec![one.at]).collect();
+    let mut sampled: Vec<Vec<FieldElement>> = Vec::new();
     while !open.is_empty() && sampled.len() + 2 < MOST_POINTS {
         let mut point = origin.clone();
         for (one, places) in group.iter().zip(&mut places) {
-            let t = stream.element();
-            set(&mut point, one.constant, t);
+            let t = stream.next_element();
+            set_constant(&mut point, one.constant, t);
             places.push(t);
         }
         sampled.push(oracle.values(&point)?);
@@ -207,11 +207,11 @@ fn probe<O: Oracle>(
             let mut x = places[*i].clone();
             let mut y = vec![one.values[*k]];
             y.extend(sampled.iter().map(|row| row[*k]));
-            if let Some(start) = place(origin, one.constant) {
+            if let Some(start) = constant_value(origin, one.constant) {
                 x.push(start);
                 y.push(at_origin[*k]);
             }
-            match univariate::degrees(&x, &y) {
+            match univariate::interpolant_degrees(&x, &y) {
                 Some(degrees) => {
                     shapes[*k].degrees.insert(one.constant, degrees);
                     false
@@ -228,10 +228,10 @@ fn probe<O: Oracle>(
 
 /// How many functions have sums in their denominators, which may vanish though no length does; those whose degrees are
 /// beyond all reason count as such.
-pub(super) fn n_quotients<O: Oracle>(
+pub(super) fn n_quotients<O: PrimeFieldOracle>(
     oracle: &mut O,
-    constants: &[Occurrence],
-    stream: &mut Stream,
+    constants: &[ConstantOccurrence],
+    stream: &mut RandomStream,
 ) -> Result<usize, DeriveError> {
     /// Lines that are looked at; in each, half of the lengths grow in proportion. A sum of products of lengths is a power of
     /// that growth only if it is so by chance in all lines.
@@ -244,12 +244,12 @@ pub(super) fn n_quotients<O: Oracle>(
         let growing: Vec<Atom> = lengths
             .iter()
             .copied()
-            .filter(|_| stream.bits() & 1 == 1)
+            .filter(|_| stream.next_bits() & 1 == 1)
             .collect();
-        let (mut x, mut y): (Vec<Element>, Vec<Vec<Element>>) = Default::default();
+        let (mut x, mut y): (Vec<FieldElement>, Vec<Vec<FieldElement>>) = Default::default();
         let mut open: Vec<usize> = Vec::new();
         while x.len() < MOST_POINTS {
-            let (t, mut point) = (stream.element(), origin.clone());
+            let (t, mut point) = (stream.next_element(), origin.clone());
             for atom in &growing {
                 point.values.insert(*atom, origin.values[atom] * t);
             }
@@ -263,14 +263,14 @@ pub(super) fn n_quotients<O: Oracle>(
                 continue;
             }
             open.retain(|k| {
-                let mut values: Vec<Element> = y.iter().map(|row| row[*k]).collect();
-                let Some((_, below)) = univariate::degrees(&x, &values) else {
+                let mut values: Vec<FieldElement> = y.iter().map(|row| row[*k]).collect();
+                let Some((_, below)) = univariate::interpolant_degrees(&x, &values) else {
                     return true;
                 };
                 for (value, t) in values.iter_mut().zip(&x) {
                     *value = *value * t.power(below as u64);
                 }
-                match univariate::degrees(&x, &values) {
+                match univariate::interpolant_degrees(&x, &values) {
                     Some((_, 0)) => false,
                     Some(_) => {
                         has_sum[*k] = true;
@@ -291,22 +291,22 @@ pub(super) fn n_quotients<O: Oracle>(
 }
 
 /// Degrees in all lengths together, along a random line.
-fn total_degrees<O: Oracle>(
+fn total_degrees<O: PrimeFieldOracle>(
     oracle: &mut O,
     origin: &FieldPoint,
-    constants: &[Occurrence],
+    constants: &[ConstantOccurrence],
     functions: &[usize],
-    shapes: &mut [Shape],
-    stream: &mut Stream,
+    shapes: &mut [FunctionShape],
+    stream: &mut RandomStream,
 ) -> Result<(), DeriveError> {
     let lengths: Vec<usize> = constants
         .iter()
         .filter(|(_, in_angle)| !in_angle)
         .map(|(i, _)| *i)
         .collect();
-    let direction: Vec<Element> = lengths.iter().map(|_| stream.element()).collect();
+    let direction: Vec<FieldElement> = lengths.iter().map(|_| stream.next_element()).collect();
     let mut x = Vec::new();
-    let mut y: Vec<Vec<Element>> = Vec::new();
+    let mut y: Vec<Vec<FieldElement>> = Vec::new();
     let mut open: Vec<usize> = functions
         .iter()
         .copied()
@@ -321,7 +321,7 @@ fn total_degrees<O: Oracle>(
         .collect();
     while !open.is_empty() && x.len() < MOST_POINTS {
         let mut point = origin.clone();
-        let t = stream.element();
+        let t = stream.next_element();
         for (index, slope) in lengths.iter().zip(&direction) {
             let value = point.values[&Atom::Constant(*index)] + t * *slope;
             point.values.insert(Atom::Constant(*index), value);
@@ -332,8 +332,8 @@ fn total_degrees<O: Oracle>(
             continue;
         }
         open.retain(|k| {
-            let values: Vec<Element> = y.iter().map(|row| row[*k]).collect();
-            shapes[*k].total = univariate::degrees(&x, &values);
+            let values: Vec<FieldElement> = y.iter().map(|row| row[*k]).collect();
+            shapes[*k].total = univariate::interpolant_degrees(&x, &values);
             shapes[*k].total.is_none()
         });
     }
@@ -341,23 +341,23 @@ fn total_degrees<O: Oracle>(
 }
 
 /// Sets a constant; inside sines and cosines by half the tangent.
-fn set(point: &mut FieldPoint, (index, in_angle): Occurrence, t: Element) {
+fn set_constant(point: &mut FieldPoint, (index, in_angle): ConstantOccurrence, t: FieldElement) {
     let atom = Atom::Constant(index);
     if !in_angle {
         point.values.insert(atom, t);
-    } else if let Some(scale) = (Element::ONE + t * t).inverse() {
+    } else if let Some(scale) = (FieldElement::ONE + t * t).inverse() {
         point
             .angles
-            .insert(atom, ((Element::ONE - t * t) * scale, (t + t) * scale));
+            .insert(atom, ((FieldElement::ONE - t * t) * scale, (t + t) * scale));
     }
 }
 
 /// Where a constant stands; half the tangent if inside sines and cosines.
-fn place(point: &FieldPoint, (index, in_angle): Occurrence) -> Option<Element> {
+fn constant_value(point: &FieldPoint, (index, in_angle): ConstantOccurrence) -> Option<FieldElement> {
     let atom = Atom::Constant(index);
     if !in_angle {
         return point.values.get(&atom).copied();
     }
     let (cosine, sine) = point.angles.get(&atom)?;
-    Some(*sine * (Element::ONE + *cosine).inverse()?)
+    Some(*sine * (FieldElement::ONE + *cosine).inverse()?)
 }

@@ -5,26 +5,26 @@ use std::ops::{Add, Mul};
 
 use super::rational_function::RationalFunction;
 use crate::DeriveError;
-use crate::tree::expressions::Monomial;
+use crate::tree::expressions::ParameterMonomial;
 
 /// The result: which columns are kept and how the others follow from them.
 #[derive(Clone, Debug)]
-pub struct Reduction {
+pub struct BaseReduction {
     /// Products of parameters whose column is not zero, in the order of eq. (5): p_g.
-    pub products: Vec<Monomial>,
+    pub products: Vec<ParameterMonomial>,
     /// Products whose column is identically zero.
-    pub without_effect: Vec<Monomial>,
+    pub without_effect: Vec<ParameterMonomial>,
     /// Positions in `products` of the retained columns, in the order of p_min.
     pub retained: Vec<usize>,
     /// Eq. (6): for every other product, by position, the retained ones (by position in `retained`) with their factors.
-    pub dependencies: Vec<Dependency>,
+    pub dependencies: Vec<ColumnDependency>,
     /// How it was found.
-    pub method: Method,
+    pub method: ReductionMethod,
 }
 
 /// How a reduction was found.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Method {
+pub enum ReductionMethod {
     /// In the prime field: it holds for all values of the constants but special ones, and for the file's own where these
     /// were put in their place.
     Exact {
@@ -48,7 +48,7 @@ pub enum Method {
     },
 }
 
-impl Method {
+impl ReductionMethod {
     /// What a reader of a numeric reduction must know, in words; `None` where the reduction holds for general values.
     pub fn caution(&self) -> Option<String> {
         match self {
@@ -69,7 +69,7 @@ impl Method {
 
 /// One line of eq. (6): `h_j = sum of a_k h_k`.
 #[derive(Clone, Debug)]
-pub struct Dependency {
+pub struct ColumnDependency {
     /// Position of the eliminated product in [`Reduction::products`].
     pub product: usize,
     /// Positions in [`Reduction::retained`] with the factors.
@@ -79,7 +79,7 @@ pub struct Dependency {
     pub via: Vec<(usize, RationalFunction)>,
 }
 
-impl Reduction {
+impl BaseReduction {
     /// The factors of every dependent product on retained ones alone, by position in [`Reduction::retained`]; `None` where
     /// `value` has none for a factor.
     pub fn factors_by<T>(
@@ -90,7 +90,7 @@ impl Reduction {
         T: Clone + Add<Output = T> + Mul<Output = T>,
     {
         let mut all: Vec<BTreeMap<usize, T>> = vec![BTreeMap::new(); self.dependencies.len()];
-        for i in self.inner_first() {
+        for i in self.lines_in_dependency_order() {
             let line = &self.dependencies[i];
             let mut found: BTreeMap<usize, T> = BTreeMap::new();
             let mut add = |k: usize, term: T| {
@@ -130,7 +130,7 @@ impl Reduction {
     }
 
     /// All lines, each after those that it goes by.
-    pub(crate) fn inner_first(&self) -> Vec<usize> {
+    pub(crate) fn lines_in_dependency_order(&self) -> Vec<usize> {
         let mut order = Vec::with_capacity(self.dependencies.len());
         let mut is_done = vec![false; self.dependencies.len()];
         for start in 0..self.dependencies.len() {

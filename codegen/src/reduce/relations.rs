@@ -7,10 +7,10 @@
 
 use std::collections::BTreeMap;
 
-use modelmill_algebra::eliminate::{self, Echelon};
-use modelmill_algebra::field::Element;
+use modelmill_algebra::eliminate::{self, RowEchelonForm};
+use modelmill_algebra::field::FieldElement;
 
-use super::rational_function::{Polynomial, Powers, RationalFunction, Variable};
+use super::rational_function::{TrigonometricPolynomial, PowerProduct, RationalFunction, FactorVariable};
 use crate::DeriveError;
 use crate::expr::{FieldPoint, Rational};
 
@@ -34,18 +34,18 @@ impl ColumnRelation {
     /// Its factors from rows of values of all columns, of which there must be enough to determine them.
     fn values_from_rows<const P: u64>(
         &self,
-        rows: &[Vec<Element<P>>],
-    ) -> Result<Vec<Element<P>>, DeriveError> {
+        rows: &[Vec<FieldElement<P>>],
+    ) -> Result<Vec<FieldElement<P>>, DeriveError> {
         /// Rows beyond those that determine the factors: they show that the relation holds.
         const MORE: usize = 2;
         let n = self.len();
         let order: Vec<usize> = (0..=n).collect();
-        let mut echelon = Echelon::new(&order);
+        let mut echelon = RowEchelonForm::new(&order);
         let mut more = 0;
         for row in rows {
             let columns = self.columns().chain([self.column]);
-            let row: Vec<Element<P>> = columns.map(|k| row[k]).collect();
-            if row.iter().all(|x| *x == Element::ZERO) {
+            let row: Vec<FieldElement<P>> = columns.map(|k| row[k]).collect();
+            if row.iter().all(|x| *x == FieldElement::ZERO) {
                 continue;
             }
             if echelon.pivots.len() == n {
@@ -65,7 +65,7 @@ impl ColumnRelation {
     }
 
     /// Whether it needs retained columns alone.
-    pub(super) fn is_direct(&self) -> bool {
+    pub(super) fn has_retained_only(&self) -> bool {
         self.dependent.is_empty()
     }
 
@@ -75,7 +75,7 @@ impl ColumnRelation {
     }
 
     /// Its factors for the constants at which columns were reduced to `echelon`.
-    fn values<const P: u64>(&self, echelon: &Echelon<P>) -> Result<Vec<Element<P>>, DeriveError> {
+    fn values<const P: u64>(&self, echelon: &RowEchelonForm<P>) -> Result<Vec<FieldElement<P>>, DeriveError> {
         let entry = |p: usize, k: usize| echelon.entry(p, k).ok_or(DeriveError::RankChanged);
         let mut of_dependent = Vec::new();
         if !self.dependent.is_empty() {
@@ -90,7 +90,7 @@ impl ColumnRelation {
                     row.push(entry(*p, *k)?);
                 }
                 row.push(-entry(*p, self.column)?);
-                if row.iter().any(|x| *x != Element::ZERO) {
+                if row.iter().any(|x| *x != FieldElement::ZERO) {
                     rows.push(row);
                 }
             }
@@ -119,8 +119,8 @@ impl ColumnRelation {
 /// columns, then, if they are fewer, to the columns before it that come last.
 ///
 /// `order` is that in which columns are retained.
-pub(super) fn find<const P: u64>(
-    echelon: &Echelon<P>,
+pub(super) fn find_relations<const P: u64>(
+    echelon: &RowEchelonForm<P>,
     order: &[usize],
     dependent: &[usize],
 ) -> Vec<ColumnRelation> {
@@ -130,10 +130,10 @@ pub(super) fn find<const P: u64>(
             continue;
         }
         let mut direct: Vec<usize> = (echelon.pivots.iter().copied())
-            .filter(|p| echelon.entry(*p, *column) != Some(Element::ZERO))
+            .filter(|p| echelon.entry(*p, *column) != Some(FieldElement::ZERO))
             .collect();
         direct.sort_unstable();
-        let near = near(echelon, &order[..at], *column);
+        let near = needed_columns(echelon, &order[..at], *column);
         let is_shorter = near.len() < direct.len();
         for columns in [Some(direct), is_shorter.then_some(near)]
             .into_iter()
@@ -151,38 +151,38 @@ pub(super) fn find<const P: u64>(
 }
 
 /// The columns among those before `column` that it needs if the last ones are preferred.
-fn near<const P: u64>(echelon: &Echelon<P>, before: &[usize], column: usize) -> Vec<usize> {
+fn needed_columns<const P: u64>(echelon: &RowEchelonForm<P>, before: &[usize], column: usize) -> Vec<usize> {
     /// Columns as vectors over the retained ones, each with what it is made of.
-    struct Made<const P: u64> {
+    struct ColumnCombination<const P: u64> {
         pivot: usize,
-        vector: Vec<Element<P>>,
-        of: BTreeMap<usize, Element<P>>,
+        vector: Vec<FieldElement<P>>,
+        combination: BTreeMap<usize, FieldElement<P>>,
     }
-    let mut known: Vec<Made<P>> = Vec::new();
-    let vector_of = |k: usize| -> Vec<Element<P>> {
+    let mut known: Vec<ColumnCombination<P>> = Vec::new();
+    let vector_of = |k: usize| -> Vec<FieldElement<P>> {
         let entries = echelon.pivots.iter().map(|p| echelon.entry(*p, k));
         entries.map(Option::unwrap_or_default).collect()
     };
-    let reduced = |known: &[Made<P>], target: &mut Vec<Element<P>>, of: &mut BTreeMap<_, _>| {
+    let reduced = |known: &[ColumnCombination<P>], target: &mut Vec<FieldElement<P>>, of: &mut BTreeMap<_, _>| {
         for one in known {
             let factor = -target[one.pivot];
-            if factor == Element::ZERO {
+            if factor == FieldElement::ZERO {
                 continue;
             }
             for (x, y) in target.iter_mut().zip(&one.vector) {
                 *x = *x + factor * *y;
             }
-            for (k, y) in &one.of {
-                let x: &mut Element<P> = of.entry(*k).or_default();
+            for (k, y) in &one.combination {
+                let x: &mut FieldElement<P> = of.entry(*k).or_default();
                 *x = *x + factor * *y;
             }
         }
     };
     let (mut target, mut made) = (vector_of(column), BTreeMap::new());
     for &k in before.iter().rev() {
-        let (mut vector, mut of) = (vector_of(k), BTreeMap::from([(k, Element::ONE)]));
+        let (mut vector, mut of) = (vector_of(k), BTreeMap::from([(k, FieldElement::ONE)]));
         reduced(&known, &mut vector, &mut of);
-        let Some(pivot) = vector.iter().position(|x| *x != Element::ZERO) else {
+        let Some(pivot) = vector.iter().position(|x| *x != FieldElement::ZERO) else {
             continue;
         };
         let Some(scale) = vector[pivot].inverse() else {
@@ -191,22 +191,22 @@ fn near<const P: u64>(echelon: &Echelon<P>, before: &[usize], column: usize) -> 
         for x in vector.iter_mut().chain(of.values_mut()) {
             *x = *x * scale;
         }
-        known.push(Made { pivot, vector, of });
+        known.push(ColumnCombination { pivot, vector, combination: of });
         let last = known.len() - 1;
         reduced(&known[last..], &mut target, &mut made);
-        if target.iter().all(|x| *x == Element::ZERO) {
+        if target.iter().all(|x| *x == FieldElement::ZERO) {
             break;
         }
     }
-    made.retain(|_, x| *x != Element::ZERO);
+    made.retain(|_, x| *x != FieldElement::ZERO);
     made.into_keys().collect()
 }
 
 /// Values of the factors of all relations, one after the other, from columns that were reduced to `echelon`.
 pub(super) fn values<const P: u64>(
     relations: &[ColumnRelation],
-    echelon: &Echelon<P>,
-) -> Result<Vec<Element<P>>, DeriveError> {
+    echelon: &RowEchelonForm<P>,
+) -> Result<Vec<FieldElement<P>>, DeriveError> {
     let mut values = Vec::new();
     for relation in relations {
         values.extend(relation.values(echelon)?);
@@ -217,8 +217,8 @@ pub(super) fn values<const P: u64>(
 /// The same from rows of values of all columns.
 pub(super) fn values_from_rows<const P: u64>(
     relations: &[ColumnRelation],
-    rows: &[Vec<Element<P>>],
-) -> Result<Vec<Element<P>>, DeriveError> {
+    rows: &[Vec<FieldElement<P>>],
+) -> Result<Vec<FieldElement<P>>, DeriveError> {
     let mut values = Vec::new();
     for relation in relations {
         values.extend(relation.values_from_rows(rows)?);
@@ -228,23 +228,23 @@ pub(super) fn values_from_rows<const P: u64>(
 
 /// A dependent column by others, with factors; `None` for those that resist.
 #[derive(Debug, PartialEq)]
-pub(super) struct Written {
+pub(super) struct DependentColumn {
     pub(super) column: usize,
     /// Retained columns, and dependent ones that stand for what they equal.
-    pub(super) by: Vec<(usize, Option<RationalFunction>)>,
+    pub(super) factors: Vec<(usize, Option<RationalFunction>)>,
 }
 
 /// Relations with their factors as functions of the constants.
-pub(super) struct Related(Vec<(ColumnRelation, Factors)>);
+pub(super) struct SolvedRelations(Vec<(ColumnRelation, RelationFactors)>);
 
 /// The factor of each column of a relation; `None` for those that resist.
-type Factors = Vec<Option<RationalFunction>>;
+type RelationFactors = Vec<Option<RationalFunction>>;
 
-impl Related {
+impl SolvedRelations {
     /// Takes the factors as [`values`] orders them.
     pub(super) fn new<'a>(
         relations: impl Iterator<Item = &'a ColumnRelation>,
-        factors: Factors,
+        factors: RelationFactors,
     ) -> Self {
         let mut rest = factors.into_iter();
         let own = |relation: &ColumnRelation| {
@@ -255,24 +255,24 @@ impl Related {
     }
 
     /// Dependent columns whose relations to others that depend are not known, or hold quotients other than by lengths.
-    pub(super) fn unwieldy(&self) -> Vec<usize> {
+    pub(super) fn unwieldy_columns(&self) -> Vec<usize> {
         let is_simple =
-            |f: &Option<RationalFunction>| f.as_ref().and_then(Quotient::from_function).is_some();
+            |f: &Option<RationalFunction>| f.as_ref().and_then(MonomialQuotient::from_function).is_some();
         let lines = self.0.iter();
         let unwieldy =
-            lines.filter(|(r, factors)| !r.is_direct() && !factors.iter().all(is_simple));
+            lines.filter(|(r, factors)| !r.has_retained_only() && !factors.iter().all(is_simple));
         unwieldy.map(|(relation, _)| relation.column).collect()
     }
 
     /// Whether a factor on retained columns resists, so that no others need be looked for.
-    pub(super) fn is_lost(&self) -> bool {
-        let mut direct = self.0.iter().filter(|(relation, _)| relation.is_direct());
+    pub(super) fn has_unknown_factor(&self) -> bool {
+        let mut direct = self.0.iter().filter(|(relation, _)| relation.has_retained_only());
         direct.any(|(_, factors)| factors.iter().any(Option::is_none))
     }
 
     /// Puts others in the place of relations of the same columns, if they are known.
     pub(super) fn replace(&mut self, others: Self) {
-        let known = |(_, factors): &(ColumnRelation, Factors)| factors.iter().all(Option::is_some);
+        let known = |(_, factors): &(ColumnRelation, RelationFactors)| factors.iter().all(Option::is_some);
         for other in others.0.into_iter().filter(known) {
             if let Some(line) = self.0.iter_mut().find(|(r, _)| r.column == other.0.column) {
                 *line = other;
@@ -282,19 +282,19 @@ impl Related {
 
     /// The wanted factors, each written out if that takes no quotients but by lengths (the lowest terms of others are not
     /// seen from their parts) and no roots that are not independent.
-    pub(super) fn written_out(
+    pub(super) fn expanded_factors(
         &self,
         wanted: &[(usize, usize)],
         roots: &[i64],
     ) -> Vec<Option<RationalFunction>> {
-        let mut expanded: BTreeMap<usize, Line> = BTreeMap::new();
+        let mut expanded: BTreeMap<usize, RetainedFactors> = BTreeMap::new();
         for (relation, factors) in &self.0 {
-            let line = if relation.is_direct() {
-                Line::from_relation(relation, factors)
+            let line = if relation.has_retained_only() {
+                RetainedFactors::from_relation(relation, factors)
             } else if are_independent(roots) {
-                Line::sum(relation, factors, &expanded)
+                RetainedFactors::from_lines(relation, factors, &expanded)
             } else {
-                Line::default()
+                RetainedFactors::default()
             };
             expanded.insert(relation.column, line);
         }
@@ -326,11 +326,11 @@ impl Related {
     }
 
     /// The relations as they are.
-    pub(super) fn written(self) -> Vec<Written> {
+    pub(super) fn into_dependent_columns(self) -> Vec<DependentColumn> {
         let lines = self.0.into_iter();
-        let written = |(relation, factors): (ColumnRelation, Factors)| Written {
+        let written = |(relation, factors): (ColumnRelation, RelationFactors)| DependentColumn {
             column: relation.column,
-            by: relation.columns().zip(factors).collect(),
+            factors: relation.columns().zip(factors).collect(),
         };
         lines.map(written).collect()
     }
@@ -345,12 +345,12 @@ impl Related {
     pub(super) fn values<const P: u64>(
         &self,
         wanted: &[(usize, usize)],
-        constants: &FieldPoint<Element<P>>,
-    ) -> Option<Vec<Element<P>>> {
-        let mut expanded: BTreeMap<usize, BTreeMap<usize, Element<P>>> = BTreeMap::new();
+        constants: &FieldPoint<FieldElement<P>>,
+    ) -> Option<Vec<FieldElement<P>>> {
+        let mut expanded: BTreeMap<usize, BTreeMap<usize, FieldElement<P>>> = BTreeMap::new();
         for (relation, factors) in &self.0 {
-            let mut line: BTreeMap<usize, Element<P>> = BTreeMap::new();
-            let mut add = |p: usize, value: Element<P>| {
+            let mut line: BTreeMap<usize, FieldElement<P>> = BTreeMap::new();
+            let mut add = |p: usize, value: FieldElement<P>| {
                 let sum = line.entry(p).or_default();
                 *sum = *sum + value;
             };
@@ -376,31 +376,31 @@ fn are_independent(roots: &[i64]) -> bool {
 
 /// A column's factors on retained ones.
 #[derive(Default)]
-struct Line {
+struct RetainedFactors {
     functions: BTreeMap<usize, RationalFunction>,
     /// The same as quotients; `None` if one of them is more than that.
-    quotients: Option<BTreeMap<usize, Quotient>>,
+    quotients: Option<BTreeMap<usize, MonomialQuotient>>,
 }
 
-impl Line {
+impl RetainedFactors {
     fn from_relation(relation: &ColumnRelation, factors: &[Option<RationalFunction>]) -> Self {
         let pairs = relation.retained.iter().zip(factors);
         let quotients =
-            (pairs.clone()).map(|(p, f)| Some((*p, Quotient::from_function(f.as_ref()?)?)));
+            (pairs.clone()).map(|(p, f)| Some((*p, MonomialQuotient::from_function(f.as_ref()?)?)));
         Self {
             quotients: quotients.collect(),
             functions: pairs.filter_map(|(p, f)| Some((*p, f.clone()?))).collect(),
         }
     }
 
-    fn sum(
+    fn from_lines(
         relation: &ColumnRelation,
         factors: &[Option<RationalFunction>],
         expanded: &BTreeMap<usize, Self>,
     ) -> Self {
-        let mut line: BTreeMap<usize, Quotient> = BTreeMap::new();
+        let mut line: BTreeMap<usize, MonomialQuotient> = BTreeMap::new();
         for (k, factor) in relation.columns().zip(factors) {
-            let Some(factor) = factor.as_ref().and_then(Quotient::from_function) else {
+            let Some(factor) = factor.as_ref().and_then(MonomialQuotient::from_function) else {
                 return Self::default();
             };
             let Some(known) = expanded.get(&k) else {
@@ -415,7 +415,7 @@ impl Line {
             }
         }
         Self {
-            functions: line.iter().map(|(p, q)| (*p, q.function())).collect(),
+            functions: line.iter().map(|(p, q)| (*p, q.to_function())).collect(),
             quotients: Some(line),
         }
     }
@@ -424,24 +424,24 @@ impl Line {
 /// A polynomial over a product of powers of lengths, in lowest terms but for common powers of lengths. No square of a
 /// sine or root occurs, so that there is one way to write it.
 #[derive(Clone, Debug, Default)]
-struct Quotient {
-    numerator: Polynomial,
-    denominator: Powers,
+struct MonomialQuotient {
+    numerator: TrigonometricPolynomial,
+    denominator: PowerProduct,
 }
 
-impl Quotient {
+impl MonomialQuotient {
     /// `None` if the denominator is something else.
     fn from_function(function: &RationalFunction) -> Option<Self> {
         let mut terms = function.denominator.iter();
         let (Some((powers, scale)), None) = (terms.next(), terms.next()) else {
             return None;
         };
-        let is_length = |(v, _): &(Variable, u32)| matches!(v, Variable::Constant(_));
+        let is_length = |(v, _): &(FactorVariable, u32)| matches!(v, FactorVariable::Constant(_));
         if !powers.iter().all(is_length) {
             return None;
         }
         let scale = scale.recip();
-        let mut numerator = Polynomial::new();
+        let mut numerator = TrigonometricPolynomial::new();
         for (powers, k) in &function.numerator {
             add_term(&mut numerator, powers.clone(), &(k * &scale));
         }
@@ -452,7 +452,7 @@ impl Quotient {
     }
 
     fn times(&self, other: &Self) -> Self {
-        let mut numerator = Polynomial::new();
+        let mut numerator = TrigonometricPolynomial::new();
         for (a, x) in &self.numerator {
             for (b, y) in &other.numerator {
                 add_term(&mut numerator, product(a, b), &(x * y));
@@ -465,7 +465,7 @@ impl Quotient {
     }
 
     fn add(&mut self, other: &Self) {
-        let common = lowest_multiple(&self.denominator, &other.denominator);
+        let common = least_common_multiple(&self.denominator, &other.denominator);
         if common != self.denominator {
             let missing = quotient(&common, &self.denominator);
             let numerator = std::mem::take(&mut self.numerator);
@@ -479,28 +479,28 @@ impl Quotient {
         }
     }
 
-    fn function(&self) -> RationalFunction {
-        let denominator = Polynomial::from([(self.denominator.clone(), Rational::ONE)]);
+    fn to_function(&self) -> RationalFunction {
+        let denominator = TrigonometricPolynomial::from([(self.denominator.clone(), Rational::ONE)]);
         RationalFunction::new(self.numerator.clone(), denominator)
     }
 }
 
 /// The product of two products of powers, both sorted.
-fn product(a: &Powers, b: &Powers) -> Powers {
-    merged(a, b, |n, m| n + m)
+fn product(a: &PowerProduct, b: &PowerProduct) -> PowerProduct {
+    merge_powers(a, b, |n, m| n + m)
 }
 
-fn lowest_multiple(a: &Powers, b: &Powers) -> Powers {
-    merged(a, b, u32::max)
+fn least_common_multiple(a: &PowerProduct, b: &PowerProduct) -> PowerProduct {
+    merge_powers(a, b, u32::max)
 }
 
 /// `a / b`, which must be a product of powers.
-fn quotient(a: &Powers, b: &Powers) -> Powers {
-    merged(a, b, |n, m| n - m)
+fn quotient(a: &PowerProduct, b: &PowerProduct) -> PowerProduct {
+    merge_powers(a, b, |n, m| n - m)
 }
 
-fn merged(a: &Powers, b: &Powers, exponent: impl Fn(u32, u32) -> u32) -> Powers {
-    let mut found = Powers::with_capacity(a.len() + b.len());
+fn merge_powers(a: &PowerProduct, b: &PowerProduct, exponent: impl Fn(u32, u32) -> u32) -> PowerProduct {
+    let mut found = PowerProduct::with_capacity(a.len() + b.len());
     let (mut a, mut b) = (a.iter().peekable(), b.iter().peekable());
     loop {
         let next = match (a.peek(), b.peek()) {
@@ -519,13 +519,13 @@ fn merged(a: &Powers, b: &Powers, exponent: impl Fn(u32, u32) -> u32) -> Powers 
 }
 
 /// Adds a term with squares of sines and roots written otherwise.
-fn add_term(to: &mut Polynomial, powers: Powers, k: &Rational) {
+fn add_term(to: &mut TrigonometricPolynomial, powers: PowerProduct, k: &Rational) {
     if k.is_zero() {
         return;
     }
     let squared = powers
         .iter()
-        .position(|(v, n)| *n > 1 && matches!(v, Variable::Sin(_) | Variable::Root(_)));
+        .position(|(v, n)| *n > 1 && matches!(v, FactorVariable::Sin(_) | FactorVariable::Root(_)));
     let Some(at) = squared else {
         let sum = to.entry(powers);
         match sum {
@@ -549,12 +549,12 @@ fn add_term(to: &mut Polynomial, powers: Powers, k: &Rational) {
         rest[at].1 = n - 2;
     }
     match variable {
-        Variable::Root(root) => add_term(to, rest, &(k * &Rational::integer(root))),
-        Variable::Sin(i) => {
-            let with = product(&rest, &vec![(Variable::Cos(i), 2)]);
+        FactorVariable::Root(root) => add_term(to, rest, &(k * &Rational::integer(root))),
+        FactorVariable::Sin(i) => {
+            let with = product(&rest, &vec![(FactorVariable::Cos(i), 2)]);
             add_term(to, rest, k);
             add_term(to, with, &-k);
         }
-        Variable::Constant(_) | Variable::Cos(_) => add_term(to, rest, k),
+        FactorVariable::Constant(_) | FactorVariable::Cos(_) => add_term(to, rest, k),
     }
 }

@@ -5,41 +5,41 @@
 //! a dyad. It matters that the poses make up one irreducible variety, the one that the nominal pose lies on; see
 //! [`crate::loops::branches`].
 
-use modelmill_algebra::eliminate::Echelon;
-use modelmill_algebra::field::{Element, Extended, Number, Stream};
+use modelmill_algebra::eliminate::RowEchelonForm;
+use modelmill_algebra::field::{FieldElement, ExtensionElement, FieldNumber, RandomStream};
 use modelmill_spec::Mechanism;
 
 use crate::DeriveError;
 use crate::expr::independent::IDLE;
-use crate::expr::{Atom, ExprId, FieldPoint, Graph, Node, Tape, Unary};
-use crate::loops::branches::{self, Branch};
-use crate::loops::field_poses::{FieldPoses, MOST_DRAWS};
-use crate::loops::plan::{Unknowns, plan};
-use crate::regressor::projection::Projection;
+use crate::expr::{Atom, ExprId, FieldPoint, Graph, Node, EvaluationTape, Unary};
+use crate::loops::branches::{self, RootBranch};
+use crate::loops::field_poses::{FieldPoseSampler, MOST_DRAWS};
+use crate::loops::plan::{SolvableCoordinates, plan};
+use crate::regressor::projection::LoopProjection;
 
 /// The same where signs occur, which take only two values: that two of them agree by chance at all points must be out of
 /// the question.
 const IDLE_WITH_SIGNS: usize = 80;
 
 /// Draws points.
-pub(super) struct Sampler {
-    poses: FieldPoses,
+pub(super) struct MotionSampler {
+    poses: FieldPoseSampler,
     n_drives: usize,
     /// Whether poses or outputs take roots of what moves.
     has_roots: bool,
     active: Vec<usize>,
     passive: Vec<usize>,
-    rates: Tape,
-    accelerations: Tape,
-    outputs: Tape,
+    rates: EvaluationTape,
+    accelerations: EvaluationTape,
+    outputs: EvaluationTape,
 }
 
-impl Sampler {
+impl MotionSampler {
     /// Prepares the evaluation of `outputs` at random points of the mechanism's motion.
     pub(super) fn new(
         graph: &mut Graph,
         mechanism: &Mechanism,
-        projection: &Projection,
+        projection: &LoopProjection,
         outputs: &[ExprId],
     ) -> Result<Self, DeriveError> {
         let loops = || {
@@ -50,16 +50,16 @@ impl Sampler {
                 .map(|c| c.name.clone())
                 .collect()
         };
-        let plan = plan(graph, mechanism, &projection.loops, Unknowns::Any)
+        let plan = plan(graph, mechanism, &projection.loops, SolvableCoordinates::Any)
             .ok_or_else(|| DeriveError::LoopsNotSampled { loops: loops() })?;
         let mut all = outputs.to_vec();
         all.extend(&projection.passive_rates);
         all.extend(&projection.passive_accelerations);
-        let poses = FieldPoses::new(graph, mechanism, plan, &all);
-        let branches = branches::branches(graph, &poses, &all)?;
+        let poses = FieldPoseSampler::new(graph, mechanism, plan, &all);
+        let branches = branches::root_branches(graph, &poses, &all)?;
         if branches
             .iter()
-            .any(|branch| matches!(branch, Branch::Multiple | Branch::Bound))
+            .any(|branch| matches!(branch, RootBranch::Multiple | RootBranch::Bound))
         {
             return Err(DeriveError::BranchesNotSeparated { loops: loops() });
         }
@@ -69,18 +69,18 @@ impl Sampler {
             n_drives: mechanism.drives.len(),
             active: projection.loops.active.clone(),
             passive: projection.loops.passive.clone(),
-            rates: Tape::new(graph, &projection.passive_rates),
-            accelerations: Tape::new(graph, &projection.passive_accelerations),
-            outputs: Tape::new(graph, outputs),
+            rates: EvaluationTape::new(graph, &projection.passive_rates),
+            accelerations: EvaluationTape::new(graph, &projection.passive_accelerations),
+            outputs: EvaluationTape::new(graph, outputs),
         })
     }
 
     /// Random constants whose functions that do not depend on the motion all exist.
     pub(super) fn constants<const P: u64>(
         &self,
-        stream: &mut Stream,
-    ) -> Result<FieldPoint<Element<P>>, DeriveError> {
-        self.poses.constants(stream)
+        stream: &mut RandomStream,
+    ) -> Result<FieldPoint<FieldElement<P>>, DeriveError> {
+        self.poses.draw_constants(stream)
     }
 
     /// Values of the outputs at a random point of motion, for the given constants: once, or once for each of the two
@@ -88,20 +88,20 @@ impl Sampler {
     /// that each part keeps to the same linear relations.
     pub(super) fn draw<const P: u64>(
         &self,
-        constants: &FieldPoint<Element<P>>,
-        stream: &mut Stream,
-    ) -> Result<Vec<Element<P>>, DeriveError> {
+        constants: &FieldPoint<FieldElement<P>>,
+        stream: &mut RandomStream,
+    ) -> Result<Vec<FieldElement<P>>, DeriveError> {
         let none = || DeriveError::NoPointFound { draws: MOST_DRAWS };
         if !self.has_roots {
             return (0..MOST_DRAWS)
-                .find_map(|_| self.try_draw::<P, Element<P>>(constants, stream))
+                .find_map(|_| self.try_draw::<P, FieldElement<P>>(constants, stream))
                 .ok_or_else(none);
         }
         let values = (0..MOST_DRAWS)
-            .find_map(|_| self.try_draw::<P, Extended<P>>(constants, stream))
+            .find_map(|_| self.try_draw::<P, ExtensionElement<P>>(constants, stream))
             .ok_or_else(none)?;
-        let parts: [fn(&Extended<P>) -> Element<P>; 2] = [|x| x.re, |x| x.im];
-        let is_split = values.iter().any(|x| x.im != Element::ZERO);
+        let parts: [fn(&ExtensionElement<P>) -> FieldElement<P>; 2] = [|x| x.re, |x| x.im];
+        let is_split = values.iter().any(|x| x.im != FieldElement::ZERO);
         let shown = &parts[..=usize::from(is_split)];
         Ok(shown
             .iter()
@@ -109,12 +109,12 @@ impl Sampler {
             .collect())
     }
 
-    fn try_draw<const P: u64, N: Number + From<Element<P>>>(
+    fn try_draw<const P: u64, N: FieldNumber + From<FieldElement<P>>>(
         &self,
-        constants: &FieldPoint<Element<P>>,
-        stream: &mut Stream,
+        constants: &FieldPoint<FieldElement<P>>,
+        stream: &mut RandomStream,
     ) -> Option<Vec<N>> {
-        let mut point: FieldPoint<N> = self.poses.open(constants, stream);
+        let mut point: FieldPoint<N> = self.poses.draw_open_point(constants, stream);
         let mut draw = |atom: Atom| point.values.insert(atom, N::draw(stream));
         for a in &self.active {
             draw(Atom::Rate(*a));
@@ -123,7 +123,7 @@ impl Sampler {
         for d in 0..self.n_drives {
             draw(Atom::Load(d));
         }
-        let mut point = self.poses.close(point)?;
+        let mut point = self.poses.close_loops(point)?;
         for (p, value) in self.passive.iter().zip(self.rates.evaluate(&point)?) {
             point.values.insert(Atom::Rate(*p), value);
         }
@@ -140,7 +140,7 @@ impl Sampler {
 
 /// The regressor's effective columns at random points of motion.
 pub(super) struct SampledRegressor {
-    pub(super) sampler: Sampler,
+    pub(super) sampler: MotionSampler,
     pub(super) n_columns: usize,
     /// How many points in a row must show nothing new.
     idle: usize,
@@ -148,33 +148,33 @@ pub(super) struct SampledRegressor {
 
 impl SampledRegressor {
     /// The rows of H at one random point.
-    pub(super) fn point<const P: u64>(
+    pub(super) fn draw_rows<const P: u64>(
         &self,
-        constants: &FieldPoint<Element<P>>,
-        stream: &mut Stream,
-    ) -> Result<Vec<Vec<Element<P>>>, DeriveError> {
+        constants: &FieldPoint<FieldElement<P>>,
+        stream: &mut RandomStream,
+    ) -> Result<Vec<Vec<FieldElement<P>>>, DeriveError> {
         let values = self.sampler.draw(constants, stream)?;
         Ok(values
             .chunks(self.n_columns.max(1))
-            .map(<[Element<P>]>::to_vec)
+            .map(<[FieldElement<P>]>::to_vec)
             .collect())
     }
 
     /// Rows of W for one set of constants, reduced, until they show nothing new or `rank` is reached; and from how many
     /// points they came.
-    pub(super) fn echelon<const P: u64>(
+    pub(super) fn reduced_rows<const P: u64>(
         &self,
-        constants: &FieldPoint<Element<P>>,
+        constants: &FieldPoint<FieldElement<P>>,
         order: &[usize],
         rank: Option<usize>,
-        stream: &mut Stream,
-    ) -> Result<(Echelon<P>, usize), DeriveError> {
-        let mut echelon = Echelon::new(order);
+        stream: &mut RandomStream,
+    ) -> Result<(RowEchelonForm<P>, usize), DeriveError> {
+        let mut echelon = RowEchelonForm::new(order);
         let (mut idle, mut n_points) = (0, 0);
         while self.n_columns > 0 && idle < self.idle && Some(echelon.pivots.len()) != rank {
             idle += 1;
             n_points += 1;
-            for row in self.point(constants, stream)? {
+            for row in self.draw_rows(constants, stream)? {
                 if echelon.insert(row) {
                     idle = 0;
                 }
@@ -185,15 +185,15 @@ impl SampledRegressor {
 }
 
 /// Prepares the evaluation of so many columns, drive by drive.
-pub(super) fn sampled(
+pub(super) fn sample_regressor(
     graph: &mut Graph,
     mechanism: &Mechanism,
-    projection: &Projection,
+    projection: &LoopProjection,
     outputs: &[ExprId],
     n_columns: usize,
 ) -> Result<SampledRegressor, DeriveError> {
     Ok(SampledRegressor {
-        sampler: Sampler::new(graph, mechanism, projection, outputs)?,
+        sampler: MotionSampler::new(graph, mechanism, projection, outputs)?,
         n_columns,
         idle: if has_sign(graph, outputs) {
             IDLE_WITH_SIGNS

@@ -6,37 +6,37 @@
 use std::collections::BTreeSet;
 
 use modelmill_algebra::eliminate;
-use modelmill_algebra::field::{Element, Stream};
+use modelmill_algebra::field::{FieldElement, RandomStream};
 
-use super::oracle::{Occurrence, Oracle};
-use super::rational_function::{Powers, Variable, monomial_value};
+use super::oracle::{ConstantOccurrence, PrimeFieldOracle};
+use super::rational_function::{PowerProduct, FactorVariable, monomial_value};
 use crate::DeriveError;
 use crate::expr::{Atom, FieldPoint};
 
 /// The monomials of numerator and denominator among those given that have a coefficient at a random place; `None` where
 /// a stage has more unknowns than `most`, or more than one solution.
-pub(super) fn support<O: Oracle>(
+pub(super) fn nonzero_monomials<O: PrimeFieldOracle>(
     oracle: &mut O,
     origin: &FieldPoint,
     function: usize,
-    variables: &[Occurrence],
-    [numerator, denominator]: [&[Powers]; 2],
+    variables: &[ConstantOccurrence],
+    [numerator, denominator]: [&[PowerProduct]; 2],
     most: usize,
-    stream: &mut Stream,
-) -> Result<Option<[Vec<Powers>; 2]>, DeriveError> {
+    stream: &mut RandomStream,
+) -> Result<Option<[Vec<PowerProduct>; 2]>, DeriveError> {
     /// Equations beyond the unknowns: they show that the ansatz holds.
     const MORE: usize = 4;
-    let mut kept: [BTreeSet<Powers>; 2] = [0, 1].map(|_| BTreeSet::from([Powers::new()]));
+    let mut kept: [BTreeSet<PowerProduct>; 2] = [0, 1].map(|_| BTreeSet::from([PowerProduct::new()]));
     for n in 1..=variables.len() {
         let loose = &variables[..n];
-        oracle.spend((numerator.len() + denominator.len()) * 100)?;
+        oracle.charge((numerator.len() + denominator.len()) * 100)?;
         let [top, bottom] = [(numerator, &kept[0]), (denominator, &kept[1])].map(|(all, kept)| {
-            let candidates: BTreeSet<Powers> = all
+            let candidates: BTreeSet<PowerProduct> = all
                 .iter()
-                .filter(|m| kept.contains(&part_in(m, &variables[..n - 1])))
-                .map(|m| part_in(m, loose))
+                .filter(|m| kept.contains(&restrict_monomial(m, &variables[..n - 1])))
+                .map(|m| restrict_monomial(m, loose))
                 .collect();
-            candidates.into_iter().collect::<Vec<Powers>>()
+            candidates.into_iter().collect::<Vec<PowerProduct>>()
         });
         let unknowns = top.len() + bottom.len();
         if unknowns > most {
@@ -44,22 +44,22 @@ pub(super) fn support<O: Oracle>(
         }
         let mut rows = Vec::with_capacity(unknowns + MORE);
         while rows.len() < unknowns + MORE {
-            let point = loosened(oracle, origin, loose, stream)?;
+            let point = redraw_constants(oracle, origin, loose, stream)?;
             let value = oracle.values(&point)?[function];
-            let row: Option<Vec<Element>> = (top.iter().map(|m| monomial_value(m, &point)))
+            let row: Option<Vec<FieldElement>> = (top.iter().map(|m| monomial_value(m, &point)))
                 .chain((bottom.iter()).map(|m| monomial_value(m, &point).map(|x| -(x * value))))
                 .collect();
             let Some(row) = row else { return Ok(None) };
             rows.push(row);
         }
-        oracle.spend(rows.len() * unknowns * unknowns)?;
+        oracle.charge(rows.len() * unknowns * unknowns)?;
         let solutions = eliminate::null_space(rows, unknowns);
         let [solution] = solutions.as_slice() else {
             return Ok(None);
         };
-        let with_coefficient = |monomials: &[Powers], factors: &[Element]| -> BTreeSet<Powers> {
+        let with_coefficient = |monomials: &[PowerProduct], factors: &[FieldElement]| -> BTreeSet<PowerProduct> {
             let pairs = monomials.iter().zip(factors);
-            let with_coefficient = pairs.filter(|(_, x)| **x != Element::ZERO);
+            let with_coefficient = pairs.filter(|(_, x)| **x != FieldElement::ZERO);
             with_coefficient.map(|(m, _)| m.clone()).collect()
         };
         let (above, below) = solution.split_at(top.len());
@@ -72,21 +72,21 @@ pub(super) fn support<O: Oracle>(
 }
 
 /// What a monomial is of some variables alone.
-fn part_in(powers: &Powers, variables: &[Occurrence]) -> Powers {
-    let is_in = |variable: &Variable| match variable {
-        Variable::Constant(i) => variables.contains(&(*i, false)),
-        Variable::Cos(i) | Variable::Sin(i) => variables.contains(&(*i, true)),
-        Variable::Root(_) => true,
+fn restrict_monomial(powers: &PowerProduct, variables: &[ConstantOccurrence]) -> PowerProduct {
+    let is_in = |variable: &FactorVariable| match variable {
+        FactorVariable::Constant(i) => variables.contains(&(*i, false)),
+        FactorVariable::Cos(i) | FactorVariable::Sin(i) => variables.contains(&(*i, true)),
+        FactorVariable::Root(_) => true,
     };
     powers.iter().filter(|(v, _)| is_in(v)).copied().collect()
 }
 
 /// The origin with some constants drawn anew.
-fn loosened<O: Oracle>(
+fn redraw_constants<O: PrimeFieldOracle>(
     oracle: &O,
     origin: &FieldPoint,
-    loose: &[Occurrence],
-    stream: &mut Stream,
+    loose: &[ConstantOccurrence],
+    stream: &mut RandomStream,
 ) -> Result<FieldPoint, DeriveError> {
     let fresh: FieldPoint = oracle.constants(stream)?;
     let mut point = origin.clone();

@@ -7,29 +7,29 @@ pub(crate) mod projection;
 use std::collections::BTreeSet;
 
 use modelmill_spec::{
-    CoordinateIdx, DriveKind, Effect, EffectTerm, Mechanism, Place, PlaceQuantity,
+    CoordinateIdx, DriveKind, ModelEffect, EffectTerm, Mechanism, EffectPlace, PlaceQuantity,
 };
 
 use crate::DeriveError;
 use crate::expr::{Atom, ExprId, Graph};
 use crate::newton_euler;
 use crate::newton_euler::inertia::InertiaByProduct;
-use crate::regressor::form::{ColumnForm, Frames, TotalForm};
-use crate::regressor::projection::Projection;
-use crate::tree::Tree;
-use crate::tree::expressions::{self, Monomial};
+use crate::regressor::form::{ColumnForm, RecursionFrames, TotalForm};
+use crate::regressor::projection::LoopProjection;
+use crate::tree::KinematicTree;
+use crate::tree::expressions::{self, ParameterMonomial};
 
 /// The mechanism's equations before reduction.
-pub(crate) struct Equations {
-    pub(crate) tree: Tree,
+pub(crate) struct UnreducedEquations {
+    pub(crate) tree: KinematicTree,
     /// Acceleration of free fall.
-    pub(crate) gravity: crate::expr::vector::Vector,
+    pub(crate) gravity: crate::expr::vector::SymbolicVector,
     pub(crate) inertia: InertiaByProduct,
-    pub(crate) projection: Projection,
+    pub(crate) projection: LoopProjection,
     /// For every effect what [`mechanics::generalised_forces`] says of it.
     of_mechanics: Vec<Vec<Vec<Vec<ExprId>>>>,
     /// Products of parameters that occur anywhere, in the order of eq. (5).
-    pub(crate) products: Vec<Monomial>,
+    pub(crate) products: Vec<ParameterMonomial>,
     /// `columns[k][d]`: force of drive `d` for product `k`.
     pub(crate) columns: Vec<Vec<ExprId>>,
 }
@@ -41,18 +41,18 @@ pub(crate) struct EffectForces {
 }
 
 /// Derives the regressor of all products.
-pub(crate) fn equations(
+pub(crate) fn unreduced_equations(
     graph: &mut Graph,
     mechanism: &Mechanism,
-) -> Result<Equations, DeriveError> {
-    let tree = Tree::new(graph, mechanism)?;
+) -> Result<UnreducedEquations, DeriveError> {
+    let tree = KinematicTree::new(graph, mechanism)?;
     let gravity = [
         expressions::expression(graph, &mechanism.gravity[0])?,
         expressions::expression(graph, &mechanism.gravity[1])?,
         expressions::expression(graph, &mechanism.gravity[2])?,
     ];
     let inertia = InertiaByProduct::new(graph, mechanism, &tree)?;
-    let projection = Projection::new(graph, mechanism, &tree)?;
+    let projection = LoopProjection::new(graph, mechanism, &tree)?;
     let mut of_mechanics = Vec::new();
     for effect in &mechanism.effects {
         of_mechanics.push(mechanics::generalised_forces(
@@ -64,7 +64,7 @@ pub(crate) fn equations(
             effect,
         )?);
     }
-    let mut products: BTreeSet<Monomial> = inertia.products();
+    let mut products: BTreeSet<ParameterMonomial> = inertia.products();
     // Bodies of effects are among the inertia already.
     let all = mechanism.effects.iter().zip(&of_mechanics);
     for (effect, _) in all.filter(|(e, forces)| e.mechanics.is_none() || !forces.is_empty()) {
@@ -72,11 +72,11 @@ pub(crate) fn equations(
             effect
                 .terms
                 .iter()
-                .map(|term| Monomial(vec![(term.parameter.0, 1)])),
+                .map(|term| ParameterMonomial(vec![(term.parameter.0, 1)])),
         );
     }
-    let products: Vec<Monomial> = products.into_iter().collect();
-    let mut equations = Equations {
+    let products: Vec<ParameterMonomial> = products.into_iter().collect();
+    let mut equations = UnreducedEquations {
         tree,
         gravity,
         inertia,
@@ -86,20 +86,20 @@ pub(crate) fn equations(
         columns: Vec::new(),
     };
     let form = ColumnForm::PLAIN;
-    let frames = Frames::new(graph, &equations.tree, &gravity, form.style, false);
+    let frames = RecursionFrames::new(graph, &equations.tree, &gravity, form.style, false);
     let products = equations.products.clone();
     equations.columns = equations.columns_of(graph, mechanism, &frames, &products, form)?;
     Ok(equations)
 }
 
-impl Equations {
+impl UnreducedEquations {
     /// Forces of the drives for each of some products of value 1, all others 0.
     pub(crate) fn columns_of(
         &self,
         graph: &mut Graph,
         mechanism: &Mechanism,
-        frames: &Frames,
-        products: &[Monomial],
+        frames: &RecursionFrames,
+        products: &[ParameterMonomial],
         form: ColumnForm,
     ) -> Result<Vec<Vec<ExprId>>, DeriveError> {
         let n = mechanism.coordinates.len();
@@ -108,15 +108,15 @@ impl Equations {
             .iter()
             .map(|product| {
                 let wrenches = form.wrenches(graph, &self.inertia, frames, product, products);
-                let on_tree = newton_euler::carry(graph, tree, style, n, form.depths, wrenches);
-                let value = |m: &Monomial| {
+                let on_tree = newton_euler::carry_wrench(graph, tree, style, n, form.depths, wrenches);
+                let value = |m: &ParameterMonomial| {
                     if m == product {
                         Graph::ONE
                     } else {
                         Graph::ZERO
                     }
                 };
-                self.forces(graph, mechanism, &on_tree, &value)
+                self.drive_forces(graph, mechanism, &on_tree, &value)
             })
             .collect()
     }
@@ -126,22 +126,22 @@ impl Equations {
         &self,
         graph: &mut Graph,
         mechanism: &Mechanism,
-        frames: &Frames,
-        value: &dyn Fn(&Monomial) -> ExprId,
+        frames: &RecursionFrames,
+        value: &dyn Fn(&ParameterMonomial) -> ExprId,
         form: TotalForm,
     ) -> Result<Vec<ExprId>, DeriveError> {
         let wrenches = form.wrenches(graph, &self.inertia, &self.tree, frames, value);
         let n = mechanism.coordinates.len();
-        let on_tree = newton_euler::backward(graph, &frames.tree, form.style, n, wrenches);
-        self.forces(graph, mechanism, &on_tree, value)
+        let on_tree = newton_euler::backward_recursion(graph, &frames.tree, form.style, n, wrenches);
+        self.drive_forces(graph, mechanism, &on_tree, value)
     }
 
-    fn forces(
+    fn drive_forces(
         &self,
         graph: &mut Graph,
         mechanism: &Mechanism,
         on_tree: &[ExprId],
-        value: &dyn Fn(&Monomial) -> ExprId,
+        value: &dyn Fn(&ParameterMonomial) -> ExprId,
     ) -> Result<Vec<ExprId>, DeriveError> {
         let effects = self.effect_forces(graph, mechanism, value)?;
         let on_tree: Vec<ExprId> = on_tree
@@ -158,7 +158,7 @@ impl Equations {
     }
 
     /// Generalised forces of the independent coordinates for those of the open tree and for forces along the drives.
-    pub(crate) fn on_active(
+    pub(crate) fn project_on_active(
         &self,
         graph: &mut Graph,
         on_tree: &[ExprId],
@@ -183,11 +183,11 @@ impl Equations {
         &self,
         graph: &mut Graph,
         mechanism: &Mechanism,
-        value: &dyn Fn(&Monomial) -> ExprId,
+        value: &dyn Fn(&ParameterMonomial) -> ExprId,
     ) -> Result<EffectForces, DeriveError> {
         let mut on_tree = vec![Graph::ZERO; mechanism.coordinates.len()];
         let mut on_drives = vec![Graph::ZERO; mechanism.drives.len()];
-        let value = |term: &EffectTerm| value(&Monomial(vec![(term.parameter.0, 1)]));
+        let value = |term: &EffectTerm| value(&ParameterMonomial(vec![(term.parameter.0, 1)]));
         for (effect, of_mechanics) in mechanism.effects.iter().zip(&self.of_mechanics) {
             for by_term in of_mechanics {
                 for (term, factors) in effect.terms.iter().zip(by_term) {
@@ -208,10 +208,10 @@ impl Equations {
                         continue;
                     }
                     let slot = match place {
-                        Place::Coordinate(i) => &mut on_tree[i.0],
-                        Place::Drive(d) => &mut on_drives[d.0],
+                        EffectPlace::Coordinate(i) => &mut on_tree[i.0],
+                        EffectPlace::Drive(d) => &mut on_drives[d.0],
                         // Masses are in the inertia, and the rest has no parameters.
-                        Place::Point(_) | Place::Part(_) | Place::Base | Place::Force => continue,
+                        EffectPlace::Point(_) | EffectPlace::Part(_) | EffectPlace::Base | EffectPlace::Force => continue,
                     };
                     let factor = self.effect_factor(graph, mechanism, effect, p, term)?;
                     let force = graph.mul(factor, value);
@@ -227,7 +227,7 @@ impl Equations {
         &self,
         graph: &mut Graph,
         mechanism: &Mechanism,
-        effect: &Effect,
+        effect: &ModelEffect,
         at: usize,
         term: &EffectTerm,
     ) -> Result<ExprId, DeriveError> {
@@ -246,8 +246,8 @@ impl Equations {
             (other, PlaceQuantity::OtherCoordinate),
         ];
         for (place, quantity) in named {
-            if let Some(i) = place.and_then(|place| turning(mechanism, place)) {
-                expression = expressions::with_coordinate(&expression, quantity, i);
+            if let Some(i) = place.and_then(|place| rotation_coordinate(mechanism, place)) {
+                expression = expressions::name_place_coordinate(&expression, quantity, i);
             }
         }
         expressions::expression_at(graph, &expression, &|quantity| match quantity {
@@ -262,9 +262,9 @@ impl Equations {
     }
 
     /// Coordinate, rate, acceleration and load of a place.
-    fn quantities(&self, graph: &mut Graph, place: Place) -> [Option<ExprId>; 4] {
+    fn quantities(&self, graph: &mut Graph, place: EffectPlace) -> [Option<ExprId>; 4] {
         match place {
-            Place::Drive(d) => {
+            EffectPlace::Drive(d) => {
                 let drive = &self.projection.drives[d.0];
                 [
                     Some(drive.coordinate),
@@ -273,7 +273,7 @@ impl Equations {
                     Some(graph.atom(Atom::Load(d.0))),
                 ]
             }
-            Place::Coordinate(i) => {
+            EffectPlace::Coordinate(i) => {
                 let atoms = [
                     Atom::Coordinate(i.0),
                     Atom::Rate(i.0),
@@ -282,20 +282,20 @@ impl Equations {
                 let [q, qd, qdd] = atoms.map(|a| Some(graph.atom(a)));
                 [q, qd, qdd, None]
             }
-            Place::Point(_) | Place::Part(_) | Place::Base | Place::Force => [None; 4],
+            EffectPlace::Point(_) | EffectPlace::Part(_) | EffectPlace::Base | EffectPlace::Force => [None; 4],
         }
     }
 }
 
 /// The angle by which a place turns, if it does.
-fn turning(mechanism: &Mechanism, place: Place) -> Option<CoordinateIdx> {
+fn rotation_coordinate(mechanism: &Mechanism, place: EffectPlace) -> Option<CoordinateIdx> {
     let coordinate = match place {
-        Place::Coordinate(i) => i,
-        Place::Drive(d) => match mechanism.drives[d.0].kind {
+        EffectPlace::Coordinate(i) => i,
+        EffectPlace::Drive(d) => match mechanism.drives[d.0].kind {
             DriveKind::Joint(i) => i,
             DriveKind::Linear { .. } => return None,
         },
-        Place::Point(_) | Place::Part(_) | Place::Base | Place::Force => return None,
+        EffectPlace::Point(_) | EffectPlace::Part(_) | EffectPlace::Base | EffectPlace::Force => return None,
     };
     let motion = mechanism.coordinates[coordinate.0].motion;
     motion.is_angle().then_some(coordinate)

@@ -7,11 +7,11 @@
 use modelmill_spec::{DriveKind, Mechanism};
 
 use crate::DeriveError;
-use crate::expr::linear::{self, Solution};
+use crate::expr::linear::{self, LinearSolution};
 use crate::expr::{Atom, ExprId, Graph, Node, Rational, Unary, nominal_value};
-use crate::loops::Loops;
+use crate::loops::KinematicLoops;
 use crate::loops::stretch::distance_squared;
-use crate::tree::Tree;
+use crate::tree::KinematicTree;
 
 /// Kinematics of a drive.
 #[derive(Clone, Debug)]
@@ -24,8 +24,8 @@ pub(crate) struct DriveMotion {
 
 /// Everything that loops and drives contribute.
 #[derive(Clone, Debug)]
-pub(crate) struct Projection {
-    pub(crate) loops: Loops,
+pub(crate) struct LoopProjection {
+    pub(crate) loops: KinematicLoops,
     /// Positions, among the independent coordinates, of those that have a rate.
     pub(crate) freedoms: Vec<usize>,
     /// Rate and acceleration of each passive coordinate, in the order of `passive`.
@@ -45,16 +45,16 @@ pub(crate) struct Projection {
     transmission: Vec<Vec<ExprId>>,
 }
 
-impl Projection {
+impl LoopProjection {
     pub(crate) fn new(
         graph: &mut Graph,
         mechanism: &Mechanism,
-        tree: &Tree,
+        tree: &KinematicTree,
     ) -> Result<Self, DeriveError> {
         let n = mechanism.coordinates.len();
-        let loops = Loops::new(graph, mechanism, tree)?;
+        let loops = KinematicLoops::new(graph, mechanism, tree)?;
         let (active, passive, residual) = (&loops.active, &loops.passive, &loops.residual);
-        let rates_of = rate_map(tree, passive, n);
+        let rates_of = passive_rate_map(tree, passive, n);
         let by_coordinate: Vec<Vec<ExprId>> = (0..n)
             .map(|i| graph.differentiate(residual, Atom::Coordinate(i)))
             .collect();
@@ -77,7 +77,7 @@ impl Projection {
         };
         let (loop_p, loop_a) = (pick(graph, passive), pick(graph, active));
         // Right-hand sides: the active columns, then what the accelerations see besides.
-        let drift = Self::drift(graph, residual);
+        let drift = Self::residual_drift(graph, residual);
         let rhs: Vec<Vec<ExprId>> = loop_a
             .iter()
             .zip(&drift)
@@ -99,7 +99,7 @@ impl Projection {
         let has_rate = |a: &usize| mechanism.coordinates[loops.active[*a]].motion.has_rate();
         let freedoms = (0..loops.active.len()).filter(has_rate).collect();
         let mut determinants = solution.determinants.clone();
-        determinants.extend(tree.squares(graph));
+        determinants.extend(tree.quaternion_squares(graph));
         let mut projection = Self {
             loops,
             freedoms,
@@ -125,7 +125,7 @@ impl Projection {
     }
 
     /// Second time derivative of the residuals without the accelerations.
-    fn drift(graph: &mut Graph, residual: &[ExprId]) -> Vec<ExprId> {
+    fn residual_drift(graph: &mut Graph, residual: &[ExprId]) -> Vec<ExprId> {
         let velocity = graph.time_derivative(residual);
         let only_rates = |graph: &mut Graph, atom: Atom| match atom {
             Atom::Coordinate(i) => graph.atom(Atom::Rate(i)),
@@ -225,7 +225,7 @@ impl Projection {
         graph: &mut Graph,
         gaps: &[ExprId],
         forces: &[ExprId],
-    ) -> Result<Solution, DeriveError> {
+    ) -> Result<LinearSolution, DeriveError> {
         let n = self.loops.passive.len();
         let by_passive: Vec<Vec<ExprId>> = self
             .loops
@@ -294,7 +294,7 @@ impl Projection {
         &mut self,
         graph: &mut Graph,
         mechanism: &Mechanism,
-        tree: &Tree,
+        tree: &KinematicTree,
     ) -> Result<(), DeriveError> {
         let n = mechanism.coordinates.len();
         for drive in &mechanism.drives {
@@ -363,7 +363,7 @@ fn signed_length(graph: &mut Graph, mechanism: &Mechanism, length: ExprId) -> Ex
 
 /// How every coordinate's rate follows from the rates `y`: for a passive revolute joint `y` is the absolute rate of its
 /// link about the axes that are parallel to its own.
-fn rate_map(tree: &Tree, passive: &[usize], n: usize) -> Vec<Vec<i64>> {
+fn passive_rate_map(tree: &KinematicTree, passive: &[usize], n: usize) -> Vec<Vec<i64>> {
     let mut rates_of: Vec<Vec<i64>> = (0..n)
         .map(|i| (0..n).map(|j| i64::from(i == j)).collect())
         .collect();

@@ -3,25 +3,25 @@
 use modelmill_spec::Mechanism;
 
 use super::document::{
-    self, Document, Equation, Inline, Line, Table, cell, linear_model, name, number, text,
+    self, PageDocument, PageEquation, InlineSpan, TextLine, PageTable, cell, linear_model, name, number, text,
 };
 use super::rank::NumericRank;
 use crate::Derivation;
 use crate::expr::Rational;
-use crate::expr::print::{Formula, Symbol};
+use crate::expr::print::{PrintedFormula, FormulaSymbol};
 use crate::reduce::base::{
-    lumped, name as base_name, product_formula as product, sums, unit, written_out,
+    lumped_formulas, base_parameter_name as base_name, product_formula as product, dependent_sums, product_unit, expanded_formula,
 };
-use crate::reduce::{Method, RationalFunction};
-use crate::tree::expressions::Monomial;
+use crate::reduce::{ReductionMethod, RationalFunction};
+use crate::tree::expressions::ParameterMonomial;
 
 /// Base parameter `k` written out term by term: what a script reads.
-pub fn base_expression(derivation: &Derivation, k: usize) -> Formula {
-    written_out(&derivation.mechanism, &derivation.reduction, k)
+pub fn base_expression(derivation: &Derivation, k: usize) -> PrintedFormula {
+    expanded_formula(&derivation.mechanism, &derivation.reduction, k)
 }
 
 /// Base parameter `k` with common factors collected: `m1*dc1 + d1*(m2 + m3)`.
-pub fn base_grouped(derivation: &Derivation, k: usize) -> Formula {
+pub fn factored_base_expression(derivation: &Derivation, k: usize) -> PrintedFormula {
     let Derivation {
         mechanism,
         reduction,
@@ -31,9 +31,9 @@ pub fn base_grouped(derivation: &Derivation, k: usize) -> Formula {
         mechanism,
         &reduction.products[reduction.retained[k]],
     )];
-    let mut groups: Vec<(RationalFunction, Vec<(Rational, Formula)>)> = Vec::new();
+    let mut groups: Vec<(RationalFunction, Vec<(Rational, PrintedFormula)>)> = Vec::new();
     for (at, line) in reduction.dependencies.iter().enumerate() {
-        let what = Formula::product(Rational::ONE, lumped(mechanism, reduction, at));
+        let what = PrintedFormula::product(Rational::ONE, lumped_formulas(mechanism, reduction, at));
         for (_, factor) in line.equals.iter().filter(|(at, _)| *at == k) {
             let (number, function) = factor.split_number();
             let member = (number, what.clone());
@@ -57,16 +57,16 @@ pub fn base_grouped(derivation: &Derivation, k: usize) -> Formula {
         }
         let sum = members
             .into_iter()
-            .map(|(k, what)| Formula::product(k, [what]));
-        let term = Formula::product(number, [factor, Formula::sum(sum)]);
+            .map(|(k, what)| PrintedFormula::product(k, [what]));
+        let term = PrintedFormula::product(number, [factor, PrintedFormula::sum(sum)]);
         terms.push(term);
     }
-    Formula::sum(terms)
+    PrintedFormula::sum(terms)
 }
 
 /// What a product of p_g, by its position, brings into base parameter `k`: `d1*m2`, with its factor of eq. (6). A product that
 /// goes by others, as in long chains, stands alone, since its factor is longer than what it would tell; so does the retained one.
-pub fn base_summand(derivation: &Derivation, k: usize, product_idx: usize) -> Formula {
+pub fn base_summand(derivation: &Derivation, k: usize, product_idx: usize) -> PrintedFormula {
     let Derivation {
         mechanism,
         reduction,
@@ -77,23 +77,23 @@ pub fn base_summand(derivation: &Derivation, k: usize, product_idx: usize) -> Fo
     let line = lines.find(|line| line.product == product_idx && line.via.is_empty());
     let factor = line.and_then(|line| line.equals.iter().find(|(at, _)| *at == k));
     match factor {
-        Some((_, factor)) => Formula::product(Rational::ONE, [factor.formula(mechanism), what]),
+        Some((_, factor)) => PrintedFormula::product(Rational::ONE, [factor.formula(mechanism), what]),
         None => what,
     }
 }
 
 /// A factor of eq. (6) as expanded text.
 pub(super) fn factor_text(mechanism: &Mechanism, factor: &RationalFunction) -> String {
-    factor.expanded(mechanism).text()
+    factor.expanded_formula(mechanism).text()
 }
 
 /// The column of a product: `h` with the product as its index.
-fn column(mechanism: &Mechanism, of: &Monomial) -> Formula {
-    Formula::Indexed(Symbol::new("h"), Box::new(product(mechanism, of)))
+fn column_symbol(mechanism: &Mechanism, of: &ParameterMonomial) -> PrintedFormula {
+    PrintedFormula::Indexed(FormulaSymbol::new("h"), Box::new(product(mechanism, of)))
 }
 
 /// p_g with units, and what has no effect.
-pub(super) fn products(page: &mut Document, derivation: &Derivation) {
+pub(super) fn products(page: &mut PageDocument, derivation: &Derivation) {
     let Derivation {
         mechanism,
         reduction,
@@ -119,33 +119,33 @@ pub(super) fn products(page: &mut Document, derivation: &Derivation) {
             let fate = match reduction.retained.iter().position(|r| *r == k) {
                 Some(at) => vec![
                     text("retained, "),
-                    Inline::Math(Formula::name(base_name(at))),
+                    InlineSpan::Math(PrintedFormula::name(base_name(at))),
                 ],
                 None => cell(text("follows from retained columns")),
             };
             vec![
                 cell(text((k + 1).to_string())),
-                cell(Inline::Math(product(mechanism, m))),
-                cell(document::unit(unit(mechanism, m))),
-                cell(text(Shown(m.value(&parameters)).to_string())),
+                cell(InlineSpan::Math(product(mechanism, m))),
+                cell(document::unit(product_unit(mechanism, m))),
+                cell(text(RoundedNumber(m.value(&parameters)).to_string())),
                 fate,
             ]
         })
         .collect();
     page.table(
         "products",
-        Table {
+        PageTable {
             head: vec!["", "product", "unit", "nominal", "column"],
             rows,
         },
     );
     if !reduction.without_effect.is_empty() {
-        let mut line: Line = vec![text("Without any effect on the drives, and so left out: ")];
+        let mut line: TextLine = vec![text("Without any effect on the drives, and so left out: ")];
         for (i, m) in reduction.without_effect.iter().enumerate() {
             if i > 0 {
                 line.push(text(", "));
             }
-            line.push(Inline::Math(product(mechanism, m)));
+            line.push(InlineSpan::Math(product(mechanism, m)));
         }
         line.push(text("."));
         page.paragraph(line);
@@ -153,7 +153,7 @@ pub(super) fn products(page: &mut Document, derivation: &Derivation) {
 }
 
 /// Eq. (6).
-pub(super) fn dependencies(page: &mut Document, derivation: &Derivation) {
+pub(super) fn dependencies(page: &mut PageDocument, derivation: &Derivation) {
     let Derivation {
         mechanism,
         reduction,
@@ -170,12 +170,12 @@ pub(super) fn dependencies(page: &mut Document, derivation: &Derivation) {
         return;
     }
     page.paragraph([text(match &reduction.method {
-        Method::Exact { confirmed_at, .. } => format!(
+        ReductionMethod::Exact { confirmed_at, .. } => format!(
             "Columns that are constant combinations of retained ones at every state, eq. (6). \
              They were found in exact arithmetic and confirmed at {confirmed_at} further states with other values of the constants."
         ),
-        Method::Unreduced => "Columns are not reduced.".to_owned(),
-        Method::Numeric { least_kept, most_dropped, residual, because } => format!(
+        ReductionMethod::Unreduced => "Columns are not reduced.".to_owned(),
+        ReductionMethod::Numeric { least_kept, most_dropped, residual, because } => format!(
             "Columns that are constant combinations of retained ones, eq. (6), found numerically on the values of this file: \
              {because}. The factors are rounded, and base and factors hold for these values alone. \
              Of every retained column the others leave at least {least_kept:.1e}, of every dependent one at most {most_dropped:.1e}; \
@@ -186,15 +186,15 @@ pub(super) fn dependencies(page: &mut Document, derivation: &Derivation) {
         .dependencies
         .iter()
         .enumerate()
-        .map(|(i, line)| Equation {
-            left: column(mechanism, &reduction.products[line.product]),
+        .map(|(i, line)| PageEquation {
+            left: column_symbol(mechanism, &reduction.products[line.product]),
             right: {
                 let retained = line.equals.iter();
                 let retained = retained.map(|(k, factor)| (reduction.retained[*k], factor));
                 let via = line.via.iter().map(|(product, factor)| (*product, factor));
-                Formula::sum(retained.chain(via).map(|(product, factor)| {
-                    let column = column(mechanism, &reduction.products[product]);
-                    Formula::product(Rational::ONE, [factor.formula(mechanism), column])
+                PrintedFormula::sum(retained.chain(via).map(|(product, factor)| {
+                    let column = column_symbol(mechanism, &reduction.products[product]);
+                    PrintedFormula::product(Rational::ONE, [factor.formula(mechanism), column])
                 }))
             },
             tag: format!("6.{}", i + 1),
@@ -206,7 +206,7 @@ pub(super) fn dependencies(page: &mut Document, derivation: &Derivation) {
 
 /// Eq. (16).
 pub(super) fn base_parameters(
-    page: &mut Document,
+    page: &mut PageDocument,
     derivation: &Derivation,
     numeric: Option<&NumericRank>,
 ) {
@@ -238,13 +238,13 @@ pub(super) fn base_parameters(
         }
     }
     page.paragraph(line);
-    let equation = |k: usize, right: Formula| Equation {
-        left: Formula::name(base_name(k)),
+    let equation = |k: usize, right: PrintedFormula| PageEquation {
+        left: PrintedFormula::name(base_name(k)),
         right,
         tag: format!("16.{}", k + 1),
-        unit: Some(unit(mechanism, &reduction.products[reduction.retained[k]])),
+        unit: Some(product_unit(mechanism, &reduction.products[reduction.retained[k]])),
     };
-    let sums = sums(mechanism, reduction);
+    let sums = dependent_sums(mechanism, reduction);
     if !sums.is_empty() {
         page.paragraph([text(
             "Products that others go by stand with these, link by link (Gautier and Khalil 1990):",
@@ -252,8 +252,8 @@ pub(super) fn base_parameters(
         let sums = sums
             .into_iter()
             .enumerate()
-            .map(|(i, (name, right))| Equation {
-                left: Formula::name(name),
+            .map(|(i, (name, right))| PageEquation {
+                left: PrintedFormula::name(name),
                 right,
                 tag: format!("7.{}", i + 1),
                 unit: None,
@@ -261,7 +261,7 @@ pub(super) fn base_parameters(
         page.equations("sums", sums.collect());
     }
     let grouped = (0..rank)
-        .map(|k| equation(k, base_grouped(derivation, k)))
+        .map(|k| equation(k, factored_base_expression(derivation, k)))
         .collect();
     page.equations("base parameters", grouped);
     let values = derivation.nominal_base_values();
@@ -269,16 +269,16 @@ pub(super) fn base_parameters(
         .map(|k| {
             let retained = &reduction.products[reduction.retained[k]];
             vec![
-                cell(Inline::Math(Formula::name(base_name(k)))),
-                cell(Inline::Math(product(mechanism, retained))),
-                cell(text(Shown(values[k]).to_string())),
-                cell(document::unit(unit(mechanism, retained))),
+                cell(InlineSpan::Math(PrintedFormula::name(base_name(k)))),
+                cell(InlineSpan::Math(product(mechanism, retained))),
+                cell(text(RoundedNumber(values[k]).to_string())),
+                cell(document::unit(product_unit(mechanism, retained))),
             ]
         })
         .collect();
     page.table(
         "values",
-        Table {
+        PageTable {
             head: vec![
                 "base parameter",
                 "retained product",
@@ -291,9 +291,9 @@ pub(super) fn base_parameters(
 }
 
 /// A number with six significant digits.
-struct Shown(f64);
+struct RoundedNumber(f64);
 
-impl std::fmt::Display for Shown {
+impl std::fmt::Display for RoundedNumber {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let rounded: f64 = format!("{:.5e}", self.0).parse().unwrap_or(self.0);
         f.write_str(&number(rounded))

@@ -1,113 +1,113 @@
 //! A page before it takes a notation: headings, paragraphs, tables and equations, in order.
 
-use crate::expr::print::{Formula, Symbol};
+use crate::expr::print::{PrintedFormula, FormulaSymbol};
 
 /// A stretch of a line.
 #[derive(Clone, Debug)]
-pub(super) enum Inline {
+pub(super) enum InlineSpan {
     Text(String),
     Code(String),
-    Math(Formula),
+    Math(PrintedFormula),
     /// A unit such as `kg m^2`.
     Unit(String),
 }
 
 /// A line of text.
-pub(super) type Line = Vec<Inline>;
+pub(super) type TextLine = Vec<InlineSpan>;
 
 /// `left = right`, with a tag in parentheses and perhaps a unit.
 #[derive(Clone, Debug)]
-pub(super) struct Equation {
-    pub(super) left: Formula,
-    pub(super) right: Formula,
+pub(super) struct PageEquation {
+    pub(super) left: PrintedFormula,
+    pub(super) right: PrintedFormula,
     pub(super) tag: String,
     pub(super) unit: Option<String>,
 }
 
 /// A table; every row has as many cells as the head.
 #[derive(Clone, Debug)]
-pub(super) struct Table {
+pub(super) struct PageTable {
     pub(super) head: Vec<&'static str>,
-    pub(super) rows: Vec<Vec<Line>>,
+    pub(super) rows: Vec<Vec<TextLine>>,
 }
 
 /// A part of a page.
 #[derive(Clone, Debug)]
-pub(super) enum Block {
+pub(super) enum PageBlock {
     Heading(String),
-    Paragraph(Line),
-    Table(Table),
-    Equations(Vec<Equation>),
+    Paragraph(TextLine),
+    Table(PageTable),
+    Equations(Vec<PageEquation>),
     /// Long matter that a reader may skip.
-    Folded(String, Vec<Block>),
+    Folded(String, Vec<PageBlock>),
 }
 
 /// A page.
 #[derive(Clone, Debug)]
-pub(super) struct Document {
+pub(super) struct PageDocument {
     pub(super) title: String,
-    pub(super) blocks: Vec<Block>,
+    pub(super) blocks: Vec<PageBlock>,
 }
 
 /// Tables and lists of equations that are longer are folded away.
 const LONG: usize = 24;
 
-impl Document {
+impl PageDocument {
     pub(super) fn heading(&mut self, text: &str) {
-        self.blocks.push(Block::Heading(text.to_owned()));
+        self.blocks.push(PageBlock::Heading(text.to_owned()));
     }
 
-    pub(super) fn paragraph(&mut self, line: impl IntoIterator<Item = Inline>) {
+    pub(super) fn paragraph(&mut self, line: impl IntoIterator<Item = InlineSpan>) {
         self.blocks
-            .push(Block::Paragraph(line.into_iter().collect()));
+            .push(PageBlock::Paragraph(line.into_iter().collect()));
     }
 
     /// A table, folded if it is long; nothing if it has no rows.
-    pub(super) fn table(&mut self, what: &str, table: Table) {
+    pub(super) fn table(&mut self, what: &str, table: PageTable) {
         match table.rows.len() {
             0 => {}
             n if n > LONG => {
                 let summary = format!("{n} {what}");
                 self.blocks
-                    .push(Block::Folded(summary, vec![Block::Table(table)]));
+                    .push(PageBlock::Folded(summary, vec![PageBlock::Table(table)]));
             }
-            _ => self.blocks.push(Block::Table(table)),
+            _ => self.blocks.push(PageBlock::Table(table)),
         }
     }
 
     /// Equations, folded if they are many.
-    pub(super) fn equations(&mut self, what: &str, equations: Vec<Equation>) {
+    pub(super) fn equations(&mut self, what: &str, equations: Vec<PageEquation>) {
         match equations.len() {
             0 => {}
             n if n > LONG => {
                 let summary = format!("{n} {what}");
                 self.blocks
-                    .push(Block::Folded(summary, vec![Block::Equations(equations)]));
+                    .push(PageBlock::Folded(summary, vec![PageBlock::Equations(equations)]));
             }
-            _ => self.blocks.push(Block::Equations(equations)),
+            _ => self.blocks.push(PageBlock::Equations(equations)),
         }
     }
 }
 
-pub(super) fn text(text: impl Into<String>) -> Inline {
-    Inline::Text(text.into())
+pub(super) fn text(text: impl Into<String>) -> InlineSpan {
+    InlineSpan::Text(text.into())
 }
 
-pub(super) fn code(text: impl Into<String>) -> Inline {
-    Inline::Code(text.into())
+pub(super) fn code(text: impl Into<String>) -> InlineSpan {
+    InlineSpan::Code(text.into())
 }
 
-pub(super) fn name(name: &str) -> Inline {
-    Inline::Math(Formula::Symbol(Symbol::new(name)))
+pub(super) fn name(name: &str) -> InlineSpan {
+    InlineSpan::Math(PrintedFormula::Symbol(FormulaSymbol::new(name)))
 }
 
-pub(super) fn unit(unit: impl Into<String>) -> Inline {
-    Inline::Unit(unit.into())
+pub(super) fn unit(unit: impl Into<String>) -> InlineSpan {
+    InlineSpan::Unit(unit.into())
 }
 
 /// `tau = H(q, q', q'') p`
-pub(super) fn linear_model(matrix: &str, parameters: &str) -> Vec<Inline> {
-    let motion = |order| Inline::Math(Formula::Symbol(Symbol::derived("q", order)));
+pub(super) fn linear_model(matrix: &str, parameters: &str) -> Vec<InlineSpan> {
+    let motion = |order| InlineSpan::Math(PrintedFormula::Symbol(FormulaSymbol::time_derivative("q", order)));
     vec![
         name("tau"),
         text(" = "),
@@ -124,7 +124,7 @@ pub(super) fn linear_model(matrix: &str, parameters: &str) -> Vec<Inline> {
 }
 
 /// A cell of one stretch.
-pub(super) fn cell(inline: Inline) -> Line {
+pub(super) fn cell(inline: InlineSpan) -> TextLine {
     vec![inline]
 }
 
@@ -139,9 +139,9 @@ pub(super) fn number(value: f64) -> String {
 }
 
 /// The stretches of an equation's right side that may stand on lines of their own: sign and magnitude of each term.
-pub(super) fn terms(formula: &Formula) -> Vec<Formula> {
+pub(super) fn line_terms(formula: &PrintedFormula) -> Vec<PrintedFormula> {
     match formula {
-        Formula::Sum(terms) => terms.clone(),
+        PrintedFormula::Sum(terms) => terms.clone(),
         other => vec![other.clone()],
     }
 }

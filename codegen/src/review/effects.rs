@@ -1,10 +1,10 @@
 //! Effects with what they add.
 
-use modelmill_spec::{DriveKind, Effect, Mechanism, Place};
+use modelmill_spec::{DriveKind, ModelEffect, Mechanism, EffectPlace};
 
-use super::document::{Document, Inline, Line, Table, cell, code, text};
+use super::document::{PageDocument, InlineSpan, TextLine, PageTable, cell, code, text};
 use crate::expr::Rational;
-use crate::expr::print::{Formula, exact_at};
+use crate::expr::print::{PrintedFormula, exact_formula_at};
 
 /// Stands for the coordinate of each of several places.
 const EACH: [&str; 4] = ["x", "xi", "chi", "place"];
@@ -12,12 +12,12 @@ const EACH: [&str; 4] = ["x", "xi", "chi", "place"];
 const OTHER: [&str; 4] = ["y", "eta", "psi", "other"];
 
 /// Effects with their expressions.
-pub(super) fn effects(page: &mut Document, mechanism: &Mechanism) {
+pub(super) fn effects(page: &mut PageDocument, mechanism: &Mechanism) {
     if mechanism.effects.is_empty() {
         return;
     }
     // A coordinate or constant of the model may have that name.
-    let taken = crate::emit::tree::names::reserved(mechanism);
+    let taken = crate::emit::tree::names::reserved_names(mechanism);
     let free = |names: [&str; 4], last: &str| {
         let found = names.into_iter().find(|name| !taken.contains(*name));
         found.unwrap_or(last).to_owned()
@@ -29,22 +29,22 @@ pub(super) fn effects(page: &mut Document, mechanism: &Mechanism) {
         text("Each adds to the force of its place; a linear drive's name stands for its length, "),
         code("load"),
         text(" for the force that the place carries. Where an effect acts at several places, "),
-        Inline::Math(Formula::name(&*each)),
+        InlineSpan::Math(PrintedFormula::name(&*each)),
         text(" stands for the coordinate of each of them. At a point the parameter is a mass."),
     ]);
-    let is_coupled = |effect: &Effect| {
+    let is_coupled = |effect: &ModelEffect| {
         let mut terms = effect.terms.iter();
         effect.other.is_none()
             && terms.any(|term| {
                 term.expression.mentions(
-                    &|symbol| matches!(symbol, modelmill_spec::Symbol::Place(q) if q.is_other()),
+                    &|symbol| matches!(symbol, modelmill_spec::ModelSymbol::Place(q) if q.is_other()),
                 )
             })
     };
     if mechanism.effects.iter().any(is_coupled) {
         page.paragraph([
             text("Where an effect couples two places, "),
-            Inline::Math(Formula::name(&*other)),
+            InlineSpan::Math(PrintedFormula::name(&*other)),
             text(" stands for the coordinate of the other one."),
         ]);
     }
@@ -52,7 +52,7 @@ pub(super) fn effects(page: &mut Document, mechanism: &Mechanism) {
         .effects
         .iter()
         .map(|effect| {
-            let mut places = Line::new();
+            let mut places = TextLine::new();
             for (i, place) in effect.places.iter().enumerate() {
                 if i > 0 {
                     places.push(text(", "));
@@ -66,26 +66,26 @@ pub(super) fn effects(page: &mut Document, mechanism: &Mechanism) {
             vec![
                 cell(text(effect.kind.replace('_', " "))),
                 places,
-                adds(mechanism, effect, &each, &other),
+                effect_contribution(mechanism, effect, &each, &other),
             ]
         })
         .collect();
     let head = vec!["effect", "at", "adds"];
-    page.table("effects", Table { head, rows });
+    page.table("effects", PageTable { head, rows });
 }
 
 /// What an effect adds, as a formula where it is one, else in words.
-fn adds(mechanism: &Mechanism, effect: &Effect, each: &str, other: &str) -> Line {
-    let names: Vec<Formula> = (effect.terms.iter())
-        .map(|term| Formula::name(&*mechanism.parameters[term.parameter.0].name))
+fn effect_contribution(mechanism: &Mechanism, effect: &ModelEffect, each: &str, other: &str) -> TextLine {
+    let names: Vec<PrintedFormula> = (effect.terms.iter())
+        .map(|term| PrintedFormula::name(&*mechanism.parameters[term.parameter.0].name))
         .collect();
     let Some(mechanics) = effect.mechanics else {
-        let name = |place: &Place| match place {
-            Place::Drive(d) => match mechanism.drives[d.0].kind {
+        let name = |place: &EffectPlace| match place {
+            EffectPlace::Drive(d) => match mechanism.drives[d.0].kind {
                 DriveKind::Joint(c) => Some(&*mechanism.coordinates[c.0].name),
                 DriveKind::Linear { .. } => Some(&*mechanism.drives[d.0].name),
             },
-            Place::Coordinate(c) => Some(&*mechanism.coordinates[c.0].name),
+            EffectPlace::Coordinate(c) => Some(&*mechanism.coordinates[c.0].name),
             _ => None,
         };
         let x = match effect.places.as_slice() {
@@ -94,28 +94,28 @@ fn adds(mechanism: &Mechanism, effect: &Effect, each: &str, other: &str) -> Line
         };
         let other = effect.other.as_ref().and_then(name).unwrap_or(other);
         let terms = effect.terms.iter().zip(&names);
-        let sum = Formula::sum(terms.map(|(term, parameter)| {
-            let factor = exact_at(mechanism, &term.expression, [x, other]);
-            Formula::product(Rational::ONE, [parameter.clone(), factor])
+        let sum = PrintedFormula::sum(terms.map(|(term, parameter)| {
+            let factor = exact_formula_at(mechanism, &term.expression, [x, other]);
+            PrintedFormula::product(Rational::ONE, [parameter.clone(), factor])
         }));
-        return cell(Inline::Math(sum));
+        return cell(InlineSpan::Math(sum));
     };
-    let listed: Vec<(&str, Formula)> = if names.is_empty() {
+    let listed: Vec<(&str, PrintedFormula)> = if names.is_empty() {
         let constants = effect.constants.iter().map(|(symbol, value)| {
-            let value = exact_at(mechanism, value, [each, other]);
+            let value = exact_formula_at(mechanism, value, [each, other]);
             (mechanics.constant_label(symbol), value)
         });
         constants.collect()
     } else {
         names.into_iter().map(|name| ("", name)).collect()
     };
-    let mut line = vec![text(mechanics.lead())];
+    let mut line = vec![text(mechanics.introduction())];
     for (i, (label, formula)) in listed.into_iter().enumerate() {
         let comma = if i == 0 { "" } else { ", " };
         if i > 0 || !label.is_empty() {
             line.push(text(format!("{comma}{label}")));
         }
-        line.push(Inline::Math(formula));
+        line.push(InlineSpan::Math(formula));
     }
     line
 }

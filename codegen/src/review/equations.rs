@@ -5,13 +5,13 @@ use serde::{Serialize, Serializer, ser::SerializeMap};
 
 use super::base_parameters::{base_expression, factor_text};
 use super::rank::NumericRank;
-use crate::reduce::base::name as base_name;
-use crate::{Derivation, Method, OperationCount, Reduction, Stage};
+use crate::reduce::base::base_parameter_name as base_name;
+use crate::{Derivation, ReductionMethod, OperationCount, BaseReduction, ProgramStage};
 
 /// Everything that reduction says about a model.
 #[derive(Clone, Debug)]
 #[cfg_attr(any(test, feature = "json"), derive(Serialize))]
-pub struct Equations {
+pub struct ReducedEquations {
     /// Name of the model, as its file calls it.
     pub model: String,
     /// p_g, eq. (5), in order.
@@ -28,11 +28,11 @@ pub struct Equations {
     )]
     pub sums: Vec<(String, String)>,
     /// Eq. (16).
-    pub base: Vec<BaseLine>,
+    pub base: Vec<BaseParameterLine>,
     /// How many base parameters there are.
-    pub rank: Rank,
+    pub rank: RankSummary,
     /// Operations per state.
-    pub operations: Operations,
+    pub operations: ProgramOperations,
 }
 
 /// One line of eq. (6): a column as a combination of retained ones.
@@ -49,7 +49,7 @@ pub struct DependencyLine {
 /// One line of eq. (16).
 #[derive(Clone, Debug)]
 #[cfg_attr(any(test, feature = "json"), derive(Serialize))]
-pub struct BaseLine {
+pub struct BaseParameterLine {
     /// `p1_min`, `p2_min`, ...
     pub name: String,
     /// The product whose column is retained.
@@ -61,7 +61,7 @@ pub struct BaseLine {
 /// Ranks.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(any(test, feature = "json"), derive(Serialize))]
-pub struct Rank {
+pub struct RankSummary {
     /// By exact reduction, for any geometry but special ones; none where columns were reduced numerically.
     pub exact: Option<usize>,
     /// Of eq. (9) on the file's values.
@@ -96,8 +96,8 @@ pub struct NumericMethod {
 
 impl NumericMethod {
     /// The method of a reduction, if it is numeric.
-    pub fn from_reduction(reduction: &Reduction) -> Option<Self> {
-        let Method::Numeric {
+    pub fn from_reduction(reduction: &BaseReduction) -> Option<Self> {
+        let ReductionMethod::Numeric {
             least_kept,
             most_dropped,
             residual,
@@ -120,7 +120,7 @@ impl NumericMethod {
 /// Operation counts per state.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[cfg_attr(any(test, feature = "json"), derive(Serialize))]
-pub struct Operations {
+pub struct ProgramOperations {
     /// H_min.
     pub regressor: OperationCount,
     /// Inverse dynamics with p_min.
@@ -136,7 +136,7 @@ fn as_map<S: Serializer>(pairs: &[(String, String)], serializer: S) -> Result<S:
     map.end()
 }
 
-impl Equations {
+impl ReducedEquations {
     /// Collects the equations of a derivation.
     pub fn new(derivation: &Derivation, numeric: Option<&NumericRank>) -> Self {
         let Derivation {
@@ -171,22 +171,22 @@ impl Equations {
             dependencies: dependent.chain(vanishing).collect(),
             sums: derivation.base_sums(),
             base: (0..reduction.retained.len())
-                .map(|k| BaseLine {
+                .map(|k| BaseParameterLine {
                     name: base_name(k),
                     retained: product(reduction.retained[k]),
                     expression: base_expression(derivation, k).text(),
                 })
                 .collect(),
-            rank: Rank {
-                exact: matches!(reduction.method, Method::Exact { .. })
+            rank: RankSummary {
+                exact: matches!(reduction.method, ReductionMethod::Exact { .. })
                     .then_some(reduction.retained.len()),
                 numeric: numeric.map(|n| n.rank),
                 samples: numeric.map(|n| n.samples),
                 method: NumericMethod::from_reduction(reduction),
             },
-            operations: Operations {
-                regressor: programs.regressor.count(Stage::State),
-                inverse_dynamics: programs.inverse_dynamics.count(Stage::State),
+            operations: ProgramOperations {
+                regressor: programs.regressor.count_operations(ProgramStage::State),
+                inverse_dynamics: programs.inverse_dynamics.count_operations(ProgramStage::State),
             },
             without_effect,
         }

@@ -1,17 +1,17 @@
 //! Tables of frames, points, bodies and lumped masses.
 
 use modelmill_spec::{
-    Axis, Convention, CoordinateIdx, Exact, Frame, FreeBody, Inertial, Mechanism, Step, TwistAxes,
+    FrameAxis, FrameConvention, CoordinateIdx, ExactExpression, ModelFrame, FreeBody, PartInertia, Mechanism, FrameStep, TwistAxes,
 };
 
-use super::document::{Block, Document, Inline, Line, Table, cell, code, text};
+use super::document::{PageBlock, PageDocument, InlineSpan, TextLine, PageTable, cell, code, text};
 use crate::expr::Rational;
-use crate::expr::print::{Formula, angle, exact, length};
+use crate::expr::print::{PrintedFormula, angle_formula, exact_formula, length_formula};
 
 /// Frames and points.
-pub(super) fn frames(page: &mut Document, mechanism: &Mechanism) {
+pub(super) fn frames(page: &mut PageDocument, mechanism: &Mechanism) {
     page.heading("Frames");
-    let on = |frame: &Frame| code(&*mechanism.frames[frame.parent.0].name);
+    let on = |frame: &ModelFrame| code(&*mechanism.frames[frame.parent.0].name);
     for (title, standard) in [
         (
             "Modified Denavit-Hartenberg parameters: Rx(alpha) Tx(a) Rz(theta) Tz(d) leads from a frame to the next.",
@@ -22,16 +22,16 @@ pub(super) fn frames(page: &mut Document, mechanism: &Mechanism) {
             true,
         ),
     ] {
-        let rows: Vec<Vec<Line>> = mechanism.frames[1..]
+        let rows: Vec<Vec<TextLine>> = mechanism.frames[1..]
             .iter()
             .filter(|frame| match frame.convention {
-                Convention::ModifiedDh(_) => !standard,
-                Convention::StandardDh(_) => standard,
-                Convention::Base | Convention::Transform(_) => false,
+                FrameConvention::ModifiedDh(_) => !standard,
+                FrameConvention::StandardDh(_) => standard,
+                FrameConvention::Base | FrameConvention::Transform(_) => false,
             })
             .map(|frame| {
                 let mut row = vec![cell(code(&*frame.name)), cell(on(frame))];
-                row.extend(dh(mechanism, frame).map(|x| cell(Inline::Math(x))));
+                row.extend(dh_parameters(mechanism, frame).map(|x| cell(InlineSpan::Math(x))));
                 row
             })
             .collect();
@@ -40,30 +40,30 @@ pub(super) fn frames(page: &mut Document, mechanism: &Mechanism) {
         }
         page.paragraph([text(title)]);
         let head = vec!["frame", "on", "a", "alpha", "d", "theta"];
-        page.blocks.push(Block::Table(Table { head, rows }));
+        page.blocks.push(PageBlock::Table(PageTable { head, rows }));
     }
-    let rows: Vec<Vec<Line>> = mechanism.frames[1..]
+    let rows: Vec<Vec<TextLine>> = mechanism.frames[1..]
         .iter()
-        .filter(|frame| matches!(frame.convention, Convention::Transform(_)))
+        .filter(|frame| matches!(frame.convention, FrameConvention::Transform(_)))
         .map(|frame| {
-            let mut steps: Line = Vec::new();
+            let mut steps: TextLine = Vec::new();
             for step in &frame.steps {
                 let (letter, axis, by) = match step {
-                    Step::Free(body) => {
-                        steps.extend(free_body(mechanism, body));
+                    FrameStep::Free(body) => {
+                        steps.extend(free_body_motion(mechanism, body));
                         continue;
                     }
-                    Step::Rotate(axis, by) => ("R", axis, angle(mechanism, by)),
-                    Step::Translate(axis, by) => ("T", axis, length(mechanism, by)),
+                    FrameStep::Rotate(axis, by) => ("R", axis, angle_formula(mechanism, by)),
+                    FrameStep::Translate(axis, by) => ("T", axis, length_formula(mechanism, by)),
                 };
                 let axis = match axis {
-                    Axis::X => "x",
-                    Axis::Y => "y",
-                    Axis::Z => "z",
+                    FrameAxis::X => "x",
+                    FrameAxis::Y => "y",
+                    FrameAxis::Z => "z",
                 };
                 let space = if steps.is_empty() { "" } else { " " };
                 steps.push(text(format!("{space}{letter}{axis}(")));
-                steps.push(Inline::Math(by));
+                steps.push(InlineSpan::Math(by));
                 steps.push(text(")"));
             }
             if steps.is_empty() {
@@ -77,9 +77,9 @@ pub(super) fn frames(page: &mut Document, mechanism: &Mechanism) {
             "Transforms, each rotation and translation about and along the axes reached so far.",
         )]);
         let head = vec!["frame", "on", "transform"];
-        page.blocks.push(Block::Table(Table { head, rows }));
+        page.blocks.push(PageBlock::Table(PageTable { head, rows }));
     }
-    let rows: Vec<Vec<Line>> = mechanism
+    let rows: Vec<Vec<TextLine>> = mechanism
         .points
         .iter()
         .map(|point| {
@@ -93,12 +93,12 @@ pub(super) fn frames(page: &mut Document, mechanism: &Mechanism) {
     if !rows.is_empty() {
         page.paragraph([text("Points, fixed to their frames.")]);
         let head = vec!["point", "on", "position in the frame, m"];
-        page.table("points", Table { head, rows });
+        page.table("points", PageTable { head, rows });
     }
 }
 
 /// What a body that hangs on nothing moves by.
-fn free_body(mechanism: &Mechanism, body: &FreeBody) -> Line {
+fn free_body_motion(mechanism: &Mechanism, body: &FreeBody) -> TextLine {
     let names = |all: &[CoordinateIdx]| {
         let names = all.iter().map(|i| mechanism.coordinates[i.0].name.as_str());
         names.collect::<Vec<_>>().join(", ")
@@ -121,41 +121,41 @@ fn free_body(mechanism: &Mechanism, body: &FreeBody) -> Line {
 }
 
 /// a, alpha, d, theta of a frame in a Denavit-Hartenberg convention.
-fn dh(mechanism: &Mechanism, frame: &Frame) -> [Formula; 4] {
-    let rotation = |wanted: Axis| {
-        Formula::sum(frame.steps.iter().filter_map(|step| match step {
-            Step::Rotate(axis, by) if *axis == wanted => Some(angle(mechanism, by)),
+fn dh_parameters(mechanism: &Mechanism, frame: &ModelFrame) -> [PrintedFormula; 4] {
+    let rotation = |wanted: FrameAxis| {
+        PrintedFormula::sum(frame.steps.iter().filter_map(|step| match step {
+            FrameStep::Rotate(axis, by) if *axis == wanted => Some(angle_formula(mechanism, by)),
             _ => None,
         }))
     };
-    let translation = |wanted: Axis| {
-        Formula::sum(frame.steps.iter().filter_map(|step| match step {
-            Step::Translate(axis, by) if *axis == wanted => Some(length(mechanism, by)),
+    let translation = |wanted: FrameAxis| {
+        PrintedFormula::sum(frame.steps.iter().filter_map(|step| match step {
+            FrameStep::Translate(axis, by) if *axis == wanted => Some(length_formula(mechanism, by)),
             _ => None,
         }))
     };
     [
-        translation(Axis::X),
-        rotation(Axis::X),
-        translation(Axis::Z),
-        rotation(Axis::Z),
+        translation(FrameAxis::X),
+        rotation(FrameAxis::X),
+        translation(FrameAxis::Z),
+        rotation(FrameAxis::Z),
     ]
 }
 
-fn vector(mechanism: &Mechanism, at: &[Exact; 3]) -> Line {
+fn vector(mechanism: &Mechanism, at: &[ExactExpression; 3]) -> TextLine {
     let mut line = vec![text("(")];
     for (i, x) in at.iter().enumerate() {
         if i > 0 {
             line.push(text(", "));
         }
-        line.push(Inline::Math(exact(mechanism, x)));
+        line.push(InlineSpan::Math(exact_formula(mechanism, x)));
     }
     line.push(text(")"));
     line
 }
 
 /// The entries of an inertia that are not zero, with their places.
-fn entries(mechanism: &Mechanism, names: [&str; 6], values: &[Exact; 6]) -> Line {
+fn inertia_entries(mechanism: &Mechanism, names: [&str; 6], values: &[ExactExpression; 6]) -> TextLine {
     let mut line = Vec::new();
     for (name, value) in names.iter().zip(values) {
         if value.is_zero() {
@@ -165,7 +165,7 @@ fn entries(mechanism: &Mechanism, names: [&str; 6], values: &[Exact; 6]) -> Line
             line.push(text(", "));
         }
         line.push(text(format!("{name} ")));
-        line.push(Inline::Math(exact(mechanism, value)));
+        line.push(InlineSpan::Math(exact_formula(mechanism, value)));
     }
     if line.is_empty() {
         line.push(text("0"));
@@ -176,7 +176,7 @@ fn entries(mechanism: &Mechanism, names: [&str; 6], values: &[Exact; 6]) -> Line
 const PLACES: [&str; 6] = ["xx", "xy", "xz", "yy", "yz", "zz"];
 
 /// Parts and lumped masses.
-pub(super) fn bodies(page: &mut Document, mechanism: &Mechanism) {
+pub(super) fn bodies(page: &mut PageDocument, mechanism: &Mechanism) {
     page.heading("Bodies");
     let (mut about_centre, mut linear) = (Vec::new(), Vec::new());
     for part in &mechanism.parts {
@@ -185,21 +185,21 @@ pub(super) fn bodies(page: &mut Document, mechanism: &Mechanism) {
             cell(code(&*mechanism.frames[part.frame.0].name)),
         ];
         let (rows, mass, place, inertia) = match &part.inertial {
-            Inertial::AboutCentre {
+            PartInertia::AboutCentre {
                 mass,
                 centre,
                 inertia,
             } => (&mut about_centre, mass, centre, inertia),
-            Inertial::Linear {
+            PartInertia::Linear {
                 mass,
                 first_moment,
                 inertia,
             } => (&mut linear, mass, first_moment, inertia),
         };
         let mut row = start;
-        row.push(cell(Inline::Math(exact(mechanism, mass))));
+        row.push(cell(InlineSpan::Math(exact_formula(mechanism, mass))));
         row.push(vector(mechanism, place));
-        row.push(entries(mechanism, PLACES, inertia));
+        row.push(inertia_entries(mechanism, PLACES, inertia));
         rows.push(row);
     }
     if !about_centre.is_empty() {
@@ -209,7 +209,7 @@ pub(super) fn bodies(page: &mut Document, mechanism: &Mechanism) {
         let head = vec!["part", "frame", "mass, kg", "centre, m", "inertia, kg m²"];
         page.table(
             "parts",
-            Table {
+            PageTable {
                 head,
                 rows: about_centre,
             },
@@ -226,12 +226,12 @@ pub(super) fn bodies(page: &mut Document, mechanism: &Mechanism) {
             "first moment, kg m",
             "inertia, kg m²",
         ];
-        page.table("parts", Table { head, rows: linear });
+        page.table("parts", PageTable { head, rows: linear });
     }
     lumped_masses(page, mechanism);
 }
 
-fn lumped_masses(page: &mut Document, mechanism: &Mechanism) {
+fn lumped_masses(page: &mut PageDocument, mechanism: &Mechanism) {
     if mechanism.lumped_masses.is_empty() {
         return;
     }
@@ -242,7 +242,7 @@ fn lumped_masses(page: &mut Document, mechanism: &Mechanism) {
         .iter()
         .map(|lump| {
             let share = Rational::from(lump.share.clone());
-            let mass = Formula::product(share, [exact(mechanism, &lump.mass)]);
+            let mass = PrintedFormula::product(share, [exact_formula(mechanism, &lump.mass)]);
             let same = lump.force_at == lump.moment_at;
             apart += usize::from(!same);
             let moment = if same {
@@ -251,7 +251,7 @@ fn lumped_masses(page: &mut Document, mechanism: &Mechanism) {
                 vector(mechanism, &lump.moment_at)
             };
             vec![
-                cell(Inline::Math(mass)),
+                cell(InlineSpan::Math(mass)),
                 cell(code(&*mechanism.frames[lump.frame.0].name)),
                 vector(mechanism, &lump.force_at),
                 moment,
@@ -264,7 +264,7 @@ fn lumped_masses(page: &mut Document, mechanism: &Mechanism) {
         "the balance of forces sees it at, m",
         "the balance of moments sees it at, m",
     ];
-    page.table("lumped masses", Table { head, rows });
+    page.table("lumped masses", PageTable { head, rows });
     if apart > 0 {
         let n = if apart == 1 {
             "one mass".to_owned()

@@ -1,17 +1,17 @@
 //! Loops and drives: closure equations, how they are solved, and what the drives see.
 
-use modelmill_spec::{Carries, DriveKind, Mechanism};
+use modelmill_spec::{PlaceLoad, DriveKind, Mechanism};
 
-use super::document::{Block, Document, Equation, Inline, Line, Table, cell, code, text};
-use crate::expr::print::{Formula, angle_sum, formula, tree_size};
+use super::document::{PageBlock, PageDocument, PageEquation, InlineSpan, TextLine, PageTable, cell, code, text};
+use crate::expr::print::{PrintedFormula, angle_sum_formula, formula, tree_size};
 use crate::expr::{ExprId, Graph, Rational, nominal_value};
 use crate::{Derivation, PassivePosition};
 
 /// Expressions with more nodes than this are shown in a program rather than in one line.
 const LONGEST: usize = 70;
 
-fn names(mechanism: &Mechanism, coordinates: &[usize]) -> Line {
-    let mut line = Line::new();
+fn coordinate_names(mechanism: &Mechanism, coordinates: &[usize]) -> TextLine {
+    let mut line = TextLine::new();
     for (i, c) in coordinates.iter().enumerate() {
         if i > 0 {
             line.push(text(if i + 1 == coordinates.len() {
@@ -20,19 +20,19 @@ fn names(mechanism: &Mechanism, coordinates: &[usize]) -> Line {
                 ", "
             }));
         }
-        line.push(Inline::Math(Formula::name(
+        line.push(InlineSpan::Math(PrintedFormula::name(
             &*mechanism.coordinates[*c].name,
         )));
     }
     line
 }
 
-fn shown(graph: &Graph, mechanism: &Mechanism, id: ExprId) -> Option<Formula> {
+fn short_formula(graph: &Graph, mechanism: &Mechanism, id: ExprId) -> Option<PrintedFormula> {
     (tree_size(graph, id, LONGEST) < LONGEST).then(|| formula(graph, mechanism, id))
 }
 
 /// Closure equations and the way from the active to the passive coordinates.
-pub(super) fn loops(page: &mut Document, derivation: &Derivation) {
+pub(super) fn loops(page: &mut PageDocument, derivation: &Derivation) {
     let Derivation {
         mechanism,
         graph,
@@ -41,7 +41,7 @@ pub(super) fn loops(page: &mut Document, derivation: &Derivation) {
         ..
     } = derivation;
     let projection = &equations.projection;
-    couplings(page, derivation);
+    list_couplings(page, derivation);
     if mechanism.loops.is_empty() {
         return;
     }
@@ -68,9 +68,9 @@ pub(super) fn loops(page: &mut Document, derivation: &Derivation) {
             .iter()
             .filter_map(|id| {
                 tag += 1;
-                Some(Equation {
-                    left: Formula::integer(0),
-                    right: shown(graph, mechanism, *id)?,
+                Some(PageEquation {
+                    left: PrintedFormula::integer(0),
+                    right: short_formula(graph, mechanism, *id)?,
                     tag: format!("L{tag}"),
                     unit: None,
                 })
@@ -80,10 +80,10 @@ pub(super) fn loops(page: &mut Document, derivation: &Derivation) {
     }
     match &programs.passive_position {
         PassivePosition::None => {}
-        PassivePosition::Closed => solved_in_closed_form(page, derivation),
+        PassivePosition::Closed => list_closed_form(page, derivation),
         PassivePosition::Newton { .. } => {
             let mut line = vec![text("The passive coordinates ")];
-            line.extend(names(mechanism, &projection.loops.passive));
+            line.extend(coordinate_names(mechanism, &projection.loops.passive));
             line.push(text(
                 " follow by Newton's method on the closure equations, started from the nominal pose or the pose before, \
                  which keeps to the assembly mode of the model file.",
@@ -91,14 +91,14 @@ pub(super) fn loops(page: &mut Document, derivation: &Derivation) {
             page.paragraph(line);
         }
     }
-    let determinants: Vec<Equation> = projection
+    let determinants: Vec<PageEquation> = projection
         .determinants
         .iter()
         .enumerate()
         .filter_map(|(k, id)| {
-            Some(Equation {
-                left: Formula::name(format!("Delta_{}", k + 1)),
-                right: shown(graph, mechanism, *id)?,
+            Some(PageEquation {
+                left: PrintedFormula::name(format!("Delta_{}", k + 1)),
+                right: short_formula(graph, mechanism, *id)?,
                 tag: format!("L{}", tag + k + 1),
                 unit: None,
             })
@@ -116,7 +116,7 @@ pub(super) fn loops(page: &mut Document, derivation: &Derivation) {
 }
 
 /// What follows other coordinates.
-fn couplings(page: &mut Document, derivation: &Derivation) {
+fn list_couplings(page: &mut PageDocument, derivation: &Derivation) {
     let Derivation {
         mechanism,
         graph,
@@ -126,11 +126,11 @@ fn couplings(page: &mut Document, derivation: &Derivation) {
     let closures = equations.projection.loops.closures.iter();
     let mut lines = Vec::new();
     for follower in closures.filter_map(|closure| closure.follower.as_ref()) {
-        let Some(right) = shown(graph, mechanism, follower.value) else {
+        let Some(right) = short_formula(graph, mechanism, follower.value) else {
             continue;
         };
-        lines.push(Equation {
-            left: Formula::name(&*mechanism.coordinates[follower.coordinate].name),
+        lines.push(PageEquation {
+            left: PrintedFormula::name(&*mechanism.coordinates[follower.coordinate].name),
             right,
             tag: format!("C{}", lines.len() + 1),
             unit: None,
@@ -147,7 +147,7 @@ fn couplings(page: &mut Document, derivation: &Derivation) {
     page.equations("couplings", lines);
 }
 
-fn solved_in_closed_form(page: &mut Document, derivation: &Derivation) {
+fn list_closed_form(page: &mut PageDocument, derivation: &Derivation) {
     let Derivation {
         mechanism,
         graph,
@@ -168,11 +168,11 @@ fn solved_in_closed_form(page: &mut Document, derivation: &Derivation) {
         }
         for relation in &step.solved.relations {
             let offset = Rational::new(i64::from(relation.pi12), 12);
-            related.push(Equation {
-                left: Formula::name(&*mechanism.coordinates[relation.coordinate].name),
-                right: Formula::sum([
-                    angle_sum(mechanism, &relation.sum),
-                    Formula::product(offset, [Formula::name("pi")]),
+            related.push(PageEquation {
+                left: PrintedFormula::name(&*mechanism.coordinates[relation.coordinate].name),
+                right: PrintedFormula::sum([
+                    angle_sum_formula(mechanism, &relation.sum),
+                    PrintedFormula::product(offset, [PrintedFormula::name("pi")]),
                 ]),
                 tag: format!("P{}", related.len() + 1),
                 unit: None,
@@ -181,7 +181,7 @@ fn solved_in_closed_form(page: &mut Document, derivation: &Derivation) {
         if !step.solved.relations.is_empty() {
             continue;
         }
-        let mut line = names(mechanism, &step.unknown);
+        let mut line = coordinate_names(mechanism, &step.unknown);
         line.push(text(match step.solved.values.len() {
             0 => " follow in closed form as the intersection of two circles",
             1 => " follow in closed form as the intersection of a circle and a line",
@@ -209,7 +209,7 @@ fn solved_in_closed_form(page: &mut Document, derivation: &Derivation) {
 }
 
 /// Drives with their coordinates and Jacobian.
-pub(super) fn drives(page: &mut Document, derivation: &Derivation) {
+pub(super) fn drives(page: &mut PageDocument, derivation: &Derivation) {
     let Derivation {
         mechanism,
         graph,
@@ -226,11 +226,11 @@ pub(super) fn drives(page: &mut Document, derivation: &Derivation) {
             let acts = match drive.kind {
                 DriveKind::Joint(i) => {
                     let coordinate = &mechanism.coordinates[i.0];
-                    let kind = match coordinate.motion.carries() {
-                        Carries::Torque => "torque on ",
+                    let kind = match coordinate.motion.place_load() {
+                        PlaceLoad::Torque => "torque on ",
                         _ => "force on ",
                     };
-                    vec![text(kind), Inline::Math(Formula::name(&*coordinate.name))]
+                    vec![text(kind), InlineSpan::Math(PrintedFormula::name(&*coordinate.name))]
                 }
                 DriveKind::Linear { from, to } => {
                     any_linear = true;
@@ -248,7 +248,7 @@ pub(super) fn drives(page: &mut Document, derivation: &Derivation) {
         .collect();
     page.table(
         "drives",
-        Table {
+        PageTable {
             head: vec!["drive", "acts as"],
             rows,
         },
@@ -262,10 +262,10 @@ pub(super) fn drives(page: &mut Document, derivation: &Derivation) {
             if id == Graph::ZERO {
                 return None;
             }
-            let right = shown(graph, mechanism, id)?;
+            let right = short_formula(graph, mechanism, id)?;
             let tag = format!("D{}", lines.len() + 1);
-            lines.push(Equation {
-                left: Formula::name(left),
+            lines.push(PageEquation {
+                left: PrintedFormula::name(left),
                 right,
                 tag,
                 unit: None,
@@ -288,6 +288,6 @@ pub(super) fn drives(page: &mut Document, derivation: &Derivation) {
             "Lengths of the linear drives, and their derivatives by the independent coordinates, the Jacobian J; what is not listed is zero. \
              By virtual power J' f equals the generalised forces of the independent coordinates.",
         )]);
-        page.blocks.push(Block::Equations(lines));
+        page.blocks.push(PageBlock::Equations(lines));
     }
 }

@@ -21,19 +21,19 @@ mod render_text;
 #[cfg(test)]
 pub(crate) mod tests;
 
-pub use base_parameters::{base_expression, base_grouped, base_summand};
-pub use equations::{BaseLine, DependencyLine, Equations, NumericMethod, Operations, Rank};
+pub use base_parameters::{base_expression, factored_base_expression, base_summand};
+pub use equations::{BaseParameterLine, DependencyLine, ReducedEquations, NumericMethod, ProgramOperations, RankSummary};
 pub use rank::NumericRank;
 
-use modelmill_draw::{Scene, Style, inline_svg};
+use modelmill_draw::{MechanismScene, DrawingStyle, inline_svg};
 use modelmill_spec::Mechanism;
 
 use crate::Derivation;
-use document::Document;
+use document::PageDocument;
 
 /// How a page is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Format {
+pub enum PageFormat {
     /// Plain text for a terminal.
     Text,
     /// Markdown with LaTeX formulas.
@@ -50,30 +50,30 @@ pub enum Format {
 /// The page of a model.
 ///
 /// `numeric` is the rank of eq. (9) on the file's values, if the caller has found it.
-pub fn page(derivation: &Derivation, format: Format, numeric: Option<&NumericRank>) -> String {
-    let document = || write(derivation, numeric);
+pub fn page(derivation: &Derivation, format: PageFormat, numeric: Option<&NumericRank>) -> String {
+    let document = || compose_page(derivation, numeric);
     match format {
-        Format::Text => render_text::render(&document()),
-        Format::Markdown => render_markdown::render(&document()),
-        Format::Latex => render_latex::render(&document()),
-        Format::Html => render_html::render(&document(), &picture(&derivation.mechanism)),
+        PageFormat::Text => render_text::render(&document()),
+        PageFormat::Markdown => render_markdown::render(&document()),
+        PageFormat::Latex => render_latex::render(&document()),
+        PageFormat::Html => render_html::render(&document(), &mechanism_picture(&derivation.mechanism)),
         #[cfg(any(test, feature = "json"))]
-        Format::Json => Equations::new(derivation, numeric).json(),
+        PageFormat::Json => ReducedEquations::new(derivation, numeric).json(),
     }
 }
 
 /// The mechanism at its nominal pose.
-fn picture(mechanism: &Mechanism) -> String {
+fn mechanism_picture(mechanism: &Mechanism) -> String {
     let nominal: Vec<f64> = mechanism.coordinates.iter().map(|c| c.nominal).collect();
-    let scene = Scene::new(mechanism, &nominal);
-    inline_svg(&[&scene], &scene.view(), &Style::default())
+    let scene = MechanismScene::new(mechanism, &nominal);
+    inline_svg(&[&scene], &scene.best_view(), &DrawingStyle::default())
 }
 
 /// The derivation, step by step.
-fn write(derivation: &Derivation, numeric: Option<&NumericRank>) -> Document {
+fn compose_page(derivation: &Derivation, numeric: Option<&NumericRank>) -> PageDocument {
     let mechanism = &derivation.mechanism;
     let title = mechanism.title.clone();
-    let mut page = Document {
+    let mut page = PageDocument {
         title: title.unwrap_or_else(|| mechanism.name.clone()),
         blocks: Vec::new(),
     };

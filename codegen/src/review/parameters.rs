@@ -2,12 +2,12 @@
 
 use modelmill_spec::Mechanism;
 
-use super::document::{Document, Inline, Table, cell, code, name, number, text, unit};
+use super::document::{PageDocument, InlineSpan, PageTable, cell, code, name, number, text, unit};
 use crate::Derivation;
-use crate::expr::print::{Formula, exact};
+use crate::expr::print::{PrintedFormula, exact_formula};
 
 /// The first paragraph.
-pub(super) fn summary(page: &mut Document, derivation: &Derivation) {
+pub(super) fn summary(page: &mut PageDocument, derivation: &Derivation) {
     let mechanism = &derivation.mechanism;
     let reduction = &derivation.reduction;
     let count = |n: usize, one: &str, many: &str| match n {
@@ -38,7 +38,7 @@ pub(super) fn summary(page: &mut Document, derivation: &Derivation) {
 }
 
 /// Constants, gravity, parameters, coordinates.
-pub(super) fn quantities(page: &mut Document, mechanism: &Mechanism) {
+pub(super) fn quantities(page: &mut PageDocument, mechanism: &Mechanism) {
     if !mechanism.constants.is_empty() {
         page.heading("Constants");
     }
@@ -56,12 +56,12 @@ pub(super) fn quantities(page: &mut Document, mechanism: &Mechanism) {
         })
         .collect();
     let head = vec!["symbol", "value", "unit", "meaning"];
-    page.table("constants", Table { head, rows });
-    let gravity = mechanism.gravity.each_ref().map(|g| exact(mechanism, g));
-    if gravity.iter().all(Formula::is_zero) {
+    page.table("constants", PageTable { head, rows });
+    let gravity = mechanism.gravity.each_ref().map(|g| exact_formula(mechanism, g));
+    if gravity.iter().all(PrintedFormula::is_zero) {
         page.paragraph([text("Gravity does not act.")]);
     } else {
-        let [x, y, z] = gravity.map(Inline::Math);
+        let [x, y, z] = gravity.map(InlineSpan::Math);
         page.paragraph([
             text("Gravity in the base frame: ("),
             x,
@@ -88,7 +88,7 @@ pub(super) fn quantities(page: &mut Document, mechanism: &Mechanism) {
         })
         .collect();
     let head = vec!["symbol", "nominal", "unit", "meaning"];
-    page.table("parameters", Table { head, rows });
+    page.table("parameters", PageTable { head, rows });
     page.heading("Coordinates");
     let follows = |i: usize| {
         let mut couplings = mechanism.couplings.iter();
@@ -126,5 +126,5 @@ pub(super) fn quantities(page: &mut Document, mechanism: &Mechanism) {
         })
         .collect();
     let head = vec!["symbol", "kind", "nominal", "unit", "role"];
-    page.table("coordinates", Table { head, rows });
+    page.table("coordinates", PageTable { head, rows });
 }

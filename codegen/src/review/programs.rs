@@ -2,18 +2,18 @@
 
 use std::collections::BTreeSet;
 
-use modelmill_spec::{Drive, DriveKind};
+use modelmill_spec::{ModelDrive, DriveKind};
 
-use super::document::{Block, Document, Equation, Line, Table, cell, name, text};
-use super::listing::{self, Listing};
-use crate::emit::tree::names::{Meaning, Meanings, reserved};
-use crate::expr::print::{Formula, Symbol};
-use crate::lower::{OperationCount, Program, Stage};
-use crate::reduce::base::name as base_name;
+use super::document::{PageBlock, PageDocument, PageEquation, TextLine, PageTable, cell, name, text};
+use super::listing::{self, ProgramListing};
+use crate::emit::tree::names::{QuantityName, NamedQuantities, reserved_names};
+use crate::expr::print::{PrintedFormula, FormulaSymbol};
+use crate::lower::{OperationCount, StraightLineProgram, ProgramStage};
+use crate::reduce::base::base_parameter_name as base_name;
 use crate::{Derivation, PassivePosition};
 
 /// Operation counts, then the programs.
-pub(super) fn programs(page: &mut Document, derivation: &Derivation) {
+pub(super) fn programs(page: &mut PageDocument, derivation: &Derivation) {
     let programs = &derivation.programs;
     page.heading("Operations");
     page.paragraph([text(
@@ -32,11 +32,11 @@ pub(super) fn programs(page: &mut Document, derivation: &Derivation) {
         if program.outputs.is_empty() {
             continue;
         }
-        for (stage, when) in [(Stage::State, "state"), (Stage::Fixed, "geometry")] {
-            let count = program.count(stage);
+        for (stage, when) in [(ProgramStage::State, "state"), (ProgramStage::Fixed, "geometry")] {
+            let count = program.count_operations(stage);
             // A program that does nothing at a state, or nothing beforehand, needs no line for it.
             if count == OperationCount::default()
-                && (stage == Stage::Fixed || program.count(Stage::Fixed) != count)
+                && (stage == ProgramStage::Fixed || program.count_operations(ProgramStage::Fixed) != count)
             {
                 continue;
             }
@@ -58,55 +58,55 @@ pub(super) fn programs(page: &mut Document, derivation: &Derivation) {
     let head = vec![
         "program", "per", "+ -", "*", "/", "sqrt", "sin cos", "other",
     ];
-    page.blocks.push(Block::Table(Table { head, rows }));
+    page.blocks.push(PageBlock::Table(PageTable { head, rows }));
 
     page.heading("Programs");
     let listings = listings(derivation);
     page.paragraph([text(
         "The programs step by step. What is used once is put in place; what is shared has a name.",
     )]);
-    legend(page, &listings);
+    add_legend(page, &listings);
     for (title, _, _, listing) in listings {
-        fold(page, &title, listing);
+        add_folded_listing(page, &title, listing);
     }
 }
 
 /// A title, the names of the outputs, the program, and its equations.
-pub(super) type Listed<'a> = (String, Vec<Symbol>, &'a Program, Listing);
+pub(super) type ListedProgram<'a> = (String, Vec<FormulaSymbol>, &'a StraightLineProgram, ProgramListing);
 
 /// The programs that are shown.
-pub(super) fn listings(derivation: &Derivation) -> Vec<Listed<'_>> {
+pub(super) fn listings(derivation: &Derivation) -> Vec<ListedProgram<'_>> {
     let Derivation {
         mechanism,
         programs,
         reduction,
         ..
     } = derivation;
-    let meanings = Meanings::new(derivation);
-    let taken = reserved(mechanism);
-    let list = |program: &Program, outputs: &[Symbol], prefix: &str| {
-        let mut names = meanings.of(program);
+    let meanings = NamedQuantities::new(derivation);
+    let taken = reserved_names(mechanism);
+    let list = |program: &StraightLineProgram, outputs: &[FormulaSymbol], prefix: &str| {
+        let mut names = meanings.name_values(program);
         names.retain(|_, meaning| !outputs.contains(&meaning.symbol));
         for (value, symbol) in program.outputs.iter().zip(outputs) {
             // An output with a meaning is called by it from the start.
             if is_motion(derivation, symbol) && !is_trivial(program, value.index()) {
-                let meaning = Meaning {
+                let meaning = QuantityName {
                     symbol: symbol.clone(),
                     negative: false,
                 };
                 names.insert(value.index(), meaning);
             }
         }
-        listing::list(program, mechanism, &names, &taken, outputs, prefix)
+        listing::list_program(program, mechanism, &names, &taken, outputs, prefix)
     };
     let mut listings = Vec::new();
     let (active, passive) = derivation.coordinates();
     if !passive.is_empty() && matches!(programs.passive_position, PassivePosition::Closed) {
-        let outputs: Vec<Symbol> = (0..3)
+        let outputs: Vec<FormulaSymbol> = (0..3)
             .flat_map(|order| {
                 passive
                     .iter()
-                    .map(move |p| Symbol::derived(&*mechanism.coordinates[*p].name, order))
+                    .map(move |p| FormulaSymbol::time_derivative(&*mechanism.coordinates[*p].name, order))
             })
             .collect();
         listings.push((
@@ -116,27 +116,27 @@ pub(super) fn listings(derivation: &Derivation) -> Vec<Listed<'_>> {
             "P",
         ));
     }
-    let is_linear = |d: &Drive| matches!(d.kind, DriveKind::Linear { .. });
+    let is_linear = |d: &ModelDrive| matches!(d.kind, DriveKind::Linear { .. });
     if mechanism.drives.iter().any(is_linear) {
-        let mut outputs: Vec<Symbol> = Vec::new();
+        let mut outputs: Vec<FormulaSymbol> = Vec::new();
         for order in 0..2 {
             let lengths = mechanism
                 .drives
                 .iter()
-                .map(|d| Symbol::derived(format!("l_{}", d.name), order));
+                .map(|d| FormulaSymbol::time_derivative(format!("l_{}", d.name), order));
             outputs.extend(lengths);
         }
         for d in &mechanism.drives {
             let row = active
                 .iter()
-                .map(|a| Symbol::new(format!("J_{}_{}", d.name, mechanism.coordinates[*a].name)));
+                .map(|a| FormulaSymbol::new(format!("J_{}_{}", d.name, mechanism.coordinates[*a].name)));
             outputs.extend(row);
         }
         listings.push(("Drives and their Jacobian", outputs, &programs.drives, "D"));
     }
     let rank = reduction.retained.len();
-    let outputs: Vec<Symbol> = (0..mechanism.drives.len())
-        .flat_map(|d| (0..rank).map(move |k| Symbol::new(format!("H_{}_{}", d + 1, k + 1))))
+    let outputs: Vec<FormulaSymbol> = (0..mechanism.drives.len())
+        .flat_map(|d| (0..rank).map(move |k| FormulaSymbol::new(format!("H_{}_{}", d + 1, k + 1))))
         .collect();
     let rows: Vec<&str> = mechanism.drives.iter().map(|d| &*d.name).collect();
     let columns = match rank {
@@ -188,11 +188,11 @@ const LETTERS: [(&[&str], &str); 10] = [
 ];
 
 /// Explains the letters that the listings use.
-fn legend(page: &mut Document, listings: &[Listed<'_>]) {
+fn add_legend(page: &mut PageDocument, listings: &[ListedProgram<'_>]) {
     let mut used = BTreeSet::new();
     for (_, _, _, listing) in listings {
         for equation in listing.fixed.iter().chain(&listing.state) {
-            if let Formula::Symbol(symbol) = &equation.left {
+            if let PrintedFormula::Symbol(symbol) = &equation.left {
                 let head = symbol.name.split('_').next().unwrap_or_default();
                 used.insert(head.trim_end_matches(|c: char| c.is_ascii_digit()));
             }
@@ -201,7 +201,7 @@ fn legend(page: &mut Document, listings: &[Listed<'_>]) {
     let rows = LETTERS
         .iter()
         .filter_map(|(letters, says)| {
-            let mut line = Line::new();
+            let mut line = TextLine::new();
             for letter in letters.iter().filter(|l| used.contains(**l)) {
                 if !line.is_empty() {
                     line.push(text(", "));
@@ -212,11 +212,11 @@ fn legend(page: &mut Document, listings: &[Listed<'_>]) {
         })
         .collect();
     let head = vec!["letter", "meaning"];
-    page.table("letters", Table { head, rows });
+    page.table("letters", PageTable { head, rows });
 }
 
 /// Whether a name is that of a coordinate's or drive's motion rather than of an entry of H_min.
-fn is_motion(derivation: &Derivation, symbol: &Symbol) -> bool {
+fn is_motion(derivation: &Derivation, symbol: &FormulaSymbol) -> bool {
     derivation
         .mechanism
         .coordinates
@@ -226,21 +226,21 @@ fn is_motion(derivation: &Derivation, symbol: &Symbol) -> bool {
         || symbol.name.starts_with("J_")
 }
 
-fn is_trivial(program: &Program, i: usize) -> bool {
-    use crate::lower::Op;
-    matches!(program.ops[i], Op::Number(_) | Op::Input(_) | Op::Neg(_))
+fn is_trivial(program: &StraightLineProgram, i: usize) -> bool {
+    use crate::lower::ProgramOp;
+    matches!(program.ops[i], ProgramOp::Number(_) | ProgramOp::Input(_) | ProgramOp::Neg(_))
 }
 
-fn fold(page: &mut Document, title: &str, listing: Listing) {
-    let Listing { fixed, state } = listing;
-    let mut blocks: Vec<Block> = Vec::new();
-    let mut part = |says: &str, equations: Vec<Equation>| {
+fn add_folded_listing(page: &mut PageDocument, title: &str, listing: ProgramListing) {
+    let ProgramListing { fixed, state } = listing;
+    let mut blocks: Vec<PageBlock> = Vec::new();
+    let mut part = |says: &str, equations: Vec<PageEquation>| {
         if !equations.is_empty() {
-            blocks.push(Block::Paragraph(vec![text(says)]));
-            blocks.push(Block::Equations(equations));
+            blocks.push(PageBlock::Paragraph(vec![text(says)]));
+            blocks.push(PageBlock::Equations(equations));
         }
     };
     part("Once per geometry:", fixed);
     part("At every state:", state);
-    page.blocks.push(Block::Folded(title.to_owned(), blocks));
+    page.blocks.push(PageBlock::Folded(title.to_owned(), blocks));
 }

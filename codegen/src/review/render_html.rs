@@ -5,17 +5,17 @@ use std::fmt::Write;
 use modelmill_boundary::text::html as escape;
 use modelmill_draw::page;
 
-use super::document::{Block, Document, Equation, Inline, Line};
-use crate::expr::print::Formula;
+use super::document::{PageBlock, PageDocument, PageEquation, InlineSpan, TextLine};
+use crate::expr::print::PrintedFormula;
 
 /// `picture` is an SVG of the mechanism.
-pub(super) fn render(document: &Document, picture: &str) -> String {
+pub(super) fn render(document: &PageDocument, picture: &str) -> String {
     let mut out = page::begin(&document.title);
     let headings: Vec<&String> = document
         .blocks
         .iter()
         .filter_map(|block| match block {
-            Block::Heading(text) => Some(text),
+            PageBlock::Heading(text) => Some(text),
             _ => None,
         })
         .collect();
@@ -41,14 +41,14 @@ fn anchor(text: &str) -> String {
         .collect()
 }
 
-fn blocks(out: &mut String, blocks: &[Block]) {
+fn blocks(out: &mut String, blocks: &[PageBlock]) {
     for block in blocks {
         match block {
-            Block::Heading(text) => {
+            PageBlock::Heading(text) => {
                 _ = writeln!(out, "<h2 id=\"{}\">{}</h2>", anchor(text), escape(text));
             }
-            Block::Paragraph(line) => _ = writeln!(out, "<p>{}</p>", inlines(line)),
-            Block::Table(table) => {
+            PageBlock::Paragraph(line) => _ = writeln!(out, "<p>{}</p>", inlines(line)),
+            PageBlock::Table(table) => {
                 out.push_str("<div class=\"wide\"><table>\n<thead><tr>");
                 for head in &table.head {
                     _ = write!(out, "<th scope=\"col\">{}</th>", escape(head));
@@ -63,14 +63,14 @@ fn blocks(out: &mut String, blocks: &[Block]) {
                 }
                 out.push_str("</tbody>\n</table></div>\n");
             }
-            Block::Equations(equations) => {
+            PageBlock::Equations(equations) => {
                 out.push_str("<div class=\"equations\">\n");
                 for equation in equations {
                     write_equation(out, equation);
                 }
                 out.push_str("</div>\n");
             }
-            Block::Folded(summary, inner) => {
+            PageBlock::Folded(summary, inner) => {
                 _ = writeln!(out, "<details>\n<summary>{}</summary>", escape(summary));
                 self::blocks(out, inner);
                 out.push_str("</details>\n");
@@ -79,12 +79,12 @@ fn blocks(out: &mut String, blocks: &[Block]) {
     }
 }
 
-fn write_equation(out: &mut String, equation: &Equation) {
+fn write_equation(out: &mut String, equation: &PageEquation) {
     _ = write!(
         out,
         "<div class=\"equation\"><span class=\"left\">{}</span> <span class=\"right\">{}",
         math(&format!("{}<mo>=</mo>", equation.left.mathml())),
-        parted(&equation.right)
+        mathml_segments(&equation.right)
     );
     if let Some(text) = &equation.unit {
         _ = write!(out, " <span class=\"unit\">{}</span>", unit(text));
@@ -126,20 +126,20 @@ fn math(content: &str) -> String {
 }
 
 /// Stretches of a formula are formulas of their own, so that the browser can break a long sum between them.
-fn parted(formula: &Formula) -> String {
-    let stretches = formula.mathml_stretches();
+fn mathml_segments(formula: &PrintedFormula) -> String {
+    let stretches = formula.mathml_segments();
     let stretches: Vec<String> = stretches.iter().map(|one| math(one)).collect();
     stretches.join(" ")
 }
 
-fn inlines(line: &Line) -> String {
+fn inlines(line: &TextLine) -> String {
     line.iter()
         .map(|inline| match inline {
-            Inline::Text(text) => escape(text).into_owned(),
-            Inline::Unit(text) => unit(text),
-            Inline::Code(text) => format!("<code>{}</code>", escape(text)),
-            Inline::Math(Formula::Number(n)) => n.to_string().replace('-', "\u{2212}"),
-            Inline::Math(formula) => parted(formula),
+            InlineSpan::Text(text) => escape(text).into_owned(),
+            InlineSpan::Unit(text) => unit(text),
+            InlineSpan::Code(text) => format!("<code>{}</code>", escape(text)),
+            InlineSpan::Math(PrintedFormula::Number(n)) => n.to_string().replace('-', "\u{2212}"),
+            InlineSpan::Math(formula) => mathml_segments(formula),
         })
         .collect()
 }

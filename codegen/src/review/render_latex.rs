@@ -4,13 +4,13 @@ use std::fmt::Write;
 
 use modelmill_boundary::text::latex as escape;
 
-use super::document::{Block, Document, Equation, Inline, Line, Table, terms};
-use crate::expr::print::Formula;
+use super::document::{PageBlock, PageDocument, PageEquation, InlineSpan, TextLine, PageTable, line_terms};
+use crate::expr::print::PrintedFormula;
 
 /// Length of the plain text of a line of an equation, beyond which it is broken.
 const LINE: usize = 75;
 
-pub(super) fn render(document: &Document) -> String {
+pub(super) fn render(document: &PageDocument) -> String {
     let mut out = String::from(
         "\\documentclass[a4paper,10pt]{article}\n\
          \\usepackage[utf8]{inputenc}\n\
@@ -33,20 +33,20 @@ pub(super) fn render(document: &Document) -> String {
     out
 }
 
-fn blocks(out: &mut String, blocks: &[Block]) {
+fn blocks(out: &mut String, blocks: &[PageBlock]) {
     for block in blocks {
         match block {
-            Block::Heading(text) => _ = writeln!(out, "\\section*{{{}}}\n", escape(text)),
-            Block::Paragraph(line) => _ = writeln!(out, "{}\n", inlines(line)),
-            Block::Table(table) => write_table(out, table),
-            Block::Equations(equations) => {
+            PageBlock::Heading(text) => _ = writeln!(out, "\\section*{{{}}}\n", escape(text)),
+            PageBlock::Paragraph(line) => _ = writeln!(out, "{}\n", inlines(line)),
+            PageBlock::Table(table) => write_table(out, table),
+            PageBlock::Equations(equations) => {
                 for equation in equations {
                     let tag = format!(" \\tag{{{}}}", equation.tag);
-                    _ = writeln!(out, "\\[\n{}\n\\]", aligned(equation, &tag));
+                    _ = writeln!(out, "\\[\n{}\n\\]", align_equation(equation, &tag));
                 }
                 out.push('\n');
             }
-            Block::Folded(summary, inner) => {
+            PageBlock::Folded(summary, inner) => {
                 _ = writeln!(out, "\\paragraph{{{}.}}\\mbox{{}}\n", escape(summary));
                 self::blocks(out, inner);
             }
@@ -54,12 +54,12 @@ fn blocks(out: &mut String, blocks: &[Block]) {
     }
 }
 
-fn write_table(out: &mut String, table: &Table) {
+fn write_table(out: &mut String, table: &PageTable) {
     // The last column of a wide table holds prose and may break.
     let n = table.head.len();
     let wide = table.rows.iter().any(|row| {
         row.last()
-            .is_some_and(|cell| super::render_text::plain(cell).len() > 40)
+            .is_some_and(|cell| super::render_text::plain_text(cell).len() > 40)
     });
     let mut columns = "l".repeat(n);
     if wide {
@@ -77,12 +77,12 @@ fn write_table(out: &mut String, table: &Table) {
 }
 
 /// An equation in display style, long sums broken; `end` stands after its last line.
-pub(super) fn aligned(equation: &Equation, end: &str) -> String {
+pub(super) fn align_equation(equation: &PageEquation, end: &str) -> String {
     let unit = equation
         .unit
         .as_ref()
         .map_or_else(String::new, |text| format!(" \\quad [{}]", unit(text)));
-    let lines = broken(&equation.right);
+    let lines = break_sum(&equation.right);
     let left = equation.left.latex();
     if let [line] = lines.as_slice() {
         return format!("{left} = {line}{unit}{end}");
@@ -94,9 +94,9 @@ pub(super) fn aligned(equation: &Equation, end: &str) -> String {
 }
 
 /// The lines of a sum.
-fn broken(formula: &Formula) -> Vec<String> {
-    let mut lines: Vec<(usize, Vec<Formula>)> = Vec::new();
-    for term in terms(formula) {
+fn break_sum(formula: &PrintedFormula) -> Vec<String> {
+    let mut lines: Vec<(usize, Vec<PrintedFormula>)> = Vec::new();
+    for term in line_terms(formula) {
         let width = term.text().len() + 3;
         match lines.last_mut() {
             Some((used, line)) if *used + width <= LINE => {
@@ -119,7 +119,7 @@ fn broken(formula: &Formula) -> Vec<String> {
             let sum = if line.len() == 1 {
                 line[0].latex()
             } else {
-                Formula::Sum(line).latex()
+                PrintedFormula::Sum(line).latex()
             };
             format!("{leading}{sum}")
         })
@@ -131,13 +131,13 @@ pub(super) fn unit(text: &str) -> String {
     format!("\\mathrm{{{}}}", text.replace(' ', "\\,"))
 }
 
-fn inlines(line: &Line) -> String {
+fn inlines(line: &TextLine) -> String {
     line.iter()
         .map(|inline| match inline {
-            Inline::Text(text) => escape(text).into_owned(),
-            Inline::Unit(text) => format!("${}$", unit(text)),
-            Inline::Code(text) => format!("\\texttt{{{}}}", escape(text)),
-            Inline::Math(formula) => format!("${}$", formula.latex()),
+            InlineSpan::Text(text) => escape(text).into_owned(),
+            InlineSpan::Unit(text) => format!("${}$", unit(text)),
+            InlineSpan::Code(text) => format!("\\texttt{{{}}}", escape(text)),
+            InlineSpan::Math(formula) => format!("${}$", formula.latex()),
         })
         .collect()
 }

@@ -4,41 +4,41 @@ use std::fmt::Write;
 
 use modelmill_boundary::text;
 
-use super::document::{Block, Document, Equation, Inline, Line, Table};
+use super::document::{PageBlock, PageDocument, PageEquation, InlineSpan, TextLine, PageTable};
 
 /// Width at which equations and paragraphs are broken.
 const WIDTH: usize = 110;
 
-pub(super) fn render(document: &Document) -> String {
+pub(super) fn render(document: &PageDocument) -> String {
     let mut out = String::new();
-    underlined(&mut out, &document.title, '=');
+    write_underlined(&mut out, &document.title, '=');
     blocks(&mut out, &document.blocks);
     out
 }
 
-fn underlined(out: &mut String, text: &str, with: char) {
+fn write_underlined(out: &mut String, text: &str, with: char) {
     let text = text::plain(text);
     let line: String = std::iter::repeat_n(with, text.chars().count()).collect();
     _ = writeln!(out, "{text}\n{line}\n");
 }
 
-fn blocks(out: &mut String, blocks: &[Block]) {
+fn blocks(out: &mut String, blocks: &[PageBlock]) {
     for block in blocks {
         match block {
-            Block::Heading(text) => underlined(out, text, '-'),
-            Block::Paragraph(line) => {
-                wrap(out, &plain(line), 0);
+            PageBlock::Heading(text) => write_underlined(out, text, '-'),
+            PageBlock::Paragraph(line) => {
+                wrap(out, &plain_text(line), 0);
                 out.push('\n');
             }
-            Block::Table(table) => {
+            PageBlock::Table(table) => {
                 write_table(out, table);
                 out.push('\n');
             }
-            Block::Equations(equations) => {
-                out.push_str(&lines(equations));
+            PageBlock::Equations(equations) => {
+                out.push_str(&equation_lines(equations));
                 out.push('\n');
             }
-            Block::Folded(summary, inner) => {
+            PageBlock::Folded(summary, inner) => {
                 _ = writeln!(out, "{}:\n", text::plain(summary));
                 self::blocks(out, inner);
             }
@@ -47,13 +47,13 @@ fn blocks(out: &mut String, blocks: &[Block]) {
 }
 
 /// A line without marks.
-pub(super) fn plain(line: &Line) -> String {
+pub(super) fn plain_text(line: &TextLine) -> String {
     line.iter()
         .map(|inline| match inline {
-            Inline::Text(text) | Inline::Code(text) | Inline::Unit(text) => {
+            InlineSpan::Text(text) | InlineSpan::Code(text) | InlineSpan::Unit(text) => {
                 text::plain(text).into_owned()
             }
-            Inline::Math(formula) => formula.text(),
+            InlineSpan::Math(formula) => formula.text(),
         })
         .collect()
 }
@@ -76,11 +76,11 @@ fn wrap(out: &mut String, text: &str, indent: usize) {
     out.push('\n');
 }
 
-fn write_table(out: &mut String, table: &Table) {
+fn write_table(out: &mut String, table: &PageTable) {
     let rows: Vec<Vec<String>> = table
         .rows
         .iter()
-        .map(|row| row.iter().map(plain).collect())
+        .map(|row| row.iter().map(plain_text).collect())
         .collect();
     let head: Vec<String> = table.head.iter().map(|h| (*h).to_owned()).collect();
     let rule: Vec<String> = Vec::new();
@@ -108,7 +108,7 @@ fn write_table(out: &mut String, table: &Table) {
 }
 
 /// Equations one below the other, long ones broken after a term.
-pub(super) fn lines(equations: &[Equation]) -> String {
+pub(super) fn equation_lines(equations: &[PageEquation]) -> String {
     let widest = equations
         .iter()
         .map(|e| e.tag.chars().count() + 2)
@@ -126,7 +126,7 @@ pub(super) fn lines(equations: &[Equation]) -> String {
         // Terms are kept whole: their blanks are those around signs.
         out.push_str(&start);
         let mut column = indent;
-        for (i, piece) in pieces(&body).into_iter().enumerate() {
+        for (i, piece) in split_at_signs(&body).into_iter().enumerate() {
             let width = piece.chars().count();
             if i > 0 && column + width > WIDTH {
                 let indent = indent.min(40);
@@ -144,12 +144,12 @@ pub(super) fn lines(equations: &[Equation]) -> String {
 }
 
 /// Splits before every sign between blanks outside parentheses, and inside them only where a piece is too long.
-fn pieces(text: &str) -> Vec<&str> {
-    split(text, 0)
+fn split_at_signs(text: &str) -> Vec<&str> {
+    split_to_depth(text, 0)
         .into_iter()
         .flat_map(|piece| {
             if piece.len() > WIDTH - 40 {
-                split(piece, usize::MAX)
+                split_to_depth(piece, usize::MAX)
             } else {
                 vec![piece]
             }
@@ -158,7 +158,7 @@ fn pieces(text: &str) -> Vec<&str> {
 }
 
 /// Splits before signs that stand in at most so many parentheses.
-fn split(text: &str, deepest: usize) -> Vec<&str> {
+fn split_to_depth(text: &str, deepest: usize) -> Vec<&str> {
     let mut found = Vec::new();
     let (mut start, mut depth) = (0, 0usize);
     for (i, triple) in text.as_bytes().windows(3).enumerate() {

@@ -6,12 +6,12 @@ use std::path::PathBuf;
 
 use modelmill_spec::Mechanism;
 
-use super::{Equations, Format, NumericRank, base_expression, base_grouped, page, programs};
-use crate::emit::tree::names::{Meanings, run};
+use super::{ReducedEquations, PageFormat, NumericRank, base_expression, factored_base_expression, page, programs};
+use crate::emit::tree::names::{NamedQuantities, operation_values};
 use crate::expr::Atom;
 use crate::expr::print::parse::parse;
 use crate::expr::print::tests::{latex_is_balanced, markup_is_balanced};
-use crate::expr::print::{Formula, atom};
+use crate::expr::print::{PrintedFormula, atom};
 use crate::{Derivation, derive};
 
 const MODELS: [&str; 8] = [
@@ -70,12 +70,12 @@ fn base_parameters_read_again_have_the_values_of_the_reduction() {
         let derivation = derivation(name);
         let (constants, parameters, names) = values(&derivation);
         let expected = derivation.base_values(&parameters, &constants);
-        let equations = Equations::new(&derivation, None);
+        let equations = ReducedEquations::new(&derivation, None);
         for (k, expected) in expected.iter().enumerate() {
             let expanded = &equations.base[k].expression;
             assert_close(parse(expanded).value_f64(&names), *expected, expanded);
             assert_eq!(*expanded, base_expression(&derivation, k).text());
-            let grouped = base_grouped(&derivation, k).text();
+            let grouped = factored_base_expression(&derivation, k).text();
             assert_close(parse(&grouped).value_f64(&names), *expected, &grouped);
         }
     }
@@ -86,7 +86,7 @@ fn factors_read_again_have_the_values_of_the_reduction() {
     for name in MODELS {
         let derivation = derivation(name);
         let (constants, _, names) = values(&derivation);
-        let equations = Equations::new(&derivation, None);
+        let equations = ReducedEquations::new(&derivation, None);
         let lines = &derivation.reduction.dependencies;
         assert_eq!(
             equations.dependencies.len(),
@@ -107,7 +107,7 @@ fn factors_read_again_have_the_values_of_the_reduction() {
 #[test]
 fn every_product_is_retained_or_depends_on_retained_ones() {
     for name in MODELS {
-        let equations = Equations::new(&derivation(name), None);
+        let equations = ReducedEquations::new(&derivation(name), None);
         let retained: BTreeSet<&String> = equations.base.iter().map(|b| &b.retained).collect();
         let dependent: BTreeSet<&String> = equations
             .dependencies
@@ -132,25 +132,25 @@ fn listed_programs_compute_what_the_programs_compute() {
     for name in MODELS {
         let derivation = derivation(name);
         let mechanism = &derivation.mechanism;
-        let meanings = Meanings::new(&derivation);
+        let meanings = NamedQuantities::new(&derivation);
         assert!(!meanings.atoms.is_empty(), "{name}: no state was found");
         for (title, outputs, program, listing) in programs::listings(&derivation) {
             let mut known: BTreeMap<String, f64> = meanings
                 .atoms
                 .iter()
                 // Passive motion is computed; where it is not, it is an input.
-                .filter(|(a, _)| program.ops.contains(&crate::Op::Input(**a)))
+                .filter(|(a, _)| program.ops.contains(&crate::ProgramOp::Input(**a)))
                 .map(|(a, v)| (atom(mechanism, *a).text(), *v))
                 .collect();
             for line in listing.fixed.iter().chain(&listing.state) {
-                let Formula::Symbol(left) = &line.left else {
+                let PrintedFormula::Symbol(left) = &line.left else {
                     panic!("{}", line.left)
                 };
                 let value = parse(&line.right.text()).value_f64(&known);
                 let before = known.insert(left.text(), value);
                 assert_eq!(before, None, "{name}, {title}: {} twice", left.text());
             }
-            let expected = run(program, &meanings.atoms);
+            let expected = operation_values(program, &meanings.atoms);
             for (symbol, value) in outputs.iter().zip(&program.outputs) {
                 let found = known[&symbol.text()];
                 assert_close(found, expected[value.index()], &symbol.text());
@@ -163,7 +163,7 @@ fn listed_programs_compute_what_the_programs_compute() {
 #[test]
 fn named_values_are_what_they_are_called() {
     let derivation = derivation("spidermill");
-    let meanings = Meanings::new(&derivation);
+    let meanings = NamedQuantities::new(&derivation);
     let (_, _, program, listing) = programs::listings(&derivation)
         .pop()
         .expect("the regressor is last");
@@ -177,9 +177,9 @@ fn named_values_are_what_they_are_called() {
     ] {
         assert!(lines.contains(wanted), "{wanted} in {lines:?}");
     }
-    let values = run(program, &meanings.atoms);
+    let values = operation_values(program, &meanings.atoms);
     let rate = |i: usize| meanings.atoms[&Atom::Rate(i)];
-    let names = meanings.of(program);
+    let names = meanings.name_values(program);
     let (at, meaning) = names
         .iter()
         .find(|(_, m)| m.symbol.text() == "omega_S3_z")
@@ -203,11 +203,11 @@ fn pages_are_whole_and_the_same_every_time() {
     for name in ["spidermill-paper", "two_link", "three_rrr"] {
         let (one, two) = (derivation(name), derivation(name));
         for format in [
-            Format::Text,
-            Format::Markdown,
-            Format::Latex,
-            Format::Html,
-            Format::Json,
+            PageFormat::Text,
+            PageFormat::Markdown,
+            PageFormat::Latex,
+            PageFormat::Html,
+            PageFormat::Json,
         ] {
             let text = page(&one, format, Some(&numeric));
             assert_eq!(
@@ -217,7 +217,7 @@ fn pages_are_whole_and_the_same_every_time() {
             );
             assert!(text.ends_with('\n'));
         }
-        let html = page(&one, Format::Html, None);
+        let html = page(&one, PageFormat::Html, None);
         let without_scripts: String = html
             .split("<script>")
             .map(|piece| {
@@ -229,7 +229,7 @@ fn pages_are_whole_and_the_same_every_time() {
         assert!(markup_is_balanced(&without_scripts), "{name}");
         // Nothing is fetched.
         assert!(!html.contains("src=") && !html.contains("http") && !html.contains("url("));
-        let latex = page(&one, Format::Latex, None);
+        let latex = page(&one, PageFormat::Latex, None);
         assert!(latex_is_balanced(
             &latex.replace("\\{", "").replace("\\}", "")
         ));
@@ -245,7 +245,7 @@ fn json_has_the_fields_of_the_contract() {
         samples: 40,
         condition: None,
     };
-    let text = Equations::new(&derivation("spidermill-paper"), Some(&numeric)).json();
+    let text = ReducedEquations::new(&derivation("spidermill-paper"), Some(&numeric)).json();
     let json: serde_json::Value = serde_json::from_str(&text).expect("valid JSON");
     let keys: Vec<&String> = json.as_object().expect("an object").keys().collect();
     assert_eq!(
@@ -279,7 +279,7 @@ fn json_has_the_fields_of_the_contract() {
 /// Eq. (5), (6) and (16) in a few lines.
 fn summary(name: &str) -> String {
     let derivation = derivation(name);
-    let equations = Equations::new(&derivation, None);
+    let equations = ReducedEquations::new(&derivation, None);
     let mut lines = vec![
         format!("p_g: {}", equations.parameters.join(", ")),
         format!("without effect: {}", equations.without_effect.join(", ")),
@@ -298,7 +298,7 @@ fn summary(name: &str) -> String {
     }
     for (k, base) in equations.base.iter().enumerate() {
         lines.push(format!("{} = {}", base.name, base.expression));
-        let grouped = base_grouped(&derivation, k).text();
+        let grouped = factored_base_expression(&derivation, k).text();
         if grouped != base.expression {
             lines.push(format!("       = {grouped}"));
         }

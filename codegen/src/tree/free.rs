@@ -5,12 +5,12 @@
 
 use modelmill_spec::{CoordinateIdx, FreeBody, TwistAxes};
 
-use crate::expr::vector::Vector;
+use crate::expr::vector::SymbolicVector;
 use crate::expr::{Atom, ExprId, Graph, Rational};
-use crate::tree::Tree;
+use crate::tree::KinematicTree;
 
 /// Atoms of coordinates, of their rates or of their accelerations.
-fn atoms<const N: usize>(
+fn coordinate_atoms<const N: usize>(
     graph: &mut Graph,
     of: fn(usize) -> Atom,
     coordinates: [CoordinateIdx; N],
@@ -19,16 +19,16 @@ fn atoms<const N: usize>(
 }
 
 /// The square of the length of a body's quaternion.
-pub(crate) fn square(graph: &mut Graph, body: &FreeBody) -> ExprId {
-    let squares = atoms(graph, Atom::Coordinate, body.quaternion).map(|x| graph.mul(x, x));
+pub(crate) fn quaternion_square(graph: &mut Graph, body: &FreeBody) -> ExprId {
+    let squares = coordinate_atoms(graph, Atom::Coordinate, body.quaternion).map(|x| graph.mul(x, x));
     graph.add_all(&squares)
 }
 
 /// The rotation from a body's axes to the base's, by rows.
-fn rotation(graph: &mut Graph, body: &FreeBody) -> [Vector; 3] {
-    let [w, x, y, z] = atoms(graph, Atom::Coordinate, body.quaternion);
+fn rotation_matrix(graph: &mut Graph, body: &FreeBody) -> [SymbolicVector; 3] {
+    let [w, x, y, z] = coordinate_atoms(graph, Atom::Coordinate, body.quaternion);
     let v = [x, y, z];
-    let square = square(graph, body);
+    let square = quaternion_square(graph, body);
     let inverse = graph.product(&[(square, -1)]);
     let twice = graph.scale(inverse, &Rational::integer(2));
     let scaled = v.map(|x| graph.mul(twice, x));
@@ -54,11 +54,11 @@ fn rotation(graph: &mut Graph, body: &FreeBody) -> [Vector; 3] {
 }
 
 /// Components in a body's axes of a vector that a twist gives in `axes`.
-pub(crate) fn to_body(graph: &mut Graph, body: &FreeBody, axes: TwistAxes, v: &Vector) -> Vector {
+pub(crate) fn to_body(graph: &mut Graph, body: &FreeBody, axes: TwistAxes, v: &SymbolicVector) -> SymbolicVector {
     match axes {
         TwistAxes::Body => *v,
         TwistAxes::World => {
-            let rows = rotation(graph, body);
+            let rows = rotation_matrix(graph, body);
             std::array::from_fn(|j| {
                 let column = rows.map(|row| row[j]);
                 graph.dot(&column, v)
@@ -68,35 +68,35 @@ pub(crate) fn to_body(graph: &mut Graph, body: &FreeBody, axes: TwistAxes, v: &V
 }
 
 /// Components in the axes of a twist of a vector given in a body's.
-pub(crate) fn from_body(graph: &mut Graph, body: &FreeBody, axes: TwistAxes, v: &Vector) -> Vector {
+pub(crate) fn from_body(graph: &mut Graph, body: &FreeBody, axes: TwistAxes, v: &SymbolicVector) -> SymbolicVector {
     match axes {
         TwistAxes::Body => *v,
-        TwistAxes::World => rotation(graph, body).map(|row| graph.dot(&row, v)),
+        TwistAxes::World => rotation_matrix(graph, body).map(|row| graph.dot(&row, v)),
     }
 }
 
 /// Angular velocity, angular acceleration and acceleration of the origin less that of free fall, all in the body's axes.
 pub(crate) struct FreeMotion {
-    pub(crate) omega: Vector,
-    pub(crate) alpha: Vector,
-    pub(crate) acceleration: Vector,
+    pub(crate) omega: SymbolicVector,
+    pub(crate) alpha: SymbolicVector,
+    pub(crate) acceleration: SymbolicVector,
 }
 
 impl FreeMotion {
-    pub(crate) fn new(graph: &mut Graph, body: &FreeBody, gravity: &Vector) -> Self {
+    pub(crate) fn new(graph: &mut Graph, body: &FreeBody, gravity: &SymbolicVector) -> Self {
         let [_, qx, qy, qz] = body.quaternion;
         let angular = [qx, qy, qz];
         let [omega, alpha] = [Atom::Rate as fn(usize) -> Atom, Atom::Acceleration].map(|of| {
-            let given = atoms(graph, of, angular);
+            let given = coordinate_atoms(graph, of, angular);
             // The angular velocity does not change in its own axes, so both sides see the same derivative.
             to_body(graph, body, body.angular, &given)
         });
-        let given = atoms(graph, Atom::Acceleration, body.position);
+        let given = coordinate_atoms(graph, Atom::Acceleration, body.position);
         let fall = to_body(graph, body, TwistAxes::World, gravity);
         let acceleration = match body.linear {
             TwistAxes::World => to_body(graph, body, body.linear, &given),
             TwistAxes::Body => {
-                let velocity = atoms(graph, Atom::Rate, body.position);
+                let velocity = coordinate_atoms(graph, Atom::Rate, body.position);
                 let carried = graph.cross(&omega, &velocity);
                 graph.add_vectors(&[given, carried])
             }
@@ -109,10 +109,10 @@ impl FreeMotion {
     }
 }
 
-impl Tree {
+impl KinematicTree {
     /// What must not vanish so that the orientations of all free bodies exist.
-    pub(crate) fn squares(&self, graph: &mut Graph) -> Vec<ExprId> {
+    pub(crate) fn quaternion_squares(&self, graph: &mut Graph) -> Vec<ExprId> {
         let bodies = self.links.iter().filter_map(|link| link.free);
-        bodies.map(|body| square(graph, &body)).collect()
+        bodies.map(|body| quaternion_square(graph, &body)).collect()
     }
 }

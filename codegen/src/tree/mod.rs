@@ -7,25 +7,25 @@ pub(crate) mod checks;
 pub(crate) mod expressions;
 pub(crate) mod free;
 
-use modelmill_spec::{Axis, FrameIdx, FreeBody, Mechanism, Step};
+use modelmill_spec::{FrameAxis, FrameIdx, FreeBody, Mechanism, FrameStep};
 
 use crate::DeriveError;
-use crate::expr::vector::{self, Turn, Vector, push_turn};
-use crate::expr::{AngleSum, Atom, ExprId, Graph, Rational};
+use crate::expr::vector::{self, AxisRotation, SymbolicVector, push_rotation};
+use crate::expr::{AtomAngleSum, Atom, ExprId, Graph, Rational};
 
 /// A rigid frame that moves relative to its parent about or along its own z axis, or not at all.
 #[derive(Clone, Debug)]
-pub(crate) struct Link {
+pub(crate) struct TreeLink {
     /// The link it hangs on; `None` for the base.
     pub(crate) parent: Option<usize>,
     /// The fixed rotation from the parent, before the joint.
-    pub(crate) pre: Vec<Turn>,
+    pub(crate) pre: Vec<AxisRotation>,
     /// The joint's rotation about z, with any fixed offset.
-    pub(crate) joint: Turn,
+    pub(crate) joint: AxisRotation,
     /// The axis of the model file about or along which the joint moves; the link's own z lies along it.
-    pub(crate) named: Axis,
+    pub(crate) named_axis: FrameAxis,
     /// Position of the origin in the parent's frame.
-    pub(crate) position: Vector,
+    pub(crate) position: SymbolicVector,
     /// Coordinates that turn it, with their integer factors.
     pub(crate) turns: Vec<(usize, i32)>,
     /// Coordinates that slide it along z, with their factors.
@@ -35,24 +35,24 @@ pub(crate) struct Link {
     /// The first of the links above it whose z axes are all parallel to its own; itself if its parent's axis is not.
     pub(crate) first_parallel: usize,
     /// Its rotation about z relative to the fixed side of that first link's joint.
-    pub(crate) absolute: Turn,
+    pub(crate) absolute: AxisRotation,
     /// Which axis of its parent's frame its joint is parallel to, and whether it points the same way.
     pub(crate) axis: Option<(usize, bool)>,
     /// The position but for what lies along such an axis, and that.
-    pub(crate) across: Vector,
+    pub(crate) across: SymbolicVector,
     pub(crate) along: ExprId,
 }
 
-impl Link {
+impl TreeLink {
     /// Whether it moves relative to its parent.
     pub(crate) fn is_moving(&self) -> bool {
         !self.turns.is_empty() || !self.slides.is_empty() || self.free.is_some()
     }
 
     /// Components in the axes that the model file reaches behind the joint, of a vector given in the link's own.
-    pub(crate) fn to_named_axes(&self, graph: &mut Graph, v: &Vector) -> Vector {
-        match to_z(self.named) {
-            Some((axis, pi12)) => graph.turn_out(&fixed_turn(axis, pi12), v),
+    pub(crate) fn to_named_axes(&self, graph: &mut Graph, v: &SymbolicVector) -> SymbolicVector {
+        match rotation_from_z(self.named_axis) {
+            Some((axis, pi12)) => graph.rotate_out(&fixed_rotation(axis, pi12), v),
             None => *v,
         }
     }
@@ -67,7 +67,7 @@ impl Link {
             .pre
             .iter()
             .rev()
-            .fold(z, |v, turn| graph.turn_out(turn, &v));
+            .fold(z, |v, turn| graph.rotate_out(turn, &v));
         let minus = graph.neg(Graph::ONE);
         (self.across, self.along, self.axis) = (self.position, Graph::ZERO, None);
         let mut nonzero = (0..3).filter(|i| z[*i] != Graph::ZERO);
@@ -84,13 +84,13 @@ impl Link {
 
 /// All links; parents come before their children.
 #[derive(Clone, Debug)]
-pub(crate) struct Tree {
-    pub(crate) links: Vec<Link>,
+pub(crate) struct KinematicTree {
+    pub(crate) links: Vec<TreeLink>,
     /// The link that carries each frame of the file; `None` for the base.
     pub(crate) of_frame: Vec<Option<usize>>,
 }
 
-impl Tree {
+impl KinematicTree {
     pub(crate) fn new(graph: &mut Graph, mechanism: &Mechanism) -> Result<Self, DeriveError> {
         let mut tree = Self {
             links: Vec::new(),
@@ -99,7 +99,7 @@ impl Tree {
         for frame in &mechanism.frames[1..] {
             let mut builder = Builder::new(tree.of_frame[frame.parent.0]);
             for step in &frame.steps {
-                builder.step(graph, &mut tree.links, step)?;
+                builder.add_step(graph, &mut tree.links, step)?;
             }
             let link = builder.finish(&mut tree.links);
             tree.of_frame.push(Some(link));
@@ -112,7 +112,7 @@ impl Tree {
 
     /// The same tree with every link's quantities in the axes of the fixed side of the first of its parallel joints, so
     /// that nothing turns between parallel links; and the turn that takes each link's own axes there.
-    pub(crate) fn in_fixed_axes(&self, graph: &mut Graph) -> (Self, Vec<Turn>) {
+    pub(crate) fn to_fixed_axes(&self, graph: &mut Graph) -> (Self, Vec<AxisRotation>) {
         let mut fixed = self.clone();
         for (i, link) in fixed.links.iter_mut().enumerate() {
             let own = &self.links[i];
@@ -121,11 +121,11 @@ impl Tree {
             link.first_parallel = i;
             let Some(parent) = own.parent else { continue };
             let turned = &self.links[parent].absolute;
-            link.position = graph.turn_out(turned, &own.position);
+            link.position = graph.rotate_out(turned, &own.position);
             if own.first_parallel == i {
                 link.pre.clear();
                 for turn in std::iter::once(turned).chain(&own.pre) {
-                    push_turn(&mut link.pre, turn);
+                    push_rotation(&mut link.pre, turn);
                 }
             } else {
                 link.pre.clear();
@@ -143,7 +143,7 @@ impl Tree {
     }
 
     /// The links from just below the base down to `link`.
-    pub(crate) fn path(&self, link: Option<usize>) -> Vec<usize> {
+    pub(crate) fn path_to(&self, link: Option<usize>) -> Vec<usize> {
         let mut path = Vec::new();
         let mut next = link;
         while let Some(i) = next {
@@ -155,29 +155,29 @@ impl Tree {
     }
 
     /// Components in the link's frame of a vector given in the parent's frame.
-    pub(crate) fn to_link(&self, graph: &mut Graph, link: usize, v: &Vector) -> Vector {
+    pub(crate) fn to_link(&self, graph: &mut Graph, link: usize, v: &SymbolicVector) -> SymbolicVector {
         let link = &self.links[link];
         let mut v = *v;
         for turn in &link.pre {
-            v = graph.turn_in(turn, &v);
+            v = graph.rotate_in(turn, &v);
         }
-        graph.turn_in(&link.joint, &v)
+        graph.rotate_in(&link.joint, &v)
     }
 }
 
 /// The fixed turn, by its axis and twelfths of pi, that takes z to an axis of the model file.
-fn to_z(axis: Axis) -> Option<(Axis, i32)> {
+fn rotation_from_z(axis: FrameAxis) -> Option<(FrameAxis, i32)> {
     match axis {
-        Axis::X => Some((Axis::Y, 6)),
-        Axis::Y => Some((Axis::X, -6)),
-        Axis::Z => None,
+        FrameAxis::X => Some((FrameAxis::Y, 6)),
+        FrameAxis::Y => Some((FrameAxis::X, -6)),
+        FrameAxis::Z => None,
     }
 }
 
-fn fixed_turn(axis: Axis, pi12: i32) -> Turn {
-    Turn {
+fn fixed_rotation(axis: FrameAxis, pi12: i32) -> AxisRotation {
+    AxisRotation {
         axis,
-        sum: AngleSum::NONE,
+        sum: AtomAngleSum::NONE,
         pi12,
     }
 }
@@ -185,18 +185,18 @@ fn fixed_turn(axis: Axis, pi12: i32) -> Turn {
 /// Collects elementary steps into links: a link ends where a step would no longer commute with its joint.
 struct Builder {
     parent: Option<usize>,
-    pre: Vec<Turn>,
-    named: Axis,
-    position: Vector,
-    joint: Turn,
+    pre: Vec<AxisRotation>,
+    named: FrameAxis,
+    position: SymbolicVector,
+    joint: AxisRotation,
     turns: Vec<(usize, i32)>,
     slides: Vec<(usize, Rational)>,
     free: Option<FreeBody>,
 }
 
-const NO_TURN: Turn = Turn {
-    axis: Axis::Z,
-    sum: AngleSum::NONE,
+const NO_TURN: AxisRotation = AxisRotation {
+    axis: FrameAxis::Z,
+    sum: AtomAngleSum::NONE,
     pi12: 0,
 };
 
@@ -205,7 +205,7 @@ impl Builder {
         Self {
             parent,
             pre: Vec::new(),
-            named: Axis::Z,
+            named: FrameAxis::Z,
             position: vector::ZERO,
             joint: NO_TURN,
             turns: Vec::new(),
@@ -218,16 +218,16 @@ impl Builder {
         !self.turns.is_empty() || !self.slides.is_empty()
     }
 
-    fn step(
+    fn add_step(
         &mut self,
         graph: &mut Graph,
-        links: &mut Vec<Link>,
-        step: &Step,
+        links: &mut Vec<TreeLink>,
+        step: &FrameStep,
     ) -> Result<(), DeriveError> {
         match step {
             // A file has it as the only step of a frame on the base.
-            Step::Free(body) => self.free = Some(*body),
-            Step::Rotate(axis, angle) => {
+            FrameStep::Free(body) => self.free = Some(*body),
+            FrameStep::Rotate(axis, angle) => {
                 let (sum, pi12) = expressions::angle_sum(angle);
                 let turns: Vec<(usize, i32)> = sum
                     .terms()
@@ -240,21 +240,21 @@ impl Builder {
                         }
                     })
                     .collect();
-                let turn = Turn {
+                let turn = AxisRotation {
                     axis: *axis,
                     sum,
                     pi12,
                 };
-                self.about_z(
+                self.add_step_about_z(
                     graph,
                     links,
                     *axis,
                     !turns.is_empty(),
                     |builder, _, axis| {
                         if turns.is_empty() && !builder.has_joint() {
-                            push_turn(
+                            push_rotation(
                                 &mut builder.pre,
-                                &Turn {
+                                &AxisRotation {
                                     axis,
                                     ..turn.clone()
                                 },
@@ -267,14 +267,14 @@ impl Builder {
                     },
                 );
             }
-            Step::Translate(axis, length) => {
+            FrameStep::Translate(axis, length) => {
                 let value = expressions::length(graph, length)?;
                 let slides: Vec<(usize, Rational)> = length
                     .coordinates
                     .iter()
                     .map(|(c, k)| (c.0, Rational::from(k.clone())))
                     .collect();
-                self.about_z(
+                self.add_step_about_z(
                     graph,
                     links,
                     *axis,
@@ -283,7 +283,7 @@ impl Builder {
                         let mut along = vector::ZERO;
                         along[axis as usize] = value;
                         for turn in builder.pre.iter().rev() {
-                            along = graph.turn_out(turn, &along);
+                            along = graph.rotate_out(turn, &along);
                         }
                         builder.position = graph.add_vectors(&[builder.position, along]);
                         builder.slides.extend(slides.iter().cloned());
@@ -295,36 +295,36 @@ impl Builder {
     }
 
     /// Applies a step with its axis brought to z if it moves, on a new link if it cannot join the present one.
-    fn about_z(
+    fn add_step_about_z(
         &mut self,
         graph: &mut Graph,
-        links: &mut Vec<Link>,
-        axis: Axis,
+        links: &mut Vec<TreeLink>,
+        axis: FrameAxis,
         moves: bool,
-        apply: impl Fn(&mut Self, &mut Graph, Axis),
+        apply: impl Fn(&mut Self, &mut Graph, FrameAxis),
     ) {
-        if self.has_joint() && axis != Axis::Z {
-            self.close(links);
+        if self.has_joint() && axis != FrameAxis::Z {
+            self.close_link(links);
         }
-        let Some((about, pi12)) = to_z(axis).filter(|_| moves) else {
+        let Some((about, pi12)) = rotation_from_z(axis).filter(|_| moves) else {
             apply(self, graph, axis);
             return;
         };
         // A = Ry(pi/2) takes z to x, A = Rx(-pi/2) takes z to y; motion about x is A (motion about z) A^-1.
-        push_turn(&mut self.pre, &fixed_turn(about, pi12));
+        push_rotation(&mut self.pre, &fixed_rotation(about, pi12));
         self.named = axis;
-        apply(self, graph, Axis::Z);
-        self.close(links);
-        push_turn(&mut self.pre, &fixed_turn(about, -pi12));
+        apply(self, graph, FrameAxis::Z);
+        self.close_link(links);
+        push_rotation(&mut self.pre, &fixed_rotation(about, -pi12));
     }
 
-    fn close(&mut self, links: &mut Vec<Link>) {
+    fn close_link(&mut self, links: &mut Vec<TreeLink>) {
         let fresh = Self::new(Some(links.len()));
         let done = std::mem::replace(self, fresh);
         let parallel = done
             .parent
             .filter(|parent| links[*parent].free.is_none())
-            .filter(|_| done.pre.iter().all(|turn| turn.axis == Axis::Z));
+            .filter(|_| done.pre.iter().all(|turn| turn.axis == FrameAxis::Z));
         let mut absolute = NO_TURN;
         let mut first_parallel = links.len();
         if let Some(parent) = parallel {
@@ -337,10 +337,10 @@ impl Builder {
         }
         absolute.sum = absolute.sum.plus(&done.joint.sum, 1);
         absolute.pi12 = (absolute.pi12 + done.joint.pi12).rem_euclid(24);
-        links.push(Link {
+        links.push(TreeLink {
             parent: done.parent,
             pre: done.pre,
-            named: done.named,
+            named_axis: done.named,
             joint: done.joint,
             position: done.position,
             turns: done.turns,
@@ -354,8 +354,8 @@ impl Builder {
         });
     }
 
-    fn finish(mut self, links: &mut Vec<Link>) -> usize {
-        self.close(links);
+    fn finish(mut self, links: &mut Vec<TreeLink>) -> usize {
+        self.close_link(links);
         links.len() - 1
     }
 }

@@ -4,10 +4,10 @@ use std::error::Error;
 use std::f64::consts::TAU;
 
 use modelmill_generated::spidermill;
-use modelmill_rig::{Plant, Rig};
+use modelmill_rig::{RigPlant, Rig};
 use modelmill_runtime::PoseError;
 
-use crate::reference::Reference;
+use crate::reference::ReferenceMotion;
 use crate::spidermill_with_friction as with_friction;
 
 /// Time between two calls of the controller, s; forces are held in between.
@@ -19,18 +19,18 @@ const RESOLUTION: f64 = TAU / 1_048_576.0;
 
 /// Where the robot is and where it should be.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Situation {
+pub(crate) struct ControlState {
     q: [f64; 2],
-    wanted: [[f64; 2]; 3],
+    desired: [[f64; 2]; 3],
     /// Rate of the error.
     error_rate: [f64; 2],
 }
 
-impl Situation {
+impl ControlState {
     /// Acceleration that lets the error die out.
     fn correction(&self) -> [f64; 2] {
         std::array::from_fn(|k| {
-            let error = self.wanted[0][k] - self.q[k];
+            let error = self.desired[0][k] - self.q[k];
             SPEED * SPEED * error + 2.0 * SPEED * self.error_rate[k]
         })
     }
@@ -38,23 +38,23 @@ impl Situation {
     /// Acceleration to ask of the model.
     fn acceleration(&self) -> [f64; 2] {
         let correction = self.correction();
-        std::array::from_fn(|k| self.wanted[2][k] + correction[k])
+        std::array::from_fn(|k| self.desired[2][k] + correction[k])
     }
 }
 
 /// Forces of the spindles for a situation.
-pub(crate) struct Controller<'a>(Box<Law<'a>>);
+pub(crate) struct TorqueController<'a>(Box<ControlLaw<'a>>);
 
 /// Forces of the spindles, N, in a situation.
-type Law<'a> = dyn Fn(&Situation) -> Result<[f64; 2], PoseError> + 'a;
+type ControlLaw<'a> = dyn Fn(&ControlState) -> Result<[f64; 2], PoseError> + 'a;
 
-impl<'a> Controller<'a> {
+impl<'a> TorqueController<'a> {
     /// Knows the mass that each crank feels, and the weight, at the nominal pose only.
     pub(crate) fn without_model(
         dynamics: &spidermill::InverseDynamics<f64>,
         drives: &'a spidermill::Model<f64>,
     ) -> Result<Self, PoseError> {
-        let q = Reference::task().at(0.0)[0];
+        let q = ReferenceMotion::task().state_at(0.0)[0];
         let still = |qdd| spidermill::State {
             q,
             qd: [0.0; 2],
@@ -88,22 +88,22 @@ impl<'a> Controller<'a> {
     }
 
     /// Computed torque with the reduced model as it comes from CAD.
-    pub(crate) fn nominal(dynamics: &'a spidermill::InverseDynamics<f64>) -> Self {
+    pub(crate) fn with_nominal(dynamics: &'a spidermill::InverseDynamics<f64>) -> Self {
         Self(Box::new(|now| {
             dynamics.forces(&spidermill::State {
                 q: now.q,
-                qd: now.wanted[1],
+                qd: now.desired[1],
                 qdd: now.acceleration(),
             })
         }))
     }
 
     /// Computed torque with what was identified. Friction goes by the rates that are wanted, which have no noise.
-    pub(crate) fn identified(dynamics: &'a with_friction::InverseDynamics<f64>) -> Self {
+    pub(crate) fn with_identified(dynamics: &'a with_friction::InverseDynamics<f64>) -> Self {
         Self(Box::new(|now| {
             dynamics.forces(&with_friction::State {
                 q: now.q,
-                qd: now.wanted[1],
+                qd: now.desired[1],
                 qdd: now.acceleration(),
             })
         }))
@@ -112,7 +112,7 @@ impl<'a> Controller<'a> {
 
 /// What was read and set in each cycle.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Recording {
+pub(crate) struct ControlRecording {
     pub(crate) t: Vec<f64>,
     /// Readings of the encoders, per coordinate.
     pub(crate) q: [Vec<f64>; 2],
@@ -122,7 +122,7 @@ pub(crate) struct Recording {
     error: [Vec<f64>; 2],
 }
 
-impl Recording {
+impl ControlRecording {
     /// Root mean square of the true error behind the first second, rad.
     pub(crate) fn rms_error(&self) -> [f64; 2] {
         self.error.each_ref().map(|e| {
@@ -136,19 +136,19 @@ impl Recording {
 /// Runs a controller on the rig, from the motion's own start.
 pub(crate) fn run(
     rig: &Rig,
-    controller: &Controller<'_>,
-    reference: &Reference,
-) -> Result<Recording, Box<dyn Error>> {
-    let [q, qd, _] = reference.at(0.0);
-    let mut plant = Plant::new(rig, &q, &qd)?;
-    let mut recording = Recording::default();
+    controller: &TorqueController<'_>,
+    reference: &ReferenceMotion,
+) -> Result<ControlRecording, Box<dyn Error>> {
+    let [q, qd, _] = reference.state_at(0.0);
+    let mut plant = RigPlant::new(rig, &q, &qd)?;
+    let mut recording = ControlRecording::default();
     let read = |q: &[f64]| [0, 1].map(|k| (q[k] / RESOLUTION).round() * RESOLUTION);
     let mut before = [0.0; 2];
     let mut error_rate = [0.0; 2];
     let mut t = 0.0;
     while t < reference.duration {
         let q = read(plant.q());
-        let wanted = reference.at(t);
+        let wanted = reference.state_at(t);
         // Differences through a low-pass of 100 Hz: of the error rather than of the reading, whose rate would come late
         // and be taken for an error.
         let share = 1.0 - f64::exp(-TAU * 100.0 * CYCLE);
@@ -159,9 +159,9 @@ pub(crate) fn run(
             }
             before[k] = error;
         }
-        let forces = controller.0(&Situation {
+        let forces = controller.0(&ControlState {
             q,
-            wanted,
+            desired: wanted,
             error_rate,
         })?;
         recording.t.push(t);

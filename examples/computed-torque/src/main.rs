@@ -16,39 +16,39 @@ include!(concat!(env!("OUT_DIR"), "/models.rs"));
 use std::error::Error;
 use std::path::Path;
 
-use control::{Controller, run};
+use control::{TorqueController, run};
 use identification::identify;
 use modelmill_generated::spidermill;
-use reference::Reference;
+use reference::ReferenceMotion;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("rig.toml");
     let rig = modelmill_rig::load_file(&file)
         .map_err(|failure| failure.render(false))?
         .rig;
-    for line in report(&rig, &Reference::task())? {
+    for line in report(&rig, &ReferenceMotion::task())? {
         println!("{line}");
     }
     Ok(())
 }
 
 /// Runs everything; the lines that are printed.
-fn report(rig: &modelmill_rig::Rig, task: &Reference) -> Result<Vec<String>, Box<dyn Error>> {
+fn report(rig: &modelmill_rig::Rig, task: &ReferenceMotion) -> Result<Vec<String>, Box<dyn Error>> {
     let geometry = spidermill::Geometry::default();
     let nominal = spidermill::base_parameters(&geometry, &spidermill::Parameters::default())?;
     let nominal = spidermill::InverseDynamics::new(&geometry, &nominal);
     let drives = spidermill::Model::new(&geometry);
 
-    let without = Controller::without_model(&nominal, &drives)?;
-    let with = Controller::nominal(&nominal);
+    let without = TorqueController::without_model(&nominal, &drives)?;
+    let with = TorqueController::with_nominal(&nominal);
     // The robot's own recording, while the nominal model controls it along another motion.
-    let recording = run(rig, &with, &Reference::exciting())?;
+    let recording = run(rig, &with, &ReferenceMotion::excitation())?;
     let base = identify(&recording)?;
     let known = spidermill_with_friction::InverseDynamics::new(
         &spidermill_with_friction::Geometry::default(),
         &base,
     );
-    let identified = Controller::identified(&known);
+    let identified = TorqueController::with_identified(&known);
 
     let mut lines =
         vec!["root mean square of the tracking error, mrad        theta1    theta2".to_owned()];
@@ -75,7 +75,7 @@ mod tests {
             .map_err(|f| f.render(false))
             .unwrap()
             .rig;
-        let mut task = Reference::task();
+        let mut task = ReferenceMotion::task();
         task.duration = 2.0;
         let lines = report(&rig, &task).unwrap();
         let errors: Vec<Vec<f64>> = lines[1..]

@@ -3,21 +3,21 @@
 use std::f64::consts::TAU;
 
 /// Amplitude, rad, number of the harmonic, and phase, rad.
-type Sine = (f64, f64, f64);
+type SineTerm = (f64, f64, f64);
 
 /// A periodic motion of both cranks.
 #[derive(Clone, Debug)]
-pub(crate) struct Reference {
+pub(crate) struct ReferenceMotion {
     period: f64,
     /// How long it goes on, s.
     pub(crate) duration: f64,
     centre: [f64; 2],
-    sines: [&'static [Sine]; 2],
+    sines: [&'static [SineTerm]; 2],
 }
 
-impl Reference {
+impl ReferenceMotion {
     /// A motion that shows what parameters do: fast and slow, both cranks together and apart.
-    pub(crate) fn exciting() -> Self {
+    pub(crate) fn excitation() -> Self {
         Self {
             period: 5.0,
             duration: 5.0,
@@ -43,7 +43,7 @@ impl Reference {
     }
 
     /// Coordinates, rates and accelerations at a time, s.
-    pub(crate) fn at(&self, t: f64) -> [[f64; 2]; 3] {
+    pub(crate) fn state_at(&self, t: f64) -> [[f64; 2]; 3] {
         let mut state = [self.centre, [0.0; 2], [0.0; 2]];
         for (k, sines) in self.sines.iter().enumerate() {
             for (amplitude, harmonic, phase) in *sines {

@@ -7,7 +7,7 @@ use std::error::Error;
 use std::f64::consts::TAU;
 use std::path::Path;
 
-use modelmill_rig::{Law, Place, Rig, State, Tracker, forces};
+use modelmill_rig::{RigLaw, RigPlace, Rig, RigState, RigTracker, forces};
 use modelmill_runtime::Random;
 
 use crate::motion::{PERIOD, motion};
@@ -20,15 +20,15 @@ const RESOLUTION: f64 = TAU / 1_048_576.0;
 /// Deviations of the reading of a force, N: of white noise, and of what wanders.
 const FORCE_NOISE: [f64; 2] = [8.0, 4.0];
 /// How much of what wanders is what it was a cycle before: it lies below some 2 Hz.
-const WANDERS: f64 = 0.987;
+const DRIFT_CORRELATION: f64 = 0.987;
 
 /// Friction that grows.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Wear {
+pub(crate) struct FrictionWear {
     /// Of which spindle.
     pub(crate) drive: usize,
     /// The friction: by how much it has grown at last, in N or N s/m.
-    pub(crate) growth: Law,
+    pub(crate) growth: RigLaw,
     /// From when, s.
     pub(crate) from: f64,
     /// For how long, s.
@@ -37,7 +37,7 @@ pub(crate) struct Wear {
 
 /// What is read in a cycle.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Reading {
+pub(crate) struct CycleReading {
     /// Encoders of the cranks, rad.
     pub(crate) q: [f64; 2],
     /// Forces of the spindles, N.
@@ -46,19 +46,19 @@ pub(crate) struct Reading {
 
 /// The rig in motion, with its sensors.
 #[derive(Clone, Debug)]
-pub(crate) struct Machine {
+pub(crate) struct SimulatedMachine {
     /// True angles, and forces as they are before any wear, over a period.
     q: Vec<[f64; 2]>,
     forces: Vec<[f64; 2]>,
     /// What the wear adds to the forces at last.
-    worn: Option<(Wear, Vec<[f64; 2]>)>,
+    worn: Option<(FrictionWear, Vec<[f64; 2]>)>,
     random: Random,
     wandering: [f64; 2],
     n: usize,
 }
 
 /// Base parameters that the controller uses: bodies as on the drawing, rods and friction as somebody has guessed them.
-pub(crate) fn in_use() -> Result<[f64; model::N_BASE], Box<dyn Error>> {
+pub(crate) fn parameters_in_use() -> Result<[f64; model::N_BASE], Box<dyn Error>> {
     let parameters = model::Parameters::<f64> {
         Jr_spindle_left_spindle_right: 2.0,
         Sr_spindle_left_spindle_right: 3.0,
@@ -74,12 +74,12 @@ pub(crate) fn in_use() -> Result<[f64; model::N_BASE], Box<dyn Error>> {
     )?)
 }
 
-impl Machine {
+impl SimulatedMachine {
     /// The rig of this example with noise from a seed.
     pub(crate) fn new(seed: u64) -> Result<Self, Box<dyn Error>> {
         Ok(Self {
             q: times().map(|t| motion(t)[0]).collect(),
-            forces: along(&rig()?)?,
+            forces: forces_along(&rig()?)?,
             worn: None,
             random: Random::new(seed),
             wandering: [0.0; 2],
@@ -88,17 +88,17 @@ impl Machine {
     }
 
     /// The same machine with wear that is to come.
-    pub(crate) fn wearing(mut self, wear: Wear) -> Result<Self, Box<dyn Error>> {
+    pub(crate) fn with_wear(mut self, wear: FrictionWear) -> Result<Self, Box<dyn Error>> {
         let mut rig = rig()?;
-        let place = [Place::Drive(wear.drive)];
+        let place = [RigPlace::Drive(wear.drive)];
         let effects = &mut rig.effects;
-        effects.retain(|effect| matches!(effect.law, Law::CoulombFriction { .. }));
+        effects.retain(|effect| matches!(effect.law, RigLaw::CoulombFriction { .. }));
         let effect = effects.iter_mut().find(|effect| effect.places == place);
         effect.ok_or("this drive of the rig has no friction")?.law = wear.growth;
         effects.retain(|effect| effect.law == wear.growth && effect.places == place);
-        let grown = along(&rig)?;
+        let grown = forces_along(&rig)?;
         rig.effects.clear();
-        let without = along(&rig)?;
+        let without = forces_along(&rig)?;
         let added = grown.iter().zip(&without);
         let added = added.map(|(with, without)| [with[0] - without[0], with[1] - without[1]]);
         self.worn = Some((wear, added.collect()));
@@ -111,7 +111,7 @@ impl Machine {
     }
 
     /// The next reading.
-    pub(crate) fn read(&mut self) -> Reading {
+    pub(crate) fn read(&mut self) -> CycleReading {
         let (t, at) = (self.time(), self.n % self.q.len());
         self.n += 1;
         let (q, mut forces) = (self.q[at], self.forces[at]);
@@ -126,17 +126,17 @@ impl Machine {
             (noisy / RESOLUTION).round() * RESOLUTION
         });
         for (k, force) in forces.iter_mut().enumerate() {
-            let rest = f64::sqrt(1.0 - WANDERS * WANDERS);
-            self.wandering[k] = WANDERS * self.wandering[k] + rest * self.normal();
+            let rest = f64::sqrt(1.0 - DRIFT_CORRELATION * DRIFT_CORRELATION);
+            self.wandering[k] = DRIFT_CORRELATION * self.wandering[k] + rest * self.normal();
             *force += FORCE_NOISE[0] * self.normal() + FORCE_NOISE[1] * self.wandering[k];
         }
-        Reading { q, forces }
+        CycleReading { q, forces }
     }
 
     /// Normal with mean zero and deviation one (G. Box, M. Muller 1958).
     fn normal(&mut self) -> f64 {
-        let radius = (-2.0 * self.random.between(f64::MIN_POSITIVE, 1.0).ln()).sqrt();
-        radius * (TAU * self.random.between(0.0, 1.0)).cos()
+        let radius = (-2.0 * self.random.uniform(f64::MIN_POSITIVE, 1.0).ln()).sqrt();
+        radius * (TAU * self.random.uniform(0.0, 1.0)).cos()
     }
 }
 
@@ -157,12 +157,12 @@ pub(crate) fn times() -> impl Iterator<Item = f64> {
 }
 
 /// Forces of a rig's drives along a period, N.
-fn along(rig: &Rig) -> Result<Vec<[f64; 2]>, Box<dyn Error>> {
-    let mut tracker = Tracker::new(rig)?;
+fn forces_along(rig: &Rig) -> Result<Vec<[f64; 2]>, Box<dyn Error>> {
+    let mut tracker = RigTracker::new(rig)?;
     let mut all = Vec::new();
     for t in times() {
         let [q, qd, qdd] = motion(t).map(Vec::from);
-        let found = forces(rig, &tracker.follow(&State { q, qd, qdd })?)?;
+        let found = forces(rig, &tracker.follow(&RigState { q, qd, qdd })?)?;
         all.push([found[0], found[1]]);
     }
     Ok(all)

@@ -10,7 +10,7 @@ const LENGTH: usize = 2 * REACH + 1;
 
 /// Position, rate and acceleration of two coordinates, and the forces of two drives, at one time.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Smoothed {
+pub(crate) struct SmoothedState {
     pub(crate) q: [f64; 2],
     pub(crate) qd: [f64; 2],
     pub(crate) qdd: [f64; 2],
@@ -19,7 +19,7 @@ pub(crate) struct Smoothed {
 
 /// The last readings of two positions and two forces.
 #[derive(Clone, Debug)]
-pub(crate) struct Smoother {
+pub(crate) struct MotionSmoother {
     /// Weights of the samples for the value, its first and its second derivative.
     weights: [[f64; LENGTH]; 3],
     /// Positions, then forces.
@@ -27,7 +27,7 @@ pub(crate) struct Smoother {
     n: usize,
 }
 
-impl Smoother {
+impl MotionSmoother {
     /// For samples that are `cycle` seconds apart.
     pub(crate) fn new(cycle: f64) -> Self {
         let places: [f64; LENGTH] = std::array::from_fn(|i| i as f64 - REACH as f64);
@@ -46,7 +46,7 @@ impl Smoother {
     }
 
     /// Takes the readings of a cycle; what they say of the cycle [`REACH`] before it, as soon as there are enough.
-    pub(crate) fn take(&mut self, q: [f64; 2], forces: [f64; 2]) -> Option<Smoothed> {
+    pub(crate) fn add_readings(&mut self, q: [f64; 2], forces: [f64; 2]) -> Option<SmoothedState> {
         self.readings[self.n % LENGTH] = [q[0], q[1], forces[0], forces[1]];
         self.n += 1;
         if self.n < LENGTH {
@@ -57,7 +57,7 @@ impl Smoother {
             let weighted = oldest_first.zip(&self.weights[derivative]);
             weighted.map(|(x, w)| x * w).sum()
         };
-        Some(Smoothed {
+        Some(SmoothedState {
             q: [of(0, 0), of(0, 1)],
             qd: [of(1, 0), of(1, 1)],
             qdd: [of(2, 0), of(2, 1)],
@@ -74,11 +74,11 @@ mod tests {
     fn a_parabola_comes_out_as_it_is() {
         let cycle = 1e-3;
         let at = |t: f64| [1.0 + 2.0 * t + 3.0 * t * t, -0.5 * t];
-        let mut smoother = Smoother::new(cycle);
+        let mut smoother = MotionSmoother::new(cycle);
         let mut last = None;
         for i in 0..50 {
             let t = f64::from(i) * cycle;
-            last = smoother.take(at(t), [7.0, t]);
+            last = smoother.add_readings(at(t), [7.0, t]);
         }
         let (found, t) = (last.unwrap(), (49 - REACH) as f64 * cycle);
         let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-9, "{a} {b}");

@@ -2,15 +2,15 @@
 
 use std::path::Path;
 
-use modelmill::files::{Files, Memory};
+use modelmill::files::{FileSource, MemoryFiles};
 use modelmill::{Error, Host, Model, Outcome};
 use modelmill_spec::bundled::{MODELS, RIGS};
 
 /// Files that are part of the program.
-fn files(bundled: &[(&str, &str)]) -> Memory {
+fn files(bundled: &[(&str, &str)]) -> MemoryFiles {
     let all = bundled.iter();
-    all.fold(Memory::default(), |files, (name, text)| {
-        files.with(name, *text)
+    all.fold(MemoryFiles::default(), |files, (name, text)| {
+        files.with_file(name, *text)
     })
 }
 

@@ -2,17 +2,17 @@
 
 use std::fmt::Write as _;
 
-use crate::Experiment;
-use crate::lengths::Length;
-use crate::runs::Periodic;
-use crate::study::{Along, Columns};
-use modelmill::text::svg::{Figure, Look, sheet};
+use crate::PaperExperiment;
+use crate::lengths::DistanceErrors;
+use crate::runs::PeriodicTrajectory;
+use crate::study::{TreatmentRun, DriveColumns};
+use modelmill::text::svg::{SvgFigure, PanelStyle, sheet};
 
 /// Largest relative error that is drawn.
 const RELATIVE: f64 = 1.0;
 
 /// The next round number above all magnitudes, so that scales can be read.
-fn round_limit(columns: &[&Columns]) -> f64 {
+fn round_limit(columns: &[&DriveColumns]) -> f64 {
     let values = columns.iter().flat_map(|c| c.iter()).flatten();
     let largest = values.fold(0.0_f64, |m, v| m.max(v.abs()));
     let decade = 10_f64.powf(largest.max(f64::MIN_POSITIVE).log10().floor());
@@ -23,22 +23,22 @@ fn round_limit(columns: &[&Columns]) -> f64 {
         .unwrap_or(largest)
 }
 
-fn scale(limit: f64) -> Look<'static> {
-    Look {
+fn scale(limit: f64) -> PanelStyle<'static> {
+    PanelStyle {
         limit: Some(limit),
-        ..Look::default()
+        ..PanelStyle::default()
     }
 }
 
 /// Angles of a trajectory around their means, and the forces along it.
-pub(crate) fn motion(title: &str, periodic: &Periodic, along: &Along, drives: &[String]) -> String {
-    let mut figure = Figure::new(title, &along.time);
-    let angles: Columns = periodic
+pub(crate) fn motion(title: &str, periodic: &PeriodicTrajectory, along: &TreatmentRun, drives: &[String]) -> String {
+    let mut figure = SvgFigure::new(title, &along.time);
+    let angles: DriveColumns = periodic
         .series
         .iter()
         .map(|one| {
             let time = along.time.iter();
-            time.map(|t| (one.at(*t)[0] - one.offset).to_degrees())
+            time.map(|t| (one.at_time(*t)[0] - one.offset).to_degrees())
                 .collect()
         })
         .collect();
@@ -57,7 +57,7 @@ pub(crate) fn motion(title: &str, periodic: &Periodic, along: &Along, drives: &[
     figure.finish()
 }
 
-fn names<'a>(drives: &'a [String], columns: &'a Columns) -> Vec<(&'a str, &'a [f64])> {
+fn names<'a>(drives: &'a [String], columns: &'a DriveColumns) -> Vec<(&'a str, &'a [f64])> {
     drives
         .iter()
         .map(String::as_str)
@@ -66,8 +66,8 @@ fn names<'a>(drives: &'a [String], columns: &'a Columns) -> Vec<(&'a str, &'a [f
 }
 
 /// Forces, and errors before and after identification of both treatments on one scale.
-pub(crate) fn errors(title: &str, along: &Along, drives: &[String]) -> String {
-    let mut figure = Figure::new(title, &along.time);
+pub(crate) fn errors(title: &str, along: &TreatmentRun, drives: &[String]) -> String {
+    let mut figure = SvgFigure::new(title, &along.time);
     let calculated = [0, 1].map(|t| along.error(&along.calculated[t]));
     let estimated = [0, 1].map(|t| along.error(&along.estimated[t]));
     let force = round_limit(&[&along.measured]);
@@ -99,8 +99,8 @@ pub(crate) fn errors(title: &str, along: &Along, drives: &[String]) -> String {
 }
 
 /// The error of the paper's treatment, the force of the misplaced mass, and what is left of the one without the other.
-pub(crate) fn decomposition(title: &str, along: &Along, drives: &[String]) -> String {
-    let mut figure = Figure::new(title, &along.time);
+pub(crate) fn decomposition(title: &str, along: &TreatmentRun, drives: &[String]) -> String {
+    let mut figure = SvgFigure::new(title, &along.time);
     let error = along.error(&along.calculated[0]);
     let placement = along.placement();
     let limit = round_limit(&[&error, &placement]);
@@ -129,8 +129,8 @@ pub(crate) fn decomposition(title: &str, along: &Along, drives: &[String]) -> St
 }
 
 /// What the paper's own identification changed in the forces, beside the force of the misplaced mass.
-pub(crate) fn printed_change(title: &str, along: &Along, drives: &[String]) -> String {
-    let mut figure = Figure::new(title, &along.time);
+pub(crate) fn printed_change(title: &str, along: &TreatmentRun, drives: &[String]) -> String {
+    let mut figure = SvgFigure::new(title, &along.time);
     let (change, placement) = (along.printed_change(), along.placement());
     let limit = round_limit(&[&change, &placement]);
     for (d, drive) in drives.iter().enumerate() {
@@ -147,8 +147,8 @@ pub(crate) fn printed_change(title: &str, along: &Along, drives: &[String]) -> S
 }
 
 /// Why relative errors have peaks: force, error and their quotient, with the zeros of the force marked.
-pub(crate) fn peaks(title: &str, along: &Along, drive: usize, name: &str) -> String {
-    let mut figure = Figure::new(title, &along.time);
+pub(crate) fn peaks(title: &str, along: &TreatmentRun, drive: usize, name: &str) -> String {
+    let mut figure = SvgFigure::new(title, &along.time);
     let zeros = along.zeros(drive);
     let error = along.error(&along.calculated[0]);
     let relative: Vec<f64> = error[drive]
@@ -178,7 +178,7 @@ pub(crate) fn peaks(title: &str, along: &Along, drive: usize, name: &str) -> Str
 }
 
 /// Where base parameters lie between calculated (0) and consistent (1).
-pub(crate) fn on_the_way(experiment: &Experiment) -> String {
+pub(crate) fn base_parameter_positions(experiment: &PaperExperiment) -> String {
     const ROW: f64 = 46.0;
     let [calculated, consistent, estimated] = &experiment.base;
     let ours = [
@@ -243,7 +243,7 @@ pub(crate) fn on_the_way(experiment: &Experiment) -> String {
 }
 
 /// The error for other distances of the base joints.
-pub(crate) fn lengths(lengths: &[Length], paper: [f64; 2]) -> String {
+pub(crate) fn lengths(lengths: &[DistanceErrors], paper: [f64; 2]) -> String {
     let (top, height, left, width) = (60.0, 240.0, 80.0, 780.0);
     let most = 0.35;
     let (first, last) = match (lengths.first(), lengths.last()) {

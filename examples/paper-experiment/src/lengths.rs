@@ -3,13 +3,13 @@
 //!
 //! The consistent treatment stands for the rig here, with which it agrees to rounding.
 
-use modelmill_identify::excite::{Motion, Series};
-use modelmill_identify::{PreparedAs, Run};
+use modelmill_identify::excite::{ExcitationMotion, FourierSeries};
+use modelmill_identify::{PreparationRecord, PreparedRun};
 
 use crate::bundled;
-use crate::study::{Along, Errors};
+use crate::study::{TreatmentRun, DriveErrors};
 use modelmill::along;
-use modelmill::stretch::Stretch;
+use modelmill::stretch::RecordingSegment;
 use modelmill::{Host, Outcome};
 
 /// Samples of the period.
@@ -18,41 +18,41 @@ const SAMPLES: usize = 1000;
 const DISTANCES: [i32; 10] = [10, 20, 30, 40, 50, 60, 70, 80, 90, 100];
 
 /// Errors for one distance of the base joints.
-pub(crate) struct Length {
+pub(crate) struct DistanceErrors {
     /// b, m.
     pub(crate) distance: f64,
     /// Of each drive.
-    pub(crate) errors: Vec<Errors>,
+    pub(crate) errors: Vec<DriveErrors>,
 }
 
 /// The errors for every distance at which the loops close all along.
 ///
 /// Fails only when whoever watches stops it.
-pub(crate) fn scan(host: &Host, series: &[Series]) -> Outcome<Vec<Length>> {
-    host.watched("trying other lengths", DISTANCES.len(), |job| {
+pub(crate) fn scan(host: &Host, series: &[FourierSeries]) -> Outcome<Vec<DistanceErrors>> {
+    host.run_job("trying other lengths", DISTANCES.len(), |job| {
         let distances = DISTANCES.iter().map(|cm| f64::from(*cm) / 100.0);
         distances
             .filter_map(|distance| {
                 job.add(1);
-                at(host, series, distance).ok()
+                errors_at(host, series, distance).ok()
             })
             .collect()
     })
 }
 
-fn at(host: &Host, series: &[Series], distance: f64) -> Outcome<Length> {
+fn errors_at(host: &Host, series: &[FourierSeries], distance: f64) -> Outcome<DistanceErrors> {
     let variant = |of: &str| {
         let text = format!(
             "schema = 1\nname = \"other_length\"\nextends = \"{of}\"\n[constants]\nb = {{ value = {distance}, unit = \"m\" }}\n"
         );
         bundled::variant(host, of, "other-length.toml", &text)
     };
-    let motion = Motion::sample(series, SAMPLES);
-    let period = series.first().map_or(0.0, Series::period);
+    let motion = ExcitationMotion::sample(series, SAMPLES);
+    let period = series.first().map_or(0.0, FourierSeries::period);
     let time: Vec<f64> = (0..SAMPLES)
         .map(|i| i as f64 * period / SAMPLES as f64)
         .collect();
-    let data = Stretch::from(Run {
+    let data = RecordingSegment::from(PreparedRun {
         file: format!("the test motion for b = {distance} m"),
         q: motion.q,
         qd: motion.qd,
@@ -62,8 +62,8 @@ fn at(host: &Host, series: &[Series], distance: f64) -> Outcome<Length> {
         left_out: Vec::new(),
         lines: (0..time.len() as u64).collect(),
         time,
-        repeats: None,
-        prepared: PreparedAs::default(),
+        repeatability: None,
+        prepared: PreparationRecord::default(),
         notes: Vec::new(),
     });
     let (paper, consistent) = (
@@ -74,14 +74,14 @@ fn at(host: &Host, series: &[Series], distance: f64) -> Outcome<Length> {
         along::forces(&paper, &data, &paper.nominal)?,
         along::forces(&consistent, &data, &consistent.nominal)?,
     ];
-    let along = Along {
+    let along = TreatmentRun {
         time: data.time(),
         measured: forces[1].clone(),
         printed: forces[0].clone(),
         calculated: forces.clone(),
         estimated: forces,
     };
-    Ok(Length {
+    Ok(DistanceErrors {
         distance,
         errors: (0..along.measured.len())
             .map(|d| along.errors(d, &along.calculated[0]))

@@ -13,18 +13,18 @@ mod wording;
 
 mod bundled;
 
-use modelmill::text::Style;
-use modelmill::text::table::{Align, number, percent, table};
+use modelmill::text::TerminalStyle;
+use modelmill::text::table::{ColumnAlignment, number, percent, table};
 use modelmill::{Host, Model, Outcome};
 use modelmill_identify::excite::Options;
 use serde_json::json;
 
-use runs::Periodic;
-use study::Bench;
+use runs::PeriodicTrajectory;
+use study::TreatmentStudy;
 
 /// How the experiment is made.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Request {
+pub struct ExperimentRequest {
     /// Random trajectories within the limits that the search for the excitation tries first.
     pub random: usize,
     /// How many of the best random trajectories the search starts from.
@@ -36,25 +36,25 @@ pub struct Request {
 }
 
 /// Everything that the page tells.
-pub struct Experiment {
+pub struct PaperExperiment {
     paper: Model,
     /// Excitation for identification, and the test trajectory for verification.
-    trajectories: [Periodic; 2],
+    trajectories: [PeriodicTrajectory; 2],
     /// Without and with spindle rods.
-    benches: [Bench; 2],
+    benches: [TreatmentStudy; 2],
     /// The paper's base parameters: calculated, of the consistent treatment, and the paper's estimate.
     base: [Vec<f64>; 3],
     /// The error for other distances of the base joints.
-    lengths: Vec<lengths::Length>,
+    lengths: Vec<lengths::DistanceErrors>,
     /// Samples per second.
     rate: f64,
 }
 
-impl Experiment {
+impl PaperExperiment {
     /// Makes the experiment.
     ///
     /// Fails only when whoever watches stops it, or a search within the limits finds nothing.
-    pub fn new(host: &Host, args: &Request) -> Outcome<Self> {
+    pub fn new(host: &Host, args: &ExperimentRequest) -> Outcome<Self> {
         let load = |name: &str| bundled::model(host, name);
         let paper = load("spidermill-paper.toml")?;
         let consistent = load("spidermill.toml")?;
@@ -80,10 +80,10 @@ impl Experiment {
             runs::search(&paper, &excitation, "searching for the excitation")?,
             runs::search(&paper, &test, "drawing the test trajectory")?,
         ];
-        let bench = |name: &str| -> Outcome<Bench> {
+        let bench = |name: &str| -> Outcome<TreatmentStudy> {
             let rig = bundled::rig(name)?;
             let [identification, verification] = &trajectories;
-            Bench::new(
+            TreatmentStudy::new(
                 [&paper, &consistent],
                 runs::run(&rig, &paper, identification, args.rate)?,
                 runs::run(&rig, &paper, verification, args.rate)?,
@@ -117,7 +117,7 @@ impl Experiment {
     }
 
     /// Error figures of all runs, for people.
-    pub fn text(&self, style: Style) -> String {
+    pub fn text(&self, style: TerminalStyle) -> String {
         let mut lines = vec![style.bold(&format!(
             "The paper's experiment: condition number {} (paper {})",
             number(self.trajectories[0].condition_number),
@@ -131,7 +131,7 @@ impl Experiment {
                     for modelled in [&along.calculated[t], &along.estimated[t]] {
                         row.extend((0..2).map(|d| percent(Some(along.errors(d, modelled).nrms))));
                     }
-                    let remains = along.explained().remains;
+                    let remains = along.explained_error().remains;
                     row.push(if t == 0 {
                         percent(Some(remains))
                     } else {
@@ -142,13 +142,13 @@ impl Experiment {
             }
         }
         let columns = [
-            ("nrms", Align::Left),
-            ("treatment of m4", Align::Left),
-            ("calculated fe1", Align::Right),
-            ("fe10", Align::Right),
-            ("estimated fe1", Align::Right),
-            ("fe10", Align::Right),
-            ("left without m4's shift", Align::Right),
+            ("nrms", ColumnAlignment::Left),
+            ("treatment of m4", ColumnAlignment::Left),
+            ("calculated fe1", ColumnAlignment::Right),
+            ("fe10", ColumnAlignment::Right),
+            ("estimated fe1", ColumnAlignment::Right),
+            ("fe10", ColumnAlignment::Right),
+            ("left without m4's shift", ColumnAlignment::Right),
         ];
         lines.extend(table(2, &columns, &rows));
         lines.join("\n")
@@ -156,11 +156,11 @@ impl Experiment {
 
     /// All figures as one JSON object.
     pub fn json(&self) -> serde_json::Value {
-        let bench = |bench: &Bench| {
+        let bench = |bench: &TreatmentStudy| {
             let run = |k: usize| {
                 let along = &bench.runs[k];
                 let treatment = |t: usize| {
-                    let errors = |modelled: &study::Columns| -> Vec<serde_json::Value> {
+                    let errors = |modelled: &study::DriveColumns| -> Vec<serde_json::Value> {
                         (0..modelled.len())
                             .map(|d| {
                                 let e = along.errors(d, modelled);
@@ -173,8 +173,8 @@ impl Experiment {
                         "estimated": errors(&along.estimated[t]),
                     })
                 };
-                let explained = along.explained();
-                let printed = study::explained(&along.printed_change(), &along.placement());
+                let explained = along.explained_error();
+                let printed = study::explain_error(&along.printed_change(), &along.placement());
                 json!({
                     "paper": treatment(0),
                     "consistent": treatment(1),

@@ -2,17 +2,17 @@
 
 use std::fmt::Write as _;
 
-use crate::Experiment;
+use crate::PaperExperiment;
 use modelmill::report;
 use modelmill::text::svg::escape;
 
 /// The page's text.
-pub(crate) fn render(experiment: &Experiment) -> String {
-    let mut page = Page(report::begin_page(
+pub(crate) fn render(experiment: &PaperExperiment) -> String {
+    let mut page = ExperimentPage(report::begin_page(
         "The paper's experiment, reproduced and explained",
     ));
     page.summary(experiment);
-    page.setting(experiment);
+    page.method(experiment);
     page.table_2(experiment);
     page.placement(experiment);
     page.peaks(experiment);
@@ -25,14 +25,14 @@ pub(crate) fn render(experiment: &Experiment) -> String {
 }
 
 /// The text so far.
-pub(crate) struct Page(pub(crate) String);
+pub(crate) struct ExperimentPage(pub(crate) String);
 
-impl Page {
+impl ExperimentPage {
     pub(crate) fn heading(&mut self, text: &str) {
         let _ = writeln!(self.0, "<h2>{}</h2>", escape(text));
     }
 
-    pub(crate) fn say(&mut self, text: &str) {
+    pub(crate) fn paragraph(&mut self, text: &str) {
         let _ = writeln!(self.0, "<p>{}</p>", escape(text));
     }
 

@@ -1,21 +1,21 @@
 //! Chapters 1 to 4 of the page: what is simulated, the errors of the forces, and what they are made of.
 
-use crate::page::Page;
-use crate::study::Columns;
-use crate::wording::{explained, largest, least, nominal, percent, rounding, share};
-use crate::{Experiment, figures, printed};
+use crate::page::ExperimentPage;
+use crate::study::DriveColumns;
+use crate::wording::{explained_text, largest, least, nominal, percent, rounding, share};
+use crate::{PaperExperiment, figures, printed};
 use modelmill::text::table::significant;
 
 /// Forces below this share of their root mean square count as near zero.
 const NEAR_ZERO: f64 = 0.1;
 
-impl Page {
-    pub(crate) fn summary(&mut self, experiment: &Experiment) {
+impl ExperimentPage {
+    pub(crate) fn summary(&mut self, experiment: &PaperExperiment) {
         let plain = &experiment.benches[0].runs;
         let rods = &experiment.benches[1].runs;
         let [calculated, consistent, estimated] = &experiment.base;
         self.0.push_str("<div class=\"short\">\n");
-        self.say(&format!(
+        self.paragraph(&format!(
             "In short. The paper's reduced model misses the forces of its multibody model by 8 to 10 % before identification, \
              and the paper blames the places of the lumped masses in general. Here the whole robot, 11 groups with true parallel \
              cranks, is simulated by a program that shares no mechanics with the model. A reduced model that lets the platform's \
@@ -26,9 +26,9 @@ impl Page {
             rounding(largest(plain, |along, d| along.errors(d, &along.calculated[1]).nrms)),
             percent(least(plain, |along, d| along.errors(d, &along.calculated[0]).nrms)),
             percent(largest(plain, |along, d| along.errors(d, &along.calculated[0]).nrms)),
-            explained(plain),
+            explained_text(plain),
         ));
-        self.say(&format!(
+        self.paragraph(&format!(
             "The paper's own Table 1 says the same: p4,min = m4 (1 - dc3/d3), which is zero for a mass in one place, falls from \
              {} kg to {} kg by identification (with d3 = 1.03 m; whatever d3 is, by more than {}), and p3,min and p5,min arrive \
              within {} and {} of the consistent values.",
@@ -38,18 +38,18 @@ impl Page {
             percent((estimated[2] / consistent[2] - 1.0).abs()),
             percent((estimated[4] / consistent[4] - 1.0).abs()),
         ));
-        self.say(&format!(
+        self.paragraph(&format!(
             "With spindles that have mass (rods of 8 kg), {} of the error of the paper's treatment (2-norm, verification run) is \
              not m4, and that is the rods.",
-            percent(rods[1].explained().remains)
+            percent(rods[1].explained_error().remains)
         ));
         self.0.push_str("</div>\n");
     }
 
-    pub(crate) fn setting(&mut self, experiment: &Experiment) {
+    pub(crate) fn method(&mut self, experiment: &PaperExperiment) {
         let [excitation, test] = &experiment.trajectories;
         self.heading("1  What was done");
-        self.say(&format!(
+        self.paragraph(&format!(
             "Excitation, eq. (14), (15) and (17): {} harmonics and a period of {} s, as in the paper, within the limits of \
              spidermill.toml. The best of {} random trajectories has condition number {}, the one found {} (paper: {}). The test \
              run is another, random series of {} harmonics and {} s. Coefficients are rounded to four decimals and printed at the \
@@ -63,14 +63,14 @@ impl Page {
             test.series.first().map_or(0, |s| s.mu.len()),
             test.period,
         ));
-        self.say(&format!(
+        self.paragraph(&format!(
             "Both are run at {} Hz on two rigs: spidermill-full.toml, whose 11 groups sum up to Table 1, and \
              spidermill-with-rods.toml, the same with a rod of 8 kg and 0.9 m in each spindle. The sensors are perfect, so \
              whatever separates rig and model is the model's doing. Two reduced models are held against them: \
              spidermill-paper.toml, which is eq. (5) and eq. (16) to the letter, and spidermill.toml, the consistent one.",
             experiment.rate
         ));
-        self.say(
+        self.paragraph(
             "What the paper does: half of m4 goes to each coupler. The coupler's balance of forces sees it at the joint R3m. The \
              balance of moments about the elbow sees it at the coupler's centre of mass, as if it sat there. That is where the \
              products m4 dc3 and m4 dc3^2 of eq. (5) come from; a mass at one place gives four base parameters instead of five.",
@@ -89,9 +89,9 @@ impl Page {
         }
     }
 
-    pub(crate) fn table_2(&mut self, experiment: &Experiment) {
+    pub(crate) fn table_2(&mut self, experiment: &PaperExperiment) {
         self.heading("2  Table 2, beside the paper's");
-        self.say(
+        self.paragraph(
             "The paper's measure is the mean of |error| / |force|. It is dominated by the moments at which a force passes through \
              zero (section 4), so the median of the same quotient and the nrms (2-norm of the error by that of the force) stand \
              beside it.",
@@ -101,7 +101,7 @@ impl Page {
             .into_iter()
             .enumerate()
         {
-            self.say(&format!("{title}:"));
+            self.paragraph(&format!("{title}:"));
             let mut rows = Vec::new();
             for (k, run) in ["identification", "verification"].into_iter().enumerate() {
                 for (s, stage) in ["calculated", "estimated"].into_iter().enumerate() {
@@ -112,7 +112,7 @@ impl Page {
                         }
                         for bench in &experiment.benches {
                             let along = &bench.runs[k];
-                            let modelled: &Columns = match s {
+                            let modelled: &DriveColumns = match s {
                                 0 => &along.calculated[t],
                                 _ => &along.estimated[t],
                             };
@@ -159,9 +159,9 @@ impl Page {
         );
     }
 
-    pub(crate) fn placement(&mut self, experiment: &Experiment) {
+    pub(crate) fn placement(&mut self, experiment: &PaperExperiment) {
         self.heading("3  The error of the paper's treatment is the force of the misplaced m4");
-        self.say(
+        self.paragraph(
             "Take the forces of both reduced models with the parameters of Table 1 and subtract: what remains is what m4 makes at \
              R3m and does not make where the paper's balance of moments has it. This needs no rig. The error of the paper's \
              treatment needs the rig, which knows nothing of either model. Both are the same curve:",
@@ -169,7 +169,7 @@ impl Page {
         let mut rows = Vec::new();
         for (bench, name) in experiment.benches.iter().zip(["rig", "rig with rods"]) {
             for (along, run) in bench.runs.iter().zip(["identification", "verification"]) {
-                let explained = along.explained();
+                let explained = along.explained_error();
                 rows.push(vec![
                     format!("{name}, {run}"),
                     format!("{:.6}", explained.correlation),
@@ -199,14 +199,14 @@ impl Page {
         }
     }
 
-    pub(crate) fn peaks(&mut self, experiment: &Experiment) {
+    pub(crate) fn peaks(&mut self, experiment: &PaperExperiment) {
         self.heading("4  The peaks of the relative error");
         let along = &experiment.benches[0].runs[1];
         let drives = experiment.paper.drives();
         let modelled = &along.calculated[0];
         let [samples, part] = along.near_zero(0, modelled, NEAR_ZERO);
         let errors = along.errors(0, modelled);
-        self.say(&format!(
+        self.paragraph(&format!(
             "The paper remarks that peaks of the relative error arise where the force is close to zero. So it is: the force of the \
              left spindle passes through zero {} times in this run, the error does not, and their quotient has no bound there. The \
              {} of the samples with a force below {} of its root mean square make {} of the mean relative error. Without peaks, \

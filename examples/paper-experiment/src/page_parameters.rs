@@ -3,19 +3,19 @@
 
 use std::fmt::Write as _;
 
-use crate::page::Page;
+use crate::page::ExperimentPage;
 use crate::study::{self, UNKNOWN};
 use crate::wording::{decimals, largest, least, percent, share};
-use crate::{Experiment, figures, printed};
+use crate::{PaperExperiment, figures, printed};
 
 /// Least and largest of the paper's errors with calculated parameters, Table 2.
 const PAPER_ERRORS: [f64; 2] = [0.0782, 0.1020];
 
-impl Page {
-    pub(crate) fn base_parameters(&mut self, experiment: &Experiment) {
+impl ExperimentPage {
+    pub(crate) fn base_parameters(&mut self, experiment: &PaperExperiment) {
         self.heading("5  Base parameters: identification takes the mass back");
         let [calculated, consistent, estimated] = &experiment.base;
-        self.say(
+        self.paragraph(
             "The consistent treatment is a special case of eq. (16): the five values in column two make exactly its forces, with \
              p4,min = 0. Identification under the paper's treatment finds them on the rig. The paper's own estimate, computed from \
              the right column of its Table 1 with the lengths assumed here, goes the same way with all five. It overshoots in \
@@ -61,13 +61,13 @@ impl Page {
         );
         let runs = &experiment.benches[0].runs;
         let changes =
-            [0, 1].map(|k| study::explained(&runs[k].printed_change(), &runs[k].placement()));
+            [0, 1].map(|k| study::explain_error(&runs[k].printed_change(), &runs[k].placement()));
         self.figure(
-            &figures::on_the_way(experiment),
+            &figures::base_parameter_positions(experiment),
             "0 is what the paper calculates from Table 1, 1 what the same masses give in one place. Values beyond 3 or below -0.1 \
              stand at the edge.",
         );
-        self.say(&format!(
+        self.paragraph(&format!(
             "In forces: the difference that the paper's identification makes, its estimated against its calculated parameters put \
              into eq. (16) along our runs, is for {} (identification run) and {} (verification run) the force of the misplaced m4, \
              nothing fitted (squares; correlation {:.2} and {:.2}). No rig of ours takes part in this. The rest is that the paper's values do not \
@@ -87,9 +87,9 @@ impl Page {
         );
     }
 
-    pub(crate) fn table_1(&mut self, experiment: &Experiment) {
+    pub(crate) fn table_1(&mut self, experiment: &PaperExperiment) {
         self.heading("6  Table 1, beside the paper's");
-        self.say(
+        self.paragraph(
             "As in the paper, m1, m3 and dc1 are known and the others are solved from the five estimated base parameters; all real \
              solutions are given.",
         );
@@ -127,13 +127,13 @@ impl Page {
         for (bench, name) in experiment.benches.iter().zip(names) {
             if bench.physical.is_empty() {
                 let p4 = bench.fits[0].values()[3];
-                self.say(&format!(
+                self.paragraph(&format!(
                     "{name}: no real values of these five give the estimated base parameters. p4,min comes out as {p4:.2} kg; a \
                      reduced model that lacks the rods puts what they do where it can.",
                 ));
             }
         }
-        self.say(
+        self.paragraph(
             "With p4,min = 0 the printed treatment allows m4 = 0 or dc3 = d3 only: the two solutions for the rig. Neither is the \
              robot, whose m4 is 12.456 kg and dc3 0.515 m, and negative values show it. The equations are solved rightly; it is the \
              treatment that has no place for the true masses. That fits the paper's remark that its \
@@ -141,10 +141,10 @@ impl Page {
         );
     }
 
-    pub(crate) fn differences(&mut self, experiment: &Experiment) {
+    pub(crate) fn differences(&mut self, experiment: &PaperExperiment) {
         self.heading("7  Where our numbers differ from the paper's, and why");
         let plain = &experiment.benches[0].runs;
-        self.say(&format!(
+        self.paragraph(&format!(
             "The paper prints masses but no lengths, limits or coefficients. The lengths of spidermill.toml (d1, d3, b, dA, Bx, By) \
              and both trajectories are assumptions, and they decide how large the errors are in per cent: before identification \
              ours are {} to {} (nrms), and the mean relative error is {} to {}, far above the paper's 8 to 10 %: with these \
@@ -155,7 +155,7 @@ impl Page {
             percent(least(plain, |a, d| a.errors(d, &a.calculated[0]).mean_relative)),
             percent(largest(plain, |a, d| a.errors(d, &a.calculated[0]).mean_relative)),
         ));
-        self.say(
+        self.paragraph(
             "How much one unprinted length changes: the same test motion with other distances b of the base joints (all else \
              as it is), held against the consistent treatment, which stands for the rig. The error is the same force of the \
              misplaced m4 at every b; what changes is how large it is beside the others.",
@@ -175,7 +175,7 @@ impl Page {
              mounts (dA, Bx, By) scale error and force alike.",
         );
         if !reached.is_empty() {
-            self.say(&format!(
+            self.paragraph(&format!(
                 "At b = {} the nrms of both spindles is within the paper's band (the mean relative error still is not: {}). Which \
                  b the real robot has we do not know.",
                 reached
@@ -190,7 +190,7 @@ impl Page {
                     .join(", "),
             ));
         }
-        self.say(
+        self.paragraph(
             "The paper's errors after identification, 3.3 to 3.6 %, have no counterpart on the rig without rods, where nothing is \
              left: they must come from something that its multibody model has beyond a planar rigid M structure, perhaps spindles \
              with mass and their offset at the cranks. The rig with rods shows that kind of remainder; its size depends on the rods, whose mass is made \
@@ -198,9 +198,9 @@ impl Page {
         );
     }
 
-    pub(crate) fn coefficients(&mut self, experiment: &Experiment) {
-        self.say("Coefficients of the trajectories, eq. (15), rad and rad/s:");
-        let names = experiment.paper.active();
+    pub(crate) fn coefficients(&mut self, experiment: &PaperExperiment) {
+        self.paragraph("Coefficients of the trajectories, eq. (15), rad and rad/s:");
+        let names = experiment.paper.active_coordinates();
         for (periodic, run) in experiment
             .trajectories
             .iter()
@@ -212,7 +212,7 @@ impl Page {
                 .zip(&names)
                 .map(|(series, name)| format!("mean of {name} {:.4}", series.offset))
                 .collect();
-            self.say(&format!(
+            self.paragraph(&format!(
                 "{run}, period {} s, {}:",
                 periodic.period,
                 means.join(", ")

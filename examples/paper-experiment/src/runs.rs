@@ -3,15 +3,15 @@
 use std::f64::consts::PI;
 
 use modelmill_identify::excite::{
-    CoordinateLimits, Motion, Options, Plant, Series, condition_number, excite, steps,
+    ExcitationLimits, ExcitationMotion, Options, ExcitationPlant, FourierSeries, condition_number, excite, max_progress_steps,
 };
-use modelmill_identify::{PreparedAs, Run};
-use modelmill_rig::{Rig, State, Trajectory};
+use modelmill_identify::{PreparationRecord, PreparedRun};
+use modelmill_rig::{Rig, RigState, Trajectory};
 
 use modelmill::Model;
 use modelmill::excite::limits;
 use modelmill::excite::plant::ModelPlant;
-use modelmill::stretch::Stretch;
+use modelmill::stretch::RecordingSegment;
 use modelmill::{Error, Outcome};
 
 /// Decimals of the coefficients: few enough to be printed, so that anybody can repeat the runs.
@@ -20,9 +20,9 @@ const DECIMALS: f64 = 1e4;
 const FINE: usize = 4000;
 
 /// A periodic trajectory.
-pub(crate) struct Periodic {
+pub(crate) struct PeriodicTrajectory {
     /// One series for each active coordinate.
-    pub(crate) series: Vec<Series>,
+    pub(crate) series: Vec<FourierSeries>,
     /// s
     pub(crate) period: f64,
     /// Condition number of the regressor along it.
@@ -34,40 +34,40 @@ pub(crate) struct Periodic {
 }
 
 /// Searches for a trajectory; its coefficients are rounded, and it keeps all limits nevertheless.
-pub(crate) fn search(model: &Model, options: &Options, message: &str) -> Outcome<Periodic> {
-    let all_limits = limits::limits(model, &[])?;
-    let coordinates = limits::of_active(model, &all_limits)?;
+pub(crate) fn search(model: &Model, options: &Options, message: &str) -> Outcome<PeriodicTrajectory> {
+    let all_limits = limits::merged_limits(model, &[])?;
+    let coordinates = limits::active_limits(model, &all_limits)?;
     let plant = ModelPlant::new(model, &all_limits);
-    let search = model.host().watched(message, steps(options), |job| {
+    let search = model.host().run_job(message, max_progress_steps(options), |job| {
         excite(&plant, &coordinates, options, &|more| job.flow(more))
     })?;
     let found = search.map_err(|error| Error::input(format!("{}: {error}", model.path)))?;
     // Rounding may leave the limits by a hair; shrinking by parts in a thousand returns.
     let series = (0..50)
-        .map(|k| rounded(&found.series, 1.0 - 1e-3 * f64::from(k), options.period))
-        .find(|series| keeps_limits(&plant, &coordinates, series))
+        .map(|k| round_coefficients(&found.series, 1.0 - 1e-3 * f64::from(k), options.period))
+        .find(|series| is_within_limits(&plant, &coordinates, series))
         .ok_or_else(|| {
             Error::input(format!(
                 "{}: the trajectory leaves its limits when its coefficients are rounded; widen the limits",
                 model.path
             ))
         })?;
-    let motion = Motion::sample(&series, modelmill_identify::excite::samples(options));
-    Ok(Periodic {
+    let motion = ExcitationMotion::sample(&series, modelmill_identify::excite::samples_per_period(options));
+    Ok(PeriodicTrajectory {
         condition_number: plant
             .regressor(&motion)
             .map_or(f64::INFINITY, |w| condition_number(&w)),
         series,
         period: options.period,
-        start: found.start,
-        random: found.random,
+        start: found.start_condition_number,
+        random: found.feasible_starts,
     })
 }
 
-fn rounded(series: &[Series], factor: f64, period: f64) -> Vec<Series> {
+fn round_coefficients(series: &[FourierSeries], factor: f64, period: f64) -> Vec<FourierSeries> {
     let round = |x: f64| (x * DECIMALS).round() / DECIMALS;
     let scaled = |list: &[f64]| list.iter().map(|x| round(factor * x)).collect();
-    let one = |one: &Series| Series {
+    let one = |one: &FourierSeries| FourierSeries {
         offset: round(one.offset),
         mu: scaled(&one.mu),
         nu: scaled(&one.nu),
@@ -76,24 +76,24 @@ fn rounded(series: &[Series], factor: f64, period: f64) -> Vec<Series> {
     series.iter().map(one).collect()
 }
 
-fn keeps_limits(plant: &ModelPlant<'_>, limits: &[CoordinateLimits], series: &[Series]) -> bool {
-    let within = |one: &Series, limits: &CoordinateLimits| {
+fn is_within_limits(plant: &ModelPlant<'_>, limits: &[ExcitationLimits], series: &[FourierSeries]) -> bool {
+    let within = |one: &FourierSeries, limits: &ExcitationLimits| {
         let ranges = [Some(limits.position), limits.rate, limits.acceleration];
         ranges.into_iter().enumerate().all(|(derivative, range)| {
             let [low, high] = one.extremes(derivative);
             range.is_none_or(|range| range[0] <= low && high <= range[1])
         })
     };
-    let excess = plant.excess(&Motion::sample(series, FINE));
+    let excess = plant.excess(&ExcitationMotion::sample(series, FINE));
     series.iter().zip(limits).all(|(s, l)| within(s, l))
         && excess.is_some_and(|all| all.iter().flatten().all(|excess| *excess <= 0.0))
 }
 
 /// Drives a rig along a trajectory: exact states and forces, as sensors without faults would read them. What remains
 /// between them and a model is then the model's doing.
-pub(crate) fn run(rig: &Rig, model: &Model, periodic: &Periodic, rate: f64) -> Outcome<Stretch> {
+pub(crate) fn run(rig: &Rig, model: &Model, periodic: &PeriodicTrajectory, rate: f64) -> Outcome<RecordingSegment> {
     let coordinates = model
-        .active()
+        .active_coordinates()
         .iter()
         .map(|name| rig.coordinates.iter().position(|c| c.name == *name))
         .collect::<Option<Vec<usize>>>();
@@ -113,26 +113,26 @@ pub(crate) fn run(rig: &Rig, model: &Model, periodic: &Periodic, rate: f64) -> O
         time.push(time.len() as f64 / rate);
     }
     let trajectory = Trajectory::from_function(time.clone(), |t| {
-        let mut state = State::default();
+        let mut state = RigState::default();
         let zeros = || vec![0.0; rig.coordinates.len()];
         (state.q, state.qd, state.qdd) = (zeros(), zeros(), zeros());
         for (series, k) in periodic.series.iter().zip(&coordinates) {
-            [state.q[*k], state.qd[*k], state.qdd[*k]] = series.at(t);
+            [state.q[*k], state.qd[*k], state.qdd[*k]] = series.at_time(t);
         }
         state
     })
     .map_err(|error| Error::input(format!("{}: {error}", rig.name)))?;
     let message = format!("simulating {}", rig.name);
-    let made = model.host().watched(&message, time.len(), |job| {
+    let made = model.host().run_job(&message, time.len(), |job| {
         modelmill_rig::forces_along(rig, &trajectory, &time, || job.add(1))
     })?;
     let instants = made.map_err(|error| Error::input(format!("{}: {error}", rig.name)))?;
-    let state = |of: fn(&State) -> &Vec<f64>| -> Vec<Vec<f64>> {
+    let state = |of: fn(&RigState) -> &Vec<f64>| -> Vec<Vec<f64>> {
         let column = |k: &usize| instants.iter().map(|i| of(&i.state)[*k]).collect();
         coordinates.iter().map(column).collect()
     };
     let force = |k: &usize| instants.iter().map(|i| i.forces[*k]).collect();
-    Ok(Stretch::from(Run {
+    Ok(RecordingSegment::from(PreparedRun {
         file: rig.name.clone(),
         q: state(|s| &s.q),
         qd: state(|s| &s.qd),
@@ -142,8 +142,8 @@ pub(crate) fn run(rig: &Rig, model: &Model, periodic: &Periodic, rate: f64) -> O
         left_out: Vec::new(),
         lines: (0..time.len() as u64).collect(),
         time,
-        repeats: None,
-        prepared: PreparedAs::default(),
+        repeatability: None,
+        prepared: PreparationRecord::default(),
         notes: Vec::new(),
     }))
 }

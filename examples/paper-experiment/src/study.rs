@@ -1,49 +1,49 @@
 //! The comparison itself: both treatments of m4 on runs of a rig, and how much of the error of the paper's treatment
 //! is the force of the misplaced mass.
 
-use modelmill_identify::interpret::{Interpretation, Physical, interpret};
-use modelmill_identify::{FitFile, Run};
+use modelmill_identify::interpret::{PhysicalInterpretation, PhysicalSolution, interpret};
+use modelmill_identify::{FitFile, PreparedRun};
 
 use crate::printed;
 use modelmill::Model;
 use modelmill::along;
-use modelmill::identify::{Estimation, Identification, identify, regression};
+use modelmill::identify::{EstimatorOptions, Identification, identify, regression};
 use modelmill::interpret as table_1;
-use modelmill::stretch::Stretch;
+use modelmill::stretch::RecordingSegment;
 use modelmill::{Error, Outcome};
 
 /// `[drive][sample]`
-pub(crate) type Columns = Vec<Vec<f64>>;
+pub(crate) type DriveColumns = Vec<Vec<f64>>;
 
 /// What Table 1 takes as unknown.
 pub(crate) const UNKNOWN: [&str; 5] = ["m2", "m4", "dc3", "Ic12", "Ic32"];
 
 /// One rig with both treatments.
-pub(crate) struct Bench {
+pub(crate) struct TreatmentStudy {
     /// Runs: identification, verification.
-    pub(crate) runs: [Along; 2],
+    pub(crate) runs: [TreatmentRun; 2],
     /// Fits of the paper's and of the consistent treatment.
     pub(crate) fits: [Identification; 2],
     /// Physical parameters of the paper's treatment, as in Table 1: all real solutions.
-    pub(crate) physical: Vec<Physical>,
+    pub(crate) physical: Vec<PhysicalSolution>,
 }
 
 /// A run of the rig with the forces of both treatments.
-pub(crate) struct Along {
+pub(crate) struct TreatmentRun {
     /// s
     pub(crate) time: Vec<f64>,
     /// What the rig needs.
-    pub(crate) measured: Columns,
+    pub(crate) measured: DriveColumns,
     /// `[treatment]`, the paper's first; with calculated and with estimated parameters.
-    pub(crate) calculated: [Columns; 2],
-    pub(crate) estimated: [Columns; 2],
+    pub(crate) calculated: [DriveColumns; 2],
+    pub(crate) estimated: [DriveColumns; 2],
     /// The paper's treatment with the parameters that the paper estimated on its own robot.
-    pub(crate) printed: Columns,
+    pub(crate) printed: DriveColumns,
 }
 
 /// How much of an error one known force explains.
 #[derive(Clone, Copy)]
-pub(crate) struct Explained {
+pub(crate) struct ExplainedError {
     /// 2-norm of the error that is left without that force, as a share of the error.
     pub(crate) remains: f64,
     /// Correlation of the error with that force.
@@ -52,7 +52,7 @@ pub(crate) struct Explained {
 
 /// Error figures of one drive.
 #[derive(Clone, Copy)]
-pub(crate) struct Errors {
+pub(crate) struct DriveErrors {
     /// Mean of |error| / |measured|.
     pub(crate) mean_relative: f64,
     /// Median of the same.
@@ -61,17 +61,17 @@ pub(crate) struct Errors {
     pub(crate) nrms: f64,
 }
 
-impl Bench {
+impl TreatmentStudy {
     /// Identifies both models on the first run and holds them against both.
     pub(crate) fn new(
         models: [&Model; 2],
-        identification: Stretch,
-        verification: Stretch,
+        identification: RecordingSegment,
+        verification: RecordingSegment,
     ) -> Outcome<Self> {
         let data = [identification];
         let check = [verification];
         let [paper, consistent] = models;
-        let plain = Estimation::default();
+        let plain = EstimatorOptions::default();
         let fits = [
             identify(paper, &data, &[], &check, &plain)?,
             identify(consistent, &data, &[], &check, &plain)?,
@@ -79,16 +79,16 @@ impl Bench {
         let physical = physical(paper, &fits[0].fit)?;
         let [identification] = &data;
         let [verification] = &check;
-        let along = |one: &Stretch| -> Outcome<Along> {
-            let forces = |values: [&[f64]; 2]| -> Outcome<[Columns; 2]> {
+        let along = |one: &RecordingSegment| -> Outcome<TreatmentRun> {
+            let forces = |values: [&[f64]; 2]| -> Outcome<[DriveColumns; 2]> {
                 Ok([
                     along::forces(paper, one, values[0])?,
                     along::forces(consistent, one, values[1])?,
                 ])
             };
-            Ok(Along {
+            Ok(TreatmentRun {
                 time: one.time(),
-                measured: along::measured(one)?,
+                measured: along::measured_forces(one)?,
                 calculated: forces([&paper.nominal, &consistent.nominal])?,
                 estimated: forces([&fits[0].values(), &fits[1].values()])?,
                 printed: along::forces(paper, one, &values_with(paper, &printed::ESTIMATED))?,
@@ -102,30 +102,30 @@ impl Bench {
     }
 }
 
-impl Along {
+impl TreatmentRun {
     /// Measured less modelled.
-    pub(crate) fn error(&self, modelled: &Columns) -> Columns {
+    pub(crate) fn error(&self, modelled: &DriveColumns) -> DriveColumns {
         difference(&self.measured, modelled)
     }
 
     /// What the platform's mass makes at its place and does not make where the paper puts it: the difference of both
     /// treatments, of models alone.
-    pub(crate) fn placement(&self) -> Columns {
+    pub(crate) fn placement(&self) -> DriveColumns {
         difference(&self.calculated[1], &self.calculated[0])
     }
 
     /// What the paper's own identification changed in the forces of its treatment, along this run.
-    pub(crate) fn printed_change(&self) -> Columns {
+    pub(crate) fn printed_change(&self) -> DriveColumns {
         difference(&self.printed, &self.calculated[0])
     }
 
     /// How much of the error of the paper's treatment the placement is, over all drives.
-    pub(crate) fn explained(&self) -> Explained {
-        explained(&self.error(&self.calculated[0]), &self.placement())
+    pub(crate) fn explained_error(&self) -> ExplainedError {
+        explain_error(&self.error(&self.calculated[0]), &self.placement())
     }
 
     /// Error figures of a drive for modelled forces.
-    pub(crate) fn errors(&self, drive: usize, modelled: &Columns) -> Errors {
+    pub(crate) fn errors(&self, drive: usize, modelled: &DriveColumns) -> DriveErrors {
         let pairs = || self.measured[drive].iter().zip(&modelled[drive]);
         let mut relative: Vec<f64> = pairs()
             .filter(|(y, _)| **y != 0.0)
@@ -134,7 +134,7 @@ impl Along {
         relative.sort_by(f64::total_cmp);
         let error: f64 = pairs().map(|(y, m)| (y - m).powi(2)).sum();
         let size: f64 = pairs().map(|(y, _)| y * y).sum();
-        Errors {
+        DriveErrors {
             mean_relative: relative.iter().sum::<f64>() / relative.len().max(1) as f64,
             median_relative: relative.get(relative.len() / 2).copied().unwrap_or(0.0),
             nrms: (error / size).sqrt(),
@@ -155,7 +155,7 @@ impl Along {
 
     /// Share of the samples of a drive whose force is below a share of its root mean square, and the share of the
     /// mean relative error that they make.
-    pub(crate) fn near_zero(&self, drive: usize, modelled: &Columns, below: f64) -> [f64; 2] {
+    pub(crate) fn near_zero(&self, drive: usize, modelled: &DriveColumns, below: f64) -> [f64; 2] {
         let force = &self.measured[drive];
         let n = force.len() as f64;
         let rms = (force.iter().map(|y| y * y).sum::<f64>() / n).sqrt();
@@ -177,18 +177,18 @@ impl Along {
 }
 
 /// How much of some forces others are, over all drives.
-pub(crate) fn explained(forces: &Columns, by: &Columns) -> Explained {
+pub(crate) fn explain_error(forces: &DriveColumns, by: &DriveColumns) -> ExplainedError {
     let (forces, by) = (forces.concat(), by.concat());
     let rest: Vec<f64> = forces.iter().zip(&by).map(|(e, d)| e - d).collect();
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let norm = |a: &[f64]| dot(a, a).sqrt();
-    Explained {
+    ExplainedError {
         remains: norm(&rest) / norm(&forces),
         correlation: dot(&forces, &by) / (norm(&forces) * norm(&by)),
     }
 }
 
-fn difference(a: &Columns, b: &Columns) -> Columns {
+fn difference(a: &DriveColumns, b: &DriveColumns) -> DriveColumns {
     let columns = a.iter().zip(b);
     columns
         .map(|(a, b)| a.iter().zip(b).map(|(a, b)| a - b).collect())
@@ -200,14 +200,14 @@ fn difference(a: &Columns, b: &Columns) -> Columns {
 pub(crate) fn consistent_values(
     paper: &Model,
     consistent: &Model,
-    data: &Stretch,
+    data: &RecordingSegment,
 ) -> Outcome<Vec<f64>> {
-    let run = Run {
+    let run = PreparedRun {
         force: Some(along::forces(consistent, data, &consistent.nominal)?),
         ..data.run.clone()
     };
     Ok(
-        regression::identify(paper, &[Stretch::from(run)], &[], &Estimation::default())?
+        regression::identify(paper, &[RecordingSegment::from(run)], &[], &EstimatorOptions::default())?
             .solution
             .values,
     )
@@ -229,16 +229,16 @@ pub(crate) fn values_with(model: &Model, changed: &[(&str, f64)]) -> Vec<f64> {
 }
 
 /// Table 1: all real solutions for the parameters that the paper takes as unknown.
-fn physical(model: &Model, fit: &FitFile) -> Outcome<Vec<Physical>> {
+fn physical(model: &Model, fit: &FitFile) -> Outcome<Vec<PhysicalSolution>> {
     let names = UNKNOWN.map(str::to_owned);
-    let unknown = table_1::unknown(model, &names)?;
+    let unknown = table_1::unknown_indices(model, &names)?;
     let values: Vec<f64> = fit.parameters.iter().map(|p| p.value).collect();
     let (system, _) = table_1::system(model, &unknown, &values, fit);
     match interpret(&system) {
         Ok(
-            Interpretation::Exact { solutions } | Interpretation::LeastSquares { solutions, .. },
+            PhysicalInterpretation::Exact { solutions } | PhysicalInterpretation::LeastSquares { solutions, .. },
         ) => Ok(solutions),
-        Ok(Interpretation::Undetermined { .. }) => Ok(Vec::new()),
+        Ok(PhysicalInterpretation::Undetermined { .. }) => Ok(Vec::new()),
         Err(error) => Err(Error::input(format!("{}: {error}", model.path))),
     }
 }

@@ -1,32 +1,32 @@
 //! Numbers as the page says them: largest and least over runs, shares, and errors with rounding shown as such.
 
-use crate::Experiment;
-use crate::study::Along;
+use crate::PaperExperiment;
+use crate::study::TreatmentRun;
 use modelmill::text::table::significant;
 
 /// Below this, an error is rounding; its digits differ from machine to machine and say nothing.
 const ROUNDING: f64 = 1e-8;
 
 /// A parameter's value in the left column of Table 1.
-pub(crate) fn nominal(experiment: &Experiment, name: &str) -> f64 {
+pub(crate) fn nominal(experiment: &PaperExperiment, name: &str) -> f64 {
     let parameters = &experiment.paper.derivation.mechanism.parameters;
     let found = parameters.iter().find(|p| p.name == name);
     found.map_or(f64::NAN, |p| p.nominal)
 }
 
 /// The largest of a figure over runs and drives.
-pub(crate) fn largest(runs: &[Along], of: impl Fn(&Along, usize) -> f64) -> f64 {
-    over(runs, of).fold(f64::NEG_INFINITY, f64::max)
+pub(crate) fn largest(runs: &[TreatmentRun], of: impl Fn(&TreatmentRun, usize) -> f64) -> f64 {
+    run_values(runs, of).fold(f64::NEG_INFINITY, f64::max)
 }
 
 /// The least.
-pub(crate) fn least(runs: &[Along], of: impl Fn(&Along, usize) -> f64) -> f64 {
-    over(runs, of).fold(f64::INFINITY, f64::min)
+pub(crate) fn least(runs: &[TreatmentRun], of: impl Fn(&TreatmentRun, usize) -> f64) -> f64 {
+    run_values(runs, of).fold(f64::INFINITY, f64::min)
 }
 
-fn over<'a>(
-    runs: &'a [Along],
-    of: impl Fn(&Along, usize) -> f64 + 'a,
+fn run_values<'a>(
+    runs: &'a [TreatmentRun],
+    of: impl Fn(&TreatmentRun, usize) -> f64 + 'a,
 ) -> impl Iterator<Item = f64> + 'a {
     let pairs = runs
         .iter()
@@ -35,10 +35,10 @@ fn over<'a>(
 }
 
 /// How much of the error the placement explains, in squares, at least over all runs.
-pub(crate) fn explained(runs: &[Along]) -> String {
+pub(crate) fn explained_text(runs: &[TreatmentRun]) -> String {
     let most = runs
         .iter()
-        .map(|along| along.explained().remains)
+        .map(|along| along.explained_error().remains)
         .fold(0.0, f64::max);
     share(1.0 - most * most)
 }

@@ -30,7 +30,7 @@ use crate::stores;
 const ATTEMPTS: usize = 4;
 
 /// What is asked, and of whom.
-pub(crate) struct Asked<'a> {
+pub(crate) struct QueryRequest<'a> {
     pub(crate) sql: &'a str,
     /// `NAME=FOLDER` each.
     pub(crate) tables: &'a [String],
@@ -42,15 +42,15 @@ pub(crate) struct Asked<'a> {
 /// Writes the answer to standard output.
 ///
 /// Fails where the query has no meaning, or nobody can answer it.
-pub(crate) async fn query(ground: &Arc<Ground>, asked: &Asked<'_>) -> Result<()> {
-    let session = session(asked).await?;
+pub(crate) async fn run_query(ground: &Arc<Ground>, asked: &QueryRequest<'_>) -> Result<()> {
+    let session = open_session(asked).await?;
     register(&session, ground);
     for table in asked.tables {
         register_table(&session, table).await?;
     }
-    let frame = flat(session.sql(asked.sql).await?)?;
+    let frame = flatten_structs(session.sql(asked.sql).await?)?;
     let batches = match asked.scheduler {
-        Some(url) => answer(&frame, url).await?,
+        Some(url) => collect_answer(&frame, url).await?,
         None => frame.collect().await?,
     };
     let mut header = true;
@@ -64,19 +64,19 @@ pub(crate) async fn query(ground: &Arc<Ground>, asked: &Asked<'_>) -> Result<()>
     Ok(())
 }
 
-async fn session(asked: &Asked<'_>) -> Result<SessionContext> {
+async fn open_session(asked: &QueryRequest<'_>) -> Result<SessionContext> {
     let Some(url) = asked.scheduler else {
         let config = SessionConfig::new().with_target_partitions(asked.partitions);
         return Ok(SessionContext::new_with_config_rt(
             config,
-            stores::runtime(None)?,
+            stores::runtime_environment(None)?,
         ));
     };
     let config = SessionConfig::new_with_ballista().with_target_partitions(asked.partitions);
     let state = SessionStateBuilder::new()
         .with_default_features()
         .with_config(config)
-        .with_runtime_env(stores::runtime(None)?)
+        .with_runtime_env(stores::runtime_environment(None)?)
         .build();
     SessionContext::remote_with_state(url, state).await
 }
@@ -103,7 +103,7 @@ async fn register_table(session: &SessionContext, table: &str) -> Result<()> {
 }
 
 /// The fields of structs as columns, since a struct has no place in CSV.
-fn flat(frame: DataFrame) -> Result<DataFrame> {
+fn flatten_structs(frame: DataFrame) -> Result<DataFrame> {
     let schema = frame.schema().clone();
     let mut columns = Vec::new();
     for (qualifier, field) in schema.iter() {
@@ -124,7 +124,7 @@ fn flat(frame: DataFrame) -> Result<DataFrame> {
 }
 
 /// The answer of executors, put again where one of them was lost.
-async fn answer(frame: &DataFrame, url: &str) -> Result<Vec<RecordBatch>> {
+async fn collect_answer(frame: &DataFrame, url: &str) -> Result<Vec<RecordBatch>> {
     let mut attempt = 1;
     loop {
         let plan = frame.clone().create_physical_plan().await?;

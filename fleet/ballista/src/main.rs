@@ -27,16 +27,16 @@ use modelmill_fleet_datafusion::aggregates;
 /// A fleet's aggregates over several computers.
 #[derive(Parser)]
 #[command(name = "modelmill-fleet-ballista", version)]
-struct Cli {
+struct BallistaCli {
     /// The plan, as `modelmill-fleet plan` writes it; the same for all processes.
     #[arg(long, global = true, default_value = "plan.json")]
     plan: PathBuf,
     #[command(subcommand)]
-    command: Command,
+    command: BallistaCommand,
 }
 
 #[derive(Subcommand)]
-enum Command {
+enum BallistaCommand {
     /// The scheduler.
     Scheduler {
         /// Host that it listens on.
@@ -88,7 +88,7 @@ enum Command {
 }
 
 fn main() -> ExitCode {
-    let cli = match Cli::try_parse() {
+    let cli = match BallistaCli::try_parse() {
         Ok(cli) => cli,
         Err(error) => {
             let status = u8::try_from(error.exit_code()).unwrap_or(2);
@@ -96,7 +96,7 @@ fn main() -> ExitCode {
             return ExitCode::from(status);
         }
     };
-    warnings::show();
+    warnings::show_warnings();
     // Plans are deep, and planners recurse.
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .enable_all()
@@ -114,7 +114,7 @@ fn main() -> ExitCode {
     }
 }
 
-fn ground(path: &Path) -> Result<Arc<Ground>, Fault> {
+fn load_fleet_model(path: &Path) -> Result<Arc<Ground>, Fault> {
     let text = std::fs::read_to_string(path).map_err(|error| {
         Fault::new(format!(
             "{} cannot be read: {error}; make a plan with `modelmill-fleet plan`",
@@ -129,15 +129,15 @@ fn ground(path: &Path) -> Result<Arc<Ground>, Fault> {
 /// Samples of a recording are long: messages between processes may be so large, in bytes.
 pub(crate) const LONGEST_MESSAGE: u32 = 256 << 20;
 
-async fn run(cli: Cli) -> Result<(), Fault> {
-    let ground = ground(&cli.plan)?;
+async fn run(cli: BallistaCli) -> Result<(), Fault> {
+    let ground = load_fleet_model(&cli.plan)?;
     match cli.command {
-        Command::Scheduler {
+        BallistaCommand::Scheduler {
             host,
             port,
             timeout,
         } => scheduler::serve(&ground, &host, port, timeout).await,
-        Command::Executor {
+        BallistaCommand::Executor {
             host,
             port,
             scheduler,
@@ -164,7 +164,7 @@ async fn run(cli: Cli) -> Result<(), Fault> {
                 })?;
             }
             let spilled = work.clone();
-            let runtime = move |_: &SessionConfig| stores::runtime(spilled.as_deref());
+            let runtime = move |_: &SessionConfig| stores::runtime_environment(spilled.as_deref());
             let config = ExecutorProcessConfig {
                 bind_host: host,
                 port,
@@ -185,19 +185,19 @@ async fn run(cli: Cli) -> Result<(), Fault> {
                 .await
                 .map_err(Fault::new)
         }
-        Command::Query {
+        BallistaCommand::Query {
             sql,
             tables,
             scheduler,
             partitions,
         } => {
-            let asked = client::Asked {
+            let asked = client::QueryRequest {
                 sql: &sql,
                 tables: &tables,
                 scheduler: scheduler.as_deref(),
                 partitions,
             };
-            client::query(&ground, &asked).await.map_err(Fault::new)
+            client::run_query(&ground, &asked).await.map_err(Fault::new)
         }
     }
 }

@@ -49,7 +49,7 @@ pub(crate) async fn serve(
         let all = known.chain(aggregates(&functions)).collect();
         Ok(SessionStateBuilder::new_from_existing(state)
             .with_aggregate_functions(all)
-            .with_runtime_env(stores::runtime(None)?)
+            .with_runtime_env(stores::runtime_environment(None)?)
             .build())
     };
     let config = SchedulerConfig {
@@ -79,7 +79,7 @@ pub(crate) async fn serve(
         session.unwrap_or_else(|| Arc::new(default_session_builder)),
         Arc::new(default_config_producer),
     ));
-    let cluster = Cluster {
+    let cluster = ExecutorCluster {
         known: InMemoryClusterState::default(),
         jobs: jobs.clone(),
         address,
@@ -94,14 +94,14 @@ pub(crate) async fn serve(
 }
 
 /// Ballista's picture of the executors, with one that is lost ending what runs.
-struct Cluster {
+struct ExecutorCluster {
     known: InMemoryClusterState,
     jobs: Arc<dyn JobState>,
     /// Of the scheduler itself.
     address: SocketAddr,
 }
 
-impl Cluster {
+impl ExecutorCluster {
     /// Ends all jobs that run; the scheduler has taken note of it when this returns.
     async fn end_jobs(&self) -> std::result::Result<usize, Fault> {
         let mut running = Vec::new();
@@ -131,7 +131,7 @@ impl Cluster {
 }
 
 #[async_trait]
-impl ClusterState for Cluster {
+impl ClusterState for ExecutorCluster {
     async fn remove_executor(&self, executor_id: &str) -> Result<()> {
         match self.end_jobs().await {
             Ok(ended) => {

@@ -11,8 +11,8 @@ use object_store::aws::AmazonS3Builder;
 use url::Url;
 
 /// What a process runs on: stores by URL, and a folder for what does not fit into memory, that of the system where none is given.
-pub(crate) fn runtime(spilled: Option<&Path>) -> Result<Arc<RuntimeEnv>> {
-    let runtime = RuntimeEnvBuilder::new().with_object_store_registry(Arc::new(Stores::default()));
+pub(crate) fn runtime_environment(spilled: Option<&Path>) -> Result<Arc<RuntimeEnv>> {
+    let runtime = RuntimeEnvBuilder::new().with_object_store_registry(Arc::new(ObjectStores::default()));
     match spilled {
         Some(folder) => runtime.with_temp_file_path(folder).build_arc(),
         None => runtime.build_arc(),
@@ -22,11 +22,11 @@ pub(crate) fn runtime(spilled: Option<&Path>) -> Result<Arc<RuntimeEnv>> {
 /// Stores that were registered, and a bucket where it is first asked for: `AWS_ACCESS_KEY_ID`, `AWS_SECRET_ACCESS_KEY`,
 /// `AWS_REGION`, `AWS_ENDPOINT`, `AWS_ALLOW_HTTP` and their like say who asks and where it is.
 #[derive(Debug, Default)]
-struct Stores {
+struct ObjectStores {
     known: DefaultObjectStoreRegistry,
 }
 
-impl ObjectStoreRegistry for Stores {
+impl ObjectStoreRegistry for ObjectStores {
     fn register_store(
         &self,
         url: &Url,

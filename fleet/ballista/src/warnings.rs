@@ -2,9 +2,9 @@
 
 use log::{LevelFilter, Log, Metadata, Record};
 
-struct Warnings;
+struct WarningLogger;
 
-impl Log for Warnings {
+impl Log for WarningLogger {
     fn enabled(&self, about: &Metadata<'_>) -> bool {
         about.level() <= log::max_level()
     }
@@ -23,9 +23,9 @@ impl Log for Warnings {
 }
 
 /// Shows warnings from now on.
-pub(crate) fn show() {
+pub(crate) fn show_warnings() {
     // A second logger could only come from a second call.
-    if log::set_logger(&Warnings).is_ok() {
+    if log::set_logger(&WarningLogger).is_ok() {
         log::set_max_level(LevelFilter::Warn);
     }
 }

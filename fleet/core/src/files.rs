@@ -2,37 +2,37 @@
 
 use std::path::{Path, PathBuf};
 
-use modelmill::files::{Disk, FileError, Files, Kind, Memory, Opened};
+use modelmill::files::{DiskFiles, FileError, FileSource, PathKind, MemoryFiles, OpenFile};
 
 /// What is in the plan comes from memory, all else from disk.
-pub(crate) struct Both {
-    pub(crate) memory: Memory,
-    pub(crate) disk: Disk,
+pub(crate) struct PlanFiles {
+    pub(crate) memory: MemoryFiles,
+    pub(crate) disk: DiskFiles,
 }
 
-impl Both {
-    fn at(&self, path: &Path) -> &dyn Files {
+impl PlanFiles {
+    fn files_for(&self, path: &Path) -> &dyn FileSource {
         match self.memory.kind(path) {
-            Kind::File => &self.memory,
+            PathKind::File => &self.memory,
             _ => &self.disk,
         }
     }
 }
 
-impl Files for Both {
+impl FileSource for PlanFiles {
     fn read(&self, path: &Path, most: u64) -> Result<Vec<u8>, FileError> {
-        self.at(path).read(path, most)
+        self.files_for(path).read(path, most)
     }
 
-    fn kind(&self, path: &Path) -> Kind {
-        self.at(path).kind(path)
+    fn kind(&self, path: &Path) -> PathKind {
+        self.files_for(path).kind(path)
     }
 
     fn list(&self, folder: &Path) -> Result<Vec<PathBuf>, FileError> {
         self.disk.list(folder)
     }
 
-    fn open(&self, path: &Path, most: u64) -> Result<Opened, FileError> {
-        self.at(path).open(path, most)
+    fn open(&self, path: &Path, most: u64) -> Result<OpenFile, FileError> {
+        self.files_for(path).open(path, most)
     }
 }

@@ -4,13 +4,13 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use modelmill::recording::has_ending_of_a_recording;
+use modelmill::recording::has_recording_extension;
 
-use crate::Fault;
+use crate::FleetFault;
 
 /// A recording that is a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct File {
+pub struct FleetFile {
     /// Its path below the folder, with `/`; what messages call it.
     pub name: String,
     /// Where it is.
@@ -24,28 +24,28 @@ pub struct File {
 /// Recordings below a folder by robot, each in the order of day and name.
 ///
 /// Fails where the folder cannot be read, or holds no recording whose robot is known.
-pub fn robots(folder: &Path) -> Result<BTreeMap<String, Vec<File>>, Fault> {
+pub fn robots(folder: &Path) -> Result<BTreeMap<String, Vec<FleetFile>>, FleetFault> {
     let mut paths = Vec::new();
     walk(folder, &mut paths)?;
     let mut found = Vec::new();
     for path in paths {
         let below = path.strip_prefix(folder).unwrap_or(&path);
         let parts: Vec<_> = below.iter().map(|part| part.to_string_lossy()).collect();
-        let about = fs::metadata(&path).map_err(|error| unread(&path, &error))?;
+        let about = fs::metadata(&path).map_err(|error| read_fault(&path, &error))?;
         let changed = about.modified().ok();
         let changed = changed.and_then(|at| at.duration_since(std::time::UNIX_EPOCH).ok());
-        found.push(Found {
+        found.push(FolderEntry {
             name: parts.join("/"),
             version: format!("{} {}", about.len(), changed.map_or(0, |at| at.as_nanos())),
             path,
         });
     }
-    by_robot(&folder.display(), found)
+    group_by_robot(&folder.display(), found)
 }
 
 /// A file or object that was found below a folder.
 #[derive(Clone, Debug)]
-pub struct Found {
+pub struct FolderEntry {
     /// Its path below the folder, with `/`.
     pub name: String,
     /// Where it is.
@@ -58,24 +58,24 @@ pub struct Found {
 /// the endings of names, nothing is said.
 ///
 /// Fails where there is no recording, or the path of one names no robot.
-pub fn by_robot(
+pub fn group_by_robot(
     folder: &dyn std::fmt::Display,
-    found: impl IntoIterator<Item = Found>,
-) -> Result<BTreeMap<String, Vec<File>>, Fault> {
-    let mut robots: BTreeMap<String, Vec<File>> = BTreeMap::new();
+    found: impl IntoIterator<Item = FolderEntry>,
+) -> Result<BTreeMap<String, Vec<FleetFile>>, FleetFault> {
+    let mut robots: BTreeMap<String, Vec<FleetFile>> = BTreeMap::new();
     for one in found {
-        if !has_ending_of_a_recording(&one.path) {
+        if !has_recording_extension(&one.path) {
             continue;
         }
         let parts: Vec<String> = one.name.split('/').map(str::to_owned).collect();
-        let Some((robot, day)) = place(&parts) else {
-            return Err(Fault::new(format!(
+        let Some((robot, day)) = robot_and_day(&parts) else {
+            return Err(FleetFault::new(format!(
                 "{folder}: the path of {} names no robot; put recordings below folders such as `robot=R1/day=2026-03-01`, or \
                  `R1/2026-03-01`",
                 one.name
             )));
         };
-        robots.entry(robot).or_default().push(File {
+        robots.entry(robot).or_default().push(FleetFile {
             key: format!("{} {}", one.name, one.version),
             name: one.name,
             path: one.path,
@@ -83,7 +83,7 @@ pub fn by_robot(
         });
     }
     if robots.is_empty() {
-        return Err(Fault::new(format!(
+        return Err(FleetFault::new(format!(
             "{folder} holds no recordings (Parquet, CSV, MATLAB, HDF5, MCAP); give the folder above those of the robots"
         )));
     }
@@ -93,19 +93,19 @@ pub fn by_robot(
     Ok(robots)
 }
 
-fn unread(path: &Path, error: &std::io::Error) -> Fault {
-    Fault::new(format!(
+fn read_fault(path: &Path, error: &std::io::Error) -> FleetFault {
+    FleetFault::new(format!(
         "{} cannot be read: {error}; check the path and who may read it",
         path.display()
     ))
 }
 
-fn walk(folder: &Path, found: &mut Vec<PathBuf>) -> Result<(), Fault> {
-    let entries = fs::read_dir(folder).map_err(|error| unread(folder, &error))?;
+fn walk(folder: &Path, found: &mut Vec<PathBuf>) -> Result<(), FleetFault> {
+    let entries = fs::read_dir(folder).map_err(|error| read_fault(folder, &error))?;
     let mut entries: Vec<PathBuf> = entries
         .map(|entry| entry.map(|entry| entry.path()))
         .collect::<Result<_, _>>()
-        .map_err(|error| unread(folder, &error))?;
+        .map_err(|error| read_fault(folder, &error))?;
     entries.sort();
     for path in entries {
         if path.is_dir() {
@@ -118,7 +118,7 @@ fn walk(folder: &Path, found: &mut Vec<PathBuf>) -> Result<(), Fault> {
 }
 
 /// Robot and day of a path: by `robot=` and `day=`, else by the first folder and the second, or what the name begins with.
-fn place(parts: &[String]) -> Option<(String, String)> {
+fn robot_and_day(parts: &[String]) -> Option<(String, String)> {
     let named = |key: &str| {
         parts
             .iter()
@@ -148,11 +148,11 @@ fn place(parts: &[String]) -> Option<(String, String)> {
 }
 
 /// Writes a file as a whole or not at all. Fails where the place cannot be written to.
-pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Fault> {
+pub fn write_atomic(path: &Path, bytes: &[u8]) -> Result<(), FleetFault> {
     let beside = path.with_extension("part");
     let written = fs::write(&beside, bytes).and_then(|()| fs::rename(&beside, path));
     written.map_err(|error| {
-        Fault::new(format!(
+        FleetFault::new(format!(
             "{} cannot be written: {error}; choose another place, or make room",
             path.display()
         ))
@@ -161,13 +161,13 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Fault> {
 
 #[cfg(test)]
 mod tests {
-    use super::place;
+    use super::robot_and_day;
 
     #[track_caller]
     fn check(path: &str, expected: Option<(&str, &str)>) {
         let parts: Vec<String> = path.split('/').map(str::to_owned).collect();
         let expected = expected.map(|(robot, day)| (robot.to_owned(), day.to_owned()));
-        assert_eq!(place(&parts), expected);
+        assert_eq!(robot_and_day(&parts), expected);
     }
 
     #[test]

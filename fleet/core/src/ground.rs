@@ -2,39 +2,39 @@
 
 use std::path::Path;
 
-use modelmill::recording::Recording;
-use modelmill::runs::{CommonGround, Fitted};
+use modelmill::recording::PreparedRecording;
+use modelmill::runs::{ReferenceFit, FittedValue};
 use modelmill_identify::ParameterInfo;
 use serde_json::{Value, json};
 
 use crate::sensors::{self, SensorFault};
-use crate::summary::{Bad, Summary};
-use crate::{Fault, Plan};
+use crate::summary::{BadRecording, FleetSummary};
+use crate::{FleetFault, FleetPlan};
 
 /// A plan with its model derived. It may be shared by threads.
 #[derive(Clone)]
-pub struct Ground {
-    plan: Plan,
+pub struct FleetModel {
+    plan: FleetPlan,
     mark: u64,
-    pub(crate) common: CommonGround,
+    pub(crate) common: ReferenceFit,
     still: Vec<(String, bool, f64)>,
 }
 
 /// What summaries say of the parameters.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Fit {
+pub struct FleetFit {
     /// Base parameters in the order of the model.
-    pub parameters: Vec<Fitted>,
+    pub parameters: Vec<FittedValue>,
     /// For each drive what the recordings' own parameters leave of its force, as a part of it.
-    pub left: Vec<f64>,
+    pub residual_shares: Vec<f64>,
     /// Recordings that gave an answer.
     pub recordings: u64,
     /// Recordings that gave none.
     pub bad: usize,
 }
 
-impl Ground {
-    pub(crate) fn new(plan: Plan, common: CommonGround) -> Self {
+impl FleetModel {
+    pub(crate) fn new(plan: FleetPlan, common: ReferenceFit) -> Self {
         let drives = common.model().drives();
         let usual = plan.reference.still.iter();
         let still = usual.map(|(name, still)| (name.clone(), drives.contains(name), *still));
@@ -47,7 +47,7 @@ impl Ground {
     }
 
     /// The plan.
-    pub fn plan(&self) -> &Plan {
+    pub fn plan(&self) -> &FleetPlan {
         &self.plan
     }
 
@@ -58,14 +58,14 @@ impl Ground {
 
     /// The base parameters, in the order in which fits have them.
     pub fn parameters(&self) -> Vec<ParameterInfo> {
-        self.common.model().infos()
+        self.common.model().parameter_infos()
     }
 
     /// Names of the columns that a recording must have: time, coordinates, then drives.
     pub fn columns(&self) -> Vec<String> {
         let model = self.common.model();
         let time = std::iter::once("t".to_owned());
-        time.chain(model.active()).chain(model.drives()).collect()
+        time.chain(model.active_coordinates()).chain(model.drives()).collect()
     }
 
     /// Names of the drives.
@@ -74,48 +74,48 @@ impl Ground {
     }
 
     /// The summary of no recordings.
-    pub fn empty(&self) -> Summary {
-        Summary::empty(self.mark, self.common.n_columns(), self.drives().len())
+    pub fn empty_summary(&self) -> FleetSummary {
+        FleetSummary::empty(self.mark, self.common.n_columns(), self.drives().len())
     }
 
     /// Summarises one recording whose columns are in memory, in SI units, with their names; the rows may be in any order, which
     /// is that of column `t`. What is wrong with it stands in the summary.
-    pub fn summarise(&self, name: &str, columns: Vec<(String, Vec<f64>)>) -> Summary {
-        let read = in_order(columns).and_then(|columns| {
+    pub fn summarise(&self, name: &str, columns: Vec<(String, Vec<f64>)>) -> FleetSummary {
+        let read = sort_by_time(columns).and_then(|columns| {
             let model = self.common.model();
             Ok(model.recording_of_table(name, columns, &self.plan.reading())?)
         });
-        self.summed(name, read)
+        self.summary_or_bad(name, read)
     }
 
     /// Summarises one recording that is a file, under a name that may be another than its path's.
-    pub fn summarise_file(&self, name: &str, path: &Path) -> Summary {
+    pub fn summarise_file(&self, name: &str, path: &Path) -> FleetSummary {
         let model = self.common.model();
         let read = model.recording(path, &self.plan.reading());
-        self.summed(name, read.map_err(Fault::from))
+        self.summary_or_bad(name, read.map_err(FleetFault::from))
     }
 
     /// As [`Ground::summarise_file`], of a file that is in memory, such as an object of a store; the ending of its name says what it
     /// is.
-    pub fn summarise_bytes(&self, name: &str, bytes: Vec<u8>) -> Summary {
+    pub fn summarise_bytes(&self, name: &str, bytes: Vec<u8>) -> FleetSummary {
         let model = self.common.model();
         let read = model.recording_of_bytes(name, bytes, &self.plan.reading());
-        self.summed(name, read.map_err(Fault::from))
+        self.summary_or_bad(name, read.map_err(FleetFault::from))
     }
 
-    fn summed(&self, name: &str, recording: Result<Recording, Fault>) -> Summary {
+    fn summary_or_bad(&self, name: &str, recording: Result<PreparedRecording, FleetFault>) -> FleetSummary {
         recording
-            .and_then(|recording| self.sums(name, recording))
-            .unwrap_or_else(|fault| Summary {
-                bad: vec![Bad {
+            .and_then(|recording| self.sum_recording(name, recording))
+            .unwrap_or_else(|fault| FleetSummary {
+                bad: vec![BadRecording {
                     recording: name.to_owned(),
                     says: fault.to_string(),
                 }],
-                ..self.empty()
+                ..self.empty_summary()
             })
     }
 
-    fn sums(&self, name: &str, mut recording: Recording) -> Result<Summary, Fault> {
+    fn sum_recording(&self, name: &str, mut recording: PreparedRecording) -> Result<FleetSummary, FleetFault> {
         let time = recording.raw_column("t").unwrap_or_default();
         let columns: Vec<(&str, bool, &[f64], f64)> = self
             .still
@@ -124,7 +124,7 @@ impl Ground {
                 Some((of.as_str(), *is_force, recording.raw_column(of)?, *usual))
             })
             .collect();
-        let sensors = sensors::faults(name, time, &columns);
+        let sensors = sensors::sensor_faults(name, time, &columns);
         let samples = time.len() as u64;
         let seconds = match time {
             [first, .., last] => last - first,
@@ -138,34 +138,34 @@ impl Ground {
                 encoder.of,
                 100.0 * encoder.still
             );
-            return Ok(Summary {
-                bad: vec![Bad {
+            return Ok(FleetSummary {
+                bad: vec![BadRecording {
                     recording: name.to_owned(),
                     says,
                 }],
                 sensors,
-                ..self.empty()
+                ..self.empty_summary()
             });
         }
-        leave_out(&mut recording, &drives, &sensors);
+        exclude_dead_sensors(&mut recording, &drives, &sensors);
         let sums = self.common.sums(&recording)?;
         let is_dead = |drive: &String| sensors.iter().any(|one| one.of == *drive);
-        let left = drives.iter().zip(&sums.left).map(|(drive, left)| {
+        let left = drives.iter().zip(&sums.residual_ratios).map(|(drive, left)| {
             if is_dead(drive) {
                 0.0
             } else {
                 left * left * samples as f64
             }
         });
-        Ok(Summary {
+        Ok(FleetSummary {
             mark: self.mark,
             recordings: 1,
             samples,
             seconds,
             base: Some(sums.base),
-            whole: sums.whole,
+            all_columns: sums.total,
             within: sums.within,
-            left: left.collect(),
+            residual_squares: left.collect(),
             remarks: (sums.events.iter())
                 .map(|event| (name.to_owned(), event.says.clone()))
                 .collect(),
@@ -177,8 +177,8 @@ impl Ground {
     /// Base parameters with deviations; parameters that the recordings do not determine have none.
     ///
     /// Fails where the summary is of another plan, or of no recordings.
-    pub fn solve(&self, summary: &Summary) -> Result<Fit, Fault> {
-        self.check(summary)?;
+    pub fn solve(&self, summary: &FleetSummary) -> Result<FleetFit, FleetFault> {
+        self.check_plan(summary)?;
         let Some(base) = &summary.base else {
             let why = match summary.bad.as_slice() {
                 [] => "it is of none".to_owned(),
@@ -189,31 +189,31 @@ impl Ground {
                     first.says
                 ),
             };
-            return Err(Fault::new(format!(
+            return Err(FleetFault::new(format!(
                 "this summary holds no recording that could be used: {why}"
             )));
         };
-        Ok(Fit {
-            parameters: self.common.fitted(base)?,
-            left: (0..summary.left.len()).map(|d| summary.left(d)).collect(),
+        Ok(FleetFit {
+            parameters: self.common.fit_parameters(base)?,
+            residual_shares: (0..summary.residual_squares.len()).map(|d| summary.residual_share(d)).collect(),
             recordings: summary.recordings,
             bad: summary.bad.len(),
         })
     }
 
     /// Fails where a summary is of another plan.
-    pub fn check(&self, summary: &Summary) -> Result<(), Fault> {
+    pub fn check_plan(&self, summary: &FleetSummary) -> Result<(), FleetFault> {
         if summary.mark == self.mark {
             Ok(())
         } else {
-            Err(Fault::new(
+            Err(FleetFault::new(
                 "this summary was made with another plan; summarise its recordings with this one, or take the other plan",
             ))
         }
     }
 
     /// A fit as JSON: `parameters` with `name`, `expression`, `value`, `std` (null where not determined) and `unit`.
-    pub fn json(&self, fit: &Fit) -> Value {
+    pub fn json(&self, fit: &FleetFit) -> Value {
         let parameters = self.parameters();
         let parameters = parameters
             .iter()
@@ -229,7 +229,7 @@ impl Ground {
             });
         json!({
             "parameters": parameters.collect::<Vec<_>>(),
-            "left": self.drives().into_iter().zip(fit.left.iter().map(|x| json!(x))).collect::<serde_json::Map<_, _>>(),
+            "left": self.drives().into_iter().zip(fit.residual_shares.iter().map(|x| json!(x))).collect::<serde_json::Map<_, _>>(),
             "recordings": fit.recordings,
             "bad": fit.bad,
         })
@@ -237,14 +237,14 @@ impl Ground {
 }
 
 /// The forces of sensors that died count in no equation.
-fn leave_out(recording: &mut Recording, drives: &[String], sensors: &[SensorFault]) {
+fn exclude_dead_sensors(recording: &mut PreparedRecording, drives: &[String], sensors: &[SensorFault]) {
     let is_dead: Vec<bool> = (drives.iter())
         .map(|drive| sensors.iter().any(|one| one.is_force && one.of == *drive))
         .collect();
     if !is_dead.contains(&true) {
         return;
     }
-    for stretch in &mut recording.stretches {
+    for stretch in &mut recording.segments {
         let run = &mut stretch.run;
         if run.left_out.is_empty() {
             run.left_out = vec![vec![false; run.time.len()]; drives.len()];
@@ -261,7 +261,7 @@ fn leave_out(recording: &mut Recording, drives: &[String], sensors: &[SensorFaul
 }
 
 /// Columns in the order of time. Rows of equal time stay as they are, and are refused later.
-fn in_order(mut columns: Vec<(String, Vec<f64>)>) -> Result<Vec<(String, Vec<f64>)>, Fault> {
+fn sort_by_time(mut columns: Vec<(String, Vec<f64>)>) -> Result<Vec<(String, Vec<f64>)>, FleetFault> {
     let Some((_, time)) = columns.iter().find(|(name, _)| name == "t") else {
         // The reader of recordings says what is missing, and knows what the plan maps onto time.
         return Ok(columns);
@@ -271,7 +271,7 @@ fn in_order(mut columns: Vec<(String, Vec<f64>)>) -> Result<Vec<(String, Vec<f64
     }
     let n = time.len();
     if let Some((name, other)) = columns.iter().find(|(_, values)| values.len() != n) {
-        return Err(Fault::new(format!(
+        return Err(FleetFault::new(format!(
             "column `t` has {n} numbers and column `{name}` has {}; all columns need one for each sample",
             other.len()
         )));

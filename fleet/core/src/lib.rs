@@ -23,32 +23,32 @@ pub mod robot;
 mod sensors;
 mod summary;
 
-pub use ground::{Fit, Ground};
-pub use modelmill::runs::Fitted;
-pub use plan::{Plan, Reference};
-pub use sensors::{SensorFault, Silence};
-pub use summary::{Bad, Summary};
+pub use ground::{FleetFit, FleetModel};
+pub use modelmill::runs::FittedValue;
+pub use plan::{FleetPlan, FleetReference};
+pub use sensors::{SensorFault, FrozenReading};
+pub use summary::{BadRecording, FleetSummary};
 
 /// Why something cannot be done, in one sentence with a remedy.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Fault(String);
+pub struct FleetFault(String);
 
-impl Fault {
+impl FleetFault {
     /// A fault from anything that can say what it is.
     pub fn new(says: impl std::fmt::Display) -> Self {
         Self(says.to_string())
     }
 }
 
-impl std::fmt::Display for Fault {
+impl std::fmt::Display for FleetFault {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(&self.0)
     }
 }
 
-impl std::error::Error for Fault {}
+impl std::error::Error for FleetFault {}
 
-impl From<modelmill::Error> for Fault {
+impl From<modelmill::Error> for FleetFault {
     fn from(error: modelmill::Error) -> Self {
         // A model's findings are a text of their own.
         match error {

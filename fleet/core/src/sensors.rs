@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 /// A reading stands still for so much more of a recording than it does on sound machines.
-const MORE: f64 = 0.2;
+const FROZEN_MARGIN: f64 = 0.2;
 
 /// A sensor whose reading stood still.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -22,16 +22,16 @@ pub struct SensorFault {
 
 /// How long a reading stood still.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Silence {
+pub struct FrozenReading {
     /// The first sample of the longest stretch of equal readings.
     pub from: usize,
     /// How many samples that is.
     pub samples: usize,
 }
 
-impl Silence {
+impl FrozenReading {
     /// The longest stretch of equal readings.
-    pub fn of(values: &[f64]) -> Self {
+    pub fn from_values(values: &[f64]) -> Self {
         let mut longest = Self {
             from: 0,
             samples: 0,
@@ -53,14 +53,14 @@ impl Silence {
     }
 
     /// The longest stretch of equal readings, as a part of all.
-    pub fn longest(values: &[f64]) -> f64 {
-        Self::of(values).samples as f64 / values.len().max(1) as f64
+    pub fn longest_share(values: &[f64]) -> f64 {
+        Self::from_values(values).samples as f64 / values.len().max(1) as f64
     }
 }
 
 /// Which sensors died; `columns` are the readings of coordinates and drives, each with for how long it stands still on sound
 /// machines, in order of time.
-pub(crate) fn faults(
+pub(crate) fn sensor_faults(
     recording: &str,
     time: &[f64],
     columns: &[(&str, bool, &[f64], f64)],
@@ -68,9 +68,9 @@ pub(crate) fn faults(
     let n = time.len();
     let mut faults = Vec::new();
     for (k, (name, is_force, values, usual)) in columns.iter().enumerate() {
-        let silence = Silence::of(values);
+        let silence = FrozenReading::from_values(values);
         let still = silence.samples as f64 / n.max(1) as f64;
-        if still <= usual + MORE {
+        if still <= usual + FROZEN_MARGIN {
             continue;
         }
         let within = silence.from..silence.from + silence.samples;
@@ -82,7 +82,7 @@ pub(crate) fn faults(
                 let of = &values[within.clone()];
                 other != k
                     && !is_force
-                    && Silence::of(of).samples as f64 / of.len().max(1) as f64 <= usual + MORE
+                    && FrozenReading::from_values(of).samples as f64 / of.len().max(1) as f64 <= usual + FROZEN_MARGIN
             });
         if moves {
             faults.push(SensorFault {
@@ -110,7 +110,7 @@ mod tests {
             .collect();
         let still = vec![1.0; 100];
         let look = |q: &[f64], f: &[f64]| {
-            faults("r", &time, &[("q", false, q, 0.05), ("f", true, f, 0.05)])
+            sensor_faults("r", &time, &[("q", false, q, 0.05), ("f", true, f, 0.05)])
         };
         assert_eq!(look(&moving, &moving), []);
         let found = look(&moving, &dead);
@@ -121,7 +121,7 @@ mod tests {
         assert!((found[0].since - 0.6).abs() < 1e-12);
         // A machine that stands has no dead sensors.
         assert_eq!(look(&still, &still), []);
-        assert_eq!(Silence::of(&[]).samples, 0);
-        assert!((Silence::longest(&[1.0, 2.0, 2.0, 3.0]) - 0.5).abs() < 1e-12);
+        assert_eq!(FrozenReading::from_values(&[]).samples, 0);
+        assert!((FrozenReading::longest_share(&[1.0, 2.0, 2.0, 3.0]) - 0.5).abs() < 1e-12);
     }
 }

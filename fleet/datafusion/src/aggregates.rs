@@ -16,11 +16,11 @@ use datafusion::logical_expr::{
 };
 use modelmill_fleet::{Ground, Summary};
 
-use crate::samples::{Samples, external};
+use crate::samples::{GroupSamples, external_error};
 
 /// What an aggregate gives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Answer {
+pub enum AggregateKind {
     /// `modelmill_summarise`: of samples the summary, as bytes.
     Summary,
     /// `modelmill_merge`: of summaries their sum, as bytes.
@@ -29,7 +29,7 @@ pub enum Answer {
     Parameters,
 }
 
-impl Answer {
+impl AggregateKind {
     fn name(self) -> &'static str {
         match self {
             Self::Summary => "modelmill_summarise",
@@ -41,24 +41,24 @@ impl Answer {
 
 /// An aggregate over a plan.
 #[derive(Clone)]
-pub struct Fleet {
+pub struct FleetAggregate {
     ground: Arc<Ground>,
-    answer: Answer,
+    answer: AggregateKind,
     signature: Signature,
     columns: Vec<String>,
 }
 
-impl Fleet {
+impl FleetAggregate {
     /// The aggregate that gives such an answer.
-    pub fn new(ground: Arc<Ground>, answer: Answer) -> Self {
+    pub fn new(ground: Arc<Ground>, answer: AggregateKind) -> Self {
         let columns = ground.columns();
         let numbers = vec![DataType::Float64; columns.len()];
         let samples = TypeSignature::Exact([vec![DataType::Utf8], numbers].concat());
         let summaries = TypeSignature::Exact(vec![DataType::Binary]);
         let signature = match answer {
-            Answer::Summary => samples,
-            Answer::Merged => summaries,
-            Answer::Parameters => TypeSignature::OneOf(vec![summaries, samples]),
+            AggregateKind::Summary => samples,
+            AggregateKind::Merged => summaries,
+            AggregateKind::Parameters => TypeSignature::OneOf(vec![summaries, samples]),
         };
         Self {
             ground,
@@ -81,28 +81,28 @@ impl Fleet {
     }
 }
 
-impl fmt::Debug for Fleet {
+impl fmt::Debug for FleetAggregate {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.answer.name())
     }
 }
 
-impl PartialEq for Fleet {
+impl PartialEq for FleetAggregate {
     fn eq(&self, other: &Self) -> bool {
         self.answer == other.answer && self.ground.mark() == other.ground.mark()
     }
 }
 
-impl Eq for Fleet {}
+impl Eq for FleetAggregate {}
 
-impl Hash for Fleet {
+impl Hash for FleetAggregate {
     fn hash<H: Hasher>(&self, state: &mut H) {
         self.answer.hash(state);
         self.ground.mark().hash(state);
     }
 }
 
-impl AggregateUDFImpl for Fleet {
+impl AggregateUDFImpl for FleetAggregate {
     fn name(&self) -> &str {
         self.answer.name()
     }
@@ -113,8 +113,8 @@ impl AggregateUDFImpl for Fleet {
 
     fn return_type(&self, _: &[DataType]) -> Result<DataType> {
         Ok(match self.answer {
-            Answer::Summary | Answer::Merged => DataType::Binary,
-            Answer::Parameters => DataType::Struct(self.fields()),
+            AggregateKind::Summary | AggregateKind::Merged => DataType::Binary,
+            AggregateKind::Parameters => DataType::Struct(self.fields()),
         })
     }
 
@@ -125,9 +125,9 @@ impl AggregateUDFImpl for Fleet {
                 self.name()
             );
         }
-        Ok(Box::new(Summing {
+        Ok(Box::new(SummaryAccumulator {
             fleet: self.clone(),
-            samples: Samples::default(),
+            samples: GroupSamples::default(),
             sum: None,
             of_samples: args.expr_fields.len() > 1,
         }))
@@ -144,25 +144,25 @@ impl AggregateUDFImpl for Fleet {
 
 /// A group on the way.
 #[derive(Debug)]
-struct Summing {
-    fleet: Fleet,
-    samples: Samples,
+struct SummaryAccumulator {
+    fleet: FleetAggregate,
+    samples: GroupSamples,
     sum: Option<Summary>,
     of_samples: bool,
 }
 
-impl Summing {
+impl SummaryAccumulator {
     fn add(&mut self, bytes: &[u8]) -> Result<()> {
-        let one = Summary::of_bytes(bytes).map_err(external)?;
-        self.fleet.ground.check(&one).map_err(external)?;
+        let one = Summary::of_bytes(bytes).map_err(external_error)?;
+        self.fleet.ground.check(&one).map_err(external_error)?;
         match &mut self.sum {
             None => self.sum = Some(one),
-            Some(sum) => sum.merge(&one).map_err(external)?,
+            Some(sum) => sum.merge(&one).map_err(external_error)?,
         }
         Ok(())
     }
 
-    fn each(values: &[ArrayRef], look: impl FnMut(&[u8]) -> Result<()>) -> Result<()> {
+    fn for_each_summary(values: &[ArrayRef], look: impl FnMut(&[u8]) -> Result<()>) -> Result<()> {
         let Some(column) = values.first() else {
             return exec_err!("a summary is missing; give a column of summaries");
         };
@@ -173,7 +173,7 @@ impl Summing {
         column.iter().flatten().try_for_each(look)
     }
 
-    fn summed(&mut self) -> Result<Option<Summary>> {
+    fn finish_sum(&mut self) -> Result<Option<Summary>> {
         if self.of_samples {
             let fleet = self.fleet.clone();
             return self
@@ -185,17 +185,17 @@ impl Summing {
     }
 }
 
-impl Accumulator for Summing {
+impl Accumulator for SummaryAccumulator {
     fn update_batch(&mut self, values: &[ArrayRef]) -> Result<()> {
         if self.of_samples {
             self.samples.add(values)
         } else {
-            Self::each(values, |bytes| self.add(bytes))
+            Self::for_each_summary(values, |bytes| self.add(bytes))
         }
     }
 
     fn merge_batch(&mut self, states: &[ArrayRef]) -> Result<()> {
-        Self::each(states, |bytes| {
+        Self::for_each_summary(states, |bytes| {
             if self.of_samples {
                 self.samples.add_bytes(bytes)
             } else {
@@ -214,10 +214,10 @@ impl Accumulator for Summing {
     }
 
     fn evaluate(&mut self) -> Result<ScalarValue> {
-        let sum = self.summed()?;
+        let sum = self.finish_sum()?;
         match self.fleet.answer {
-            Answer::Summary | Answer::Merged => Ok(ScalarValue::Binary(sum.map(|sum| sum.bytes()))),
-            Answer::Parameters => {
+            AggregateKind::Summary | AggregateKind::Merged => Ok(ScalarValue::Binary(sum.map(|sum| sum.bytes()))),
+            AggregateKind::Parameters => {
                 let sum = sum.unwrap_or_else(|| self.fleet.ground.empty());
                 // A group without a usable recording has counts and no parameters.
                 let fit = self.fleet.ground.solve(&sum).ok();

@@ -28,14 +28,14 @@ use datafusion::execution::context::SessionContext;
 use datafusion::logical_expr::AggregateUDF;
 use modelmill_fleet::Ground;
 
-pub use aggregates::{Answer, Fleet};
-pub use recordings::Recordings;
+pub use aggregates::{AggregateKind, FleetAggregate};
+pub use recordings::RecordingsFunction;
 
 /// All aggregates over a plan, by which function registries of schedulers and executors are filled.
 pub fn aggregates(ground: &Arc<Ground>) -> Vec<Arc<AggregateUDF>> {
-    [Answer::Summary, Answer::Merged, Answer::Parameters]
+    [AggregateKind::Summary, AggregateKind::Merged, AggregateKind::Parameters]
         .into_iter()
-        .map(|answer| Arc::new(AggregateUDF::from(Fleet::new(ground.clone(), answer))))
+        .map(|answer| Arc::new(AggregateUDF::from(FleetAggregate::new(ground.clone(), answer))))
         .collect()
 }
 
@@ -46,6 +46,6 @@ pub fn register(session: &SessionContext, ground: &Arc<Ground>) {
     }
     session.register_udtf(
         "modelmill_recordings",
-        Arc::new(Recordings::new(ground.clone())),
+        Arc::new(RecordingsFunction::new(ground.clone())),
     );
 }

@@ -21,29 +21,29 @@ use futures::{StreamExt, TryStreamExt};
 use modelmill_fleet::folder::{File, Found, by_robot, robots};
 use modelmill_fleet::{Ground, Summary};
 
-use crate::samples::external;
+use crate::samples::external_error;
 
 /// `modelmill_recordings('folder')`: `robot`, `day`, `recording`, `summary`, and `bad` with the reason where it gave no answer. The
 /// folder is a path or the URL of one, such as `s3://bucket/folder`, in a store that the session knows.
 #[derive(Clone)]
-pub struct Recordings {
+pub struct RecordingsFunction {
     ground: Arc<Ground>,
 }
 
-impl Recordings {
+impl RecordingsFunction {
     /// The function over a plan.
     pub fn new(ground: Arc<Ground>) -> Self {
         Self { ground }
     }
 }
 
-impl std::fmt::Debug for Recordings {
+impl std::fmt::Debug for RecordingsFunction {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str("modelmill_recordings")
     }
 }
 
-impl TableFunctionImpl for Recordings {
+impl TableFunctionImpl for RecordingsFunction {
     fn call_with_args(&self, args: TableFunctionArgs<'_, '_>) -> Result<Arc<dyn TableProvider>> {
         let [
             Expr::Literal(ScalarValue::Utf8(Some(folder)) | ScalarValue::Utf8View(Some(folder)), _),
@@ -54,11 +54,11 @@ impl TableFunctionImpl for Recordings {
             );
         };
         let folder = if folder.contains("://") {
-            Folder::Stored(ListingTableUrl::parse(folder)?)
+            RecordingsFolder::Stored(ListingTableUrl::parse(folder)?)
         } else {
-            Folder::Path(folder.into())
+            RecordingsFolder::Path(folder.into())
         };
-        Ok(Arc::new(Table {
+        Ok(Arc::new(RecordingsTable {
             ground: self.ground.clone(),
             folder,
             schema: schema(),
@@ -67,16 +67,16 @@ impl TableFunctionImpl for Recordings {
 }
 
 /// Where the recordings lie.
-enum Folder {
+enum RecordingsFolder {
     Path(PathBuf),
     Stored(ListingTableUrl),
 }
 
-impl Folder {
+impl RecordingsFolder {
     /// All recordings, and what they are read from.
-    async fn files(&self, session: &dyn Session) -> Result<(Source, Vec<(String, File)>)> {
+    async fn files(&self, session: &dyn Session) -> Result<(RecordingsSource, Vec<(String, File)>)> {
         let (source, robots) = match self {
-            Self::Path(folder) => (Source::Disk, robots(folder).map_err(external)?),
+            Self::Path(folder) => (RecordingsSource::Disk, robots(folder).map_err(external_error)?),
             Self::Stored(url) => {
                 let store = session.runtime_env().object_store(url)?;
                 let above = url.prefix();
@@ -98,8 +98,8 @@ impl Folder {
                         ),
                     }
                 });
-                let robots = by_robot(url, found).map_err(external)?;
-                (Source::Store(store), robots)
+                let robots = by_robot(url, found).map_err(external_error)?;
+                (RecordingsSource::Store(store), robots)
             }
         };
         let files = robots
@@ -111,12 +111,12 @@ impl Folder {
 
 /// What files are read from.
 #[derive(Clone)]
-enum Source {
+enum RecordingsSource {
     Disk,
     Store(Arc<dyn ObjectStore>),
 }
 
-impl Source {
+impl RecordingsSource {
     /// The summary of a file. What is wrong with a recording stands in it; a store that does not answer is a fault.
     async fn summary(&self, ground: Arc<Ground>, file: File) -> Result<Summary> {
         let bytes = match self {
@@ -137,23 +137,23 @@ impl Source {
 }
 
 /// The table. Files are listed when it is scanned, since only then a store may be asked.
-struct Table {
+struct RecordingsTable {
     ground: Arc<Ground>,
-    folder: Folder,
+    folder: RecordingsFolder,
     schema: SchemaRef,
 }
 
-impl std::fmt::Debug for Table {
+impl std::fmt::Debug for RecordingsTable {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match &self.folder {
-            Folder::Path(folder) => write!(f, "recordings below {}", folder.display()),
-            Folder::Stored(url) => write!(f, "recordings below {url}"),
+            RecordingsFolder::Path(folder) => write!(f, "recordings below {}", folder.display()),
+            RecordingsFolder::Stored(url) => write!(f, "recordings below {url}"),
         }
     }
 }
 
 #[async_trait]
-impl TableProvider for Table {
+impl TableProvider for RecordingsTable {
     fn schema(&self) -> SchemaRef {
         self.schema.clone()
     }
@@ -173,7 +173,7 @@ impl TableProvider for Table {
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         let each = files.len().div_ceil(cores).max(1);
         let partitions = files.chunks(each).map(|files| {
-            Arc::new(Part {
+            Arc::new(RecordingsPartition {
                 ground: self.ground.clone(),
                 schema: self.schema.clone(),
                 source: source.clone(),
@@ -197,20 +197,20 @@ fn schema() -> SchemaRef {
 }
 
 /// Some of the files.
-struct Part {
+struct RecordingsPartition {
     ground: Arc<Ground>,
     schema: SchemaRef,
-    source: Source,
+    source: RecordingsSource,
     files: Vec<(String, File)>,
 }
 
-impl std::fmt::Debug for Part {
+impl std::fmt::Debug for RecordingsPartition {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{} recordings", self.files.len())
     }
 }
 
-impl PartitionStream for Part {
+impl PartitionStream for RecordingsPartition {
     fn schema(&self) -> &SchemaRef {
         &self.schema
     }
@@ -225,14 +225,14 @@ impl PartitionStream for Part {
             let (ground, schema, source) = (ground.clone(), schema.clone(), source.clone());
             async move {
                 let summary = source.summary(ground, file.clone()).await?;
-                row(schema, &robot, &file, &summary)
+                summary_row(schema, &robot, &file, &summary)
             }
         });
         Box::pin(RecordBatchStreamAdapter::new(self.schema.clone(), batches))
     }
 }
 
-fn row(schema: SchemaRef, robot: &str, file: &File, summary: &Summary) -> Result<RecordBatch> {
+fn summary_row(schema: SchemaRef, robot: &str, file: &File, summary: &Summary) -> Result<RecordBatch> {
     let text = |text: &str| Arc::new(StringArray::from(vec![text])) as ArrayRef;
     let bad = summary.bad.first().map(|bad| bad.says.as_str());
     let columns: Vec<ArrayRef> = vec![

@@ -10,11 +10,11 @@ use modelmill_fleet::{Ground, Summary};
 
 /// Samples by recording: column by column, in the order in which they came.
 #[derive(Debug, Default)]
-pub(crate) struct Samples {
+pub(crate) struct GroupSamples {
     recordings: BTreeMap<String, Vec<Vec<f64>>>,
 }
 
-impl Samples {
+impl GroupSamples {
     /// Takes rows: names of recordings, then numbers; what is missing becomes NaN, which the reader of recordings refuses or leaves
     /// out as the plan says.
     pub(crate) fn add(&mut self, values: &[ArrayRef]) -> Result<()> {
@@ -86,7 +86,7 @@ impl Samples {
         for (recording, columns) in std::mem::take(&mut self.recordings) {
             let columns = names.iter().cloned().zip(columns).collect();
             sum.merge(&ground.summarise(&recording, columns))
-                .map_err(external)?;
+                .map_err(external_error)?;
         }
         Ok(sum)
     }
@@ -132,10 +132,10 @@ impl Samples {
 
     fn add_one(&mut self, left: &mut &[u8]) -> Option<()> {
         let mut number =
-            || usize::try_from(u64::from_le_bytes(take(left, 8)?.try_into().ok()?)).ok();
+            || usize::try_from(u64::from_le_bytes(take_bytes(left, 8)?.try_into().ok()?)).ok();
         let [length, columns, rows] = [number()?, number()?, number()?];
-        let name = std::str::from_utf8(take(left, length)?).ok()?.to_owned();
-        let all = take(left, columns.checked_mul(rows)?.checked_mul(8)?)?;
+        let name = std::str::from_utf8(take_bytes(left, length)?).ok()?.to_owned();
+        let all = take_bytes(left, columns.checked_mul(rows)?.checked_mul(8)?)?;
         let kept = self
             .recordings
             .entry(name)
@@ -150,12 +150,12 @@ impl Samples {
     }
 }
 
-fn take<'a>(left: &mut &'a [u8], n: usize) -> Option<&'a [u8]> {
+fn take_bytes<'a>(left: &mut &'a [u8], n: usize) -> Option<&'a [u8]> {
     let (taken, rest) = left.split_at_checked(n)?;
     *left = rest;
     Some(taken)
 }
 
-pub(crate) fn external(fault: modelmill_fleet::Fault) -> DataFusionError {
+pub(crate) fn external_error(fault: modelmill_fleet::Fault) -> DataFusionError {
     DataFusionError::External(Box::new(fault))
 }

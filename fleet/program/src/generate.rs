@@ -10,8 +10,8 @@ use std::io::BufWriter;
 use std::path::Path;
 use std::sync::Arc;
 
-use modelmill_fleet::Fault;
-use modelmill_rig::{Body, Channel, Noise, State, Tracker, forces};
+use modelmill_fleet::FleetFault;
+use modelmill_rig::{RigBody, SensorChannel, GaussianNoise, RigState, RigTracker, forces};
 use nalgebra::{Matrix3, Vector3};
 use parquet::basic::{Compression, Repetition, Type as Physical};
 use parquet::data_type::{DoubleType, FloatType};
@@ -80,12 +80,12 @@ const FRICTIONS: f64 = 0.05;
 /// Friction of one robot differs from recording to recording by this part.
 const DAILY: f64 = 0.005;
 /// Encoders: 17 bits; noise in rad. Torques: noise in N m.
-const ENCODER: Channel = Channel {
+const ENCODER: SensorChannel = SensorChannel {
     noise: 2e-5,
     resolution: std::f64::consts::TAU / 131_072.0,
     delay: 0.0,
 };
-const TORQUE: Channel = Channel {
+const TORQUE: SensorChannel = SensorChannel {
     noise: 0.05,
     resolution: 1.0 / 1024.0,
     delay: 0.0,
@@ -93,7 +93,7 @@ const TORQUE: Channel = Channel {
 
 /// How large a fleet, and from which seed.
 #[derive(Clone, Debug)]
-pub struct Size {
+pub struct FleetSize {
     /// How many robots.
     pub robots: usize,
     /// On how many days, six or more.
@@ -114,7 +114,7 @@ pub struct Size {
 
 /// What a robot has beyond small differences.
 #[derive(Clone, Debug)]
-enum Planted {
+enum PlantedChange {
     Nothing,
     /// Friction of a motor grows by so large a part of its own each day, from a day on.
     Wear {
@@ -138,7 +138,7 @@ enum Planted {
     },
 }
 
-impl Planted {
+impl PlantedChange {
     fn json(&self, days: &[String]) -> Value {
         let motor = |drive: &usize| ["motor_left", "motor_right"][*drive];
         match self {
@@ -162,7 +162,7 @@ impl Planted {
 }
 
 /// One period of a motion: positions and rates of the motors, and what each number of each link adds to their torques.
-struct Motion {
+struct FleetMotion {
     q: [Vec<f64>; 2],
     qd: [Vec<f64>; 2],
     /// `[link][number][drive][sample]`.
@@ -172,7 +172,7 @@ struct Motion {
 /// Makes a fleet in a folder: a model file, Parquet by robot, day and recording, and the truth, which comes back too.
 ///
 /// Fails where the size makes no fleet, or the folder cannot be written to.
-pub fn generate(folder: &Path, size: &Size) -> Result<Value, Fault> {
+pub fn generate(folder: &Path, size: &FleetSize) -> Result<Value, FleetFault> {
     let is_large_enough = size.robots > 0
         && size.days >= 6
         && size.per_day > 0
@@ -180,42 +180,42 @@ pub fn generate(folder: &Path, size: &Size) -> Result<Value, Fault> {
         && size.rate >= 20.0
         && size.changes >= 0.0;
     if !is_large_enough {
-        return Err(Fault::new(
+        return Err(FleetFault::new(
             "a fleet has one robot or more, six days or more, one recording a day or more, each of 5 s or more at 20 Hz or more, and no changes of less than nothing",
         ));
     }
-    write(&folder.join("five_bar.toml"), MODEL)?;
-    write(&folder.join("model.toml"), FRICTION)?;
+    write_text(&folder.join("five_bar.toml"), MODEL)?;
+    write_text(&folder.join("model.toml"), FRICTION)?;
     let data = folder.join("recordings");
-    let motions: Vec<Motion> = (0..MOTIONS)
+    let motions: Vec<FleetMotion> = (0..MOTIONS)
         .into_par_iter()
         .map(|k| motion(size, k))
         .collect::<Result<_, _>>()?;
     let days: Vec<String> = (0..size.days).map(date).collect();
-    let robots: Vec<(String, Planted)> = (0..size.robots)
-        .map(|r| (format!("R{r:05}"), planted(size, r)))
+    let robots: Vec<(String, PlantedChange)> = (0..size.robots)
+        .map(|r| (format!("R{r:05}"), planted_change(size, r)))
         .collect();
     let bad = bad_recordings(size);
     robots
         .par_iter()
         .enumerate()
         .try_for_each(|(r, (name, planted))| {
-            let robot = robot(size, r);
+            let robot = robot_parameters(size, r);
             for day in 0..size.days {
                 for k in 0..size.per_day {
                     let path = data
                         .join(format!("robot={name}"))
                         .join(format!("day={}", days[day]))
                         .join(format!("recording={k}"));
-                    fs::create_dir_all(&path).map_err(|error| unwritten(&path, &error))?;
+                    fs::create_dir_all(&path).map_err(|error| write_fault(&path, &error))?;
                     let path = path.join("data.parquet");
-                    record(&path, size, &motions, &robot, planted, (r, day, k))?;
+                    write_recording(&path, size, &motions, &robot, planted, (r, day, k))?;
                     if bad.contains(&(r, day, k)) {
-                        spoil(&path)?;
+                        truncate_file(&path)?;
                     }
                 }
             }
-            Ok::<_, Fault>(())
+            Ok::<_, FleetFault>(())
         })?;
     let bad = bad.iter().map(|(r, day, k)| {
         format!(
@@ -232,7 +232,7 @@ pub fn generate(folder: &Path, size: &Size) -> Result<Value, Fault> {
         "samples": samples(size),
         "bad": bad.collect::<Vec<_>>(),
     });
-    write(&folder.join("truth.json"), &format!("{truth:#}\n"))?;
+    write_text(&folder.join("truth.json"), &format!("{truth:#}\n"))?;
     Ok(truth)
 }
 
@@ -242,7 +242,7 @@ pub fn generate(folder: &Path, size: &Size) -> Result<Value, Fault> {
     clippy::cast_sign_loss,
     reason = "sizes of a fleet"
 )]
-fn count(x: f64) -> usize {
+fn rounded_count(x: f64) -> usize {
     x.round() as usize
 }
 
@@ -252,12 +252,12 @@ fn count(x: f64) -> usize {
     clippy::cast_sign_loss,
     reason = "below n, which is one"
 )]
-fn one_of(noise: &mut Noise, n: usize) -> usize {
+fn random_index(noise: &mut GaussianNoise, n: usize) -> usize {
     ((noise.uniform() * n as f64) as usize).min(n - 1)
 }
 
-fn samples(size: &Size) -> usize {
-    count(size.seconds * size.rate)
+fn samples(size: &FleetSize) -> usize {
+    rounded_count(size.seconds * size.rate)
 }
 
 /// Days from the first of March 2026 on.
@@ -274,27 +274,27 @@ fn date(day: usize) -> String {
     format!("2026-{month:02}-{:02}", left + 1)
 }
 
-fn write(path: &Path, text: &str) -> Result<(), Fault> {
+fn write_text(path: &Path, text: &str) -> Result<(), FleetFault> {
     if let Some(folder) = path.parent() {
-        fs::create_dir_all(folder).map_err(|error| unwritten(folder, &error))?;
+        fs::create_dir_all(folder).map_err(|error| write_fault(folder, &error))?;
     }
-    fs::write(path, text).map_err(|error| unwritten(path, &error))
+    fs::write(path, text).map_err(|error| write_fault(path, &error))
 }
 
-fn unwritten(path: &Path, error: &dyn std::fmt::Display) -> Fault {
-    Fault::new(format!(
+fn write_fault(path: &Path, error: &dyn std::fmt::Display) -> FleetFault {
+    FleetFault::new(format!(
         "{} cannot be written: {error}; choose another folder, or make room",
         path.display()
     ))
 }
 
 /// A motion, and the forces of the rig along it.
-fn motion(size: &Size, k: usize) -> Result<Motion, Fault> {
-    let files = modelmill::files::Memory::default();
+fn motion(size: &FleetSize, k: usize) -> Result<FleetMotion, FleetFault> {
+    let files = modelmill::files::MemoryFiles::default();
     let mut rig = modelmill_rig::load("five_bar.rig.toml", RIG, &files)
-        .map_err(|failure| Fault::new(failure.render(false)))?
+        .map_err(|failure| FleetFault::new(failure.render(false)))?
         .rig;
-    let mut noise = Noise::new(size.seed, 1_000 + k as u64);
+    let mut noise = GaussianNoise::new(size.seed, 1_000 + k as u64);
     let mut waves = [[[0.0; 2]; HARMONICS]; 2];
     for waves in &mut waves {
         let mut largest = 0.0;
@@ -307,7 +307,7 @@ fn motion(size: &Size, k: usize) -> Result<Motion, Fault> {
         }
     }
     let state = |t: f64| {
-        let mut state = State {
+        let mut state = RigState {
             q: MIDDLE.to_vec(),
             qd: vec![0.0; 2],
             qdd: vec![0.0; 2],
@@ -323,11 +323,11 @@ fn motion(size: &Size, k: usize) -> Result<Motion, Fault> {
         }
         state
     };
-    let n = count(PERIOD * size.rate);
+    let n = rounded_count(PERIOD * size.rate);
     // The motions of all bodies once; then forces for one number after the other.
     let tracked = rig.clone();
-    let mut tracker = Tracker::new(&tracked).map_err(Fault::new)?;
-    let mut one = Motion {
+    let mut tracker = RigTracker::new(&tracked).map_err(FleetFault::new)?;
+    let mut one = FleetMotion {
         q: [Vec::with_capacity(n), Vec::with_capacity(n)],
         qd: [Vec::with_capacity(n), Vec::with_capacity(n)],
         columns: (0..LINKS.len())
@@ -335,20 +335,20 @@ fn motion(size: &Size, k: usize) -> Result<Motion, Fault> {
             .collect(),
     };
     for body in &mut rig.bodies {
-        set(body, [0.0; 4]);
+        set_link(body, [0.0; 4]);
     }
     for i in 0..n {
         let state = state(i as f64 / size.rate);
-        let moved = tracker.follow(&state).map_err(Fault::new)?;
+        let moved = tracker.follow(&state).map_err(FleetFault::new)?;
         for j in 0..2 {
             one.q[j].push(state.q[j]);
             one.qd[j].push(state.qd[j]);
         }
         for link in 0..LINKS.len() {
             let mut of = |numbers: [f64; 4]| {
-                set(&mut rig.bodies[link], numbers);
-                let found = forces(&rig, &moved).map_err(Fault::new);
-                set(&mut rig.bodies[link], [0.0; 4]);
+                set_link(&mut rig.bodies[link], numbers);
+                let found = forces(&rig, &moved).map_err(FleetFault::new);
+                set_link(&mut rig.bodies[link], [0.0; 4]);
                 found
             };
             // ZZ, MX, MY, M.
@@ -371,7 +371,7 @@ fn motion(size: &Size, k: usize) -> Result<Motion, Fault> {
 }
 
 /// Gives a body of the rig the numbers ZZ, MX, MY and M about its joint.
-fn set(body: &mut Body, [zz, mx, my, m]: [f64; 4]) {
+fn set_link(body: &mut RigBody, [zz, mx, my, m]: [f64; 4]) {
     body.mass = m;
     body.centre = if m == 0.0 {
         Vector3::zeros()
@@ -383,14 +383,14 @@ fn set(body: &mut Body, [zz, mx, my, m]: [f64; 4]) {
 }
 
 /// Numbers of a robot.
-struct Robot {
+struct RobotParameters {
     links: [[f64; 4]; 4],
     dry: [f64; 2],
     viscous: [f64; 2],
 }
 
-fn robot(size: &Size, r: usize) -> Robot {
-    let mut noise = Noise::new(size.seed, 10_000 + r as u64);
+fn robot_parameters(size: &FleetSize, r: usize) -> RobotParameters {
+    let mut noise = GaussianNoise::new(size.seed, 10_000 + r as u64);
     let mut links = LINKS;
     for link in &mut links {
         let heavier = 1.0 + ROBOTS * noise.normal();
@@ -399,7 +399,7 @@ fn robot(size: &Size, r: usize) -> Robot {
         }
     }
     let mut friction = |of: [f64; 2]| of.map(|f| f * (1.0 + FRICTIONS * noise.normal()));
-    Robot {
+    RobotParameters {
         links,
         dry: friction(DRY),
         viscous: friction(VISCOUS),
@@ -407,35 +407,35 @@ fn robot(size: &Size, r: usize) -> Robot {
 }
 
 /// Of a hundred robots three wear, three get a load, two lose a sensor and one is odd.
-fn planted(size: &Size, r: usize) -> Planted {
-    let mut noise = Noise::new(size.seed, 5_000_000 + r as u64);
+fn planted_change(size: &FleetSize, r: usize) -> PlantedChange {
+    let mut noise = GaussianNoise::new(size.seed, 5_000_000 + r as u64);
     let drive = usize::from(noise.uniform() < 0.5);
     // Two days before and three after, so that there is something to tell.
-    let day = 2 + one_of(&mut noise, size.days - 4);
+    let day = 2 + random_index(&mut noise, size.days - 4);
     let much = noise.uniform();
     // Small fleets have one of each as well.
     match r % 100 {
-        7 | 38 | 71 => Planted::Wear {
+        7 | 38 | 71 => PlantedChange::Wear {
             drive,
             day,
             per_day: size.changes * (0.08 + 0.10 * much),
         },
-        3 | 45 | 82 => Planted::Load {
+        3 | 45 | 82 => PlantedChange::Load {
             day,
             mass: size.changes * (0.15 + 0.25 * much),
         },
-        5 | 60 => Planted::Dead { drive, day },
-        9 => Planted::Odd {
+        5 | 60 => PlantedChange::Dead { drive, day },
+        9 => PlantedChange::Odd {
             mass: size.changes * (0.25 + 0.2 * much),
         },
-        _ => Planted::Nothing,
+        _ => PlantedChange::Nothing,
     }
 }
 
 /// Which recordings are cut off, as by a full disk.
-fn bad_recordings(size: &Size) -> Vec<(usize, usize, usize)> {
-    let mut noise = Noise::new(size.seed, 9_000_000);
-    let mut place = |n: usize| one_of(&mut noise, n);
+fn bad_recordings(size: &FleetSize) -> Vec<(usize, usize, usize)> {
+    let mut noise = GaussianNoise::new(size.seed, 9_000_000);
+    let mut place = |n: usize| random_index(&mut noise, n);
     let mut all: Vec<_> = (0..size.bad)
         .map(|_| (place(size.robots), place(size.days), place(size.per_day)))
         .collect();
@@ -445,34 +445,34 @@ fn bad_recordings(size: &Size) -> Vec<(usize, usize, usize)> {
 }
 
 /// Cuts a file off.
-fn spoil(path: &Path) -> Result<(), Fault> {
+fn truncate_file(path: &Path) -> Result<(), FleetFault> {
     let file = fs::OpenOptions::new().write(true).open(path);
     let cut = file.and_then(|file| file.set_len(file.metadata()?.len() * 2 / 3));
-    cut.map_err(|error| unwritten(path, &error))
+    cut.map_err(|error| write_fault(path, &error))
 }
 
 /// Writes one recording.
-fn record(
+fn write_recording(
     path: &Path,
-    size: &Size,
-    motions: &[Motion],
-    robot: &Robot,
-    planted: &Planted,
+    size: &FleetSize,
+    motions: &[FleetMotion],
+    robot: &RobotParameters,
+    planted: &PlantedChange,
     (r, day, k): (usize, usize, usize),
-) -> Result<(), Fault> {
+) -> Result<(), FleetFault> {
     let seed = size.seed
         ^ ((r as u64) << 24 | (day as u64) << 8 | k as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15);
-    let mut noise = Noise::new(seed, 3);
-    let motion = &motions[one_of(&mut noise, MOTIONS)];
+    let mut noise = GaussianNoise::new(seed, 3);
+    let motion = &motions[random_index(&mut noise, MOTIONS)];
     let n = motion.q[0].len();
-    let start = one_of(&mut noise, n);
+    let start = random_index(&mut noise, n);
     let mut links = robot.links;
     let daily = 1.0 + DAILY * noise.normal();
     let [mut dry, mut viscous] = [robot.dry, robot.viscous].map(|f| f.map(|f| f * daily));
     let mut dead = None;
     let mut load = 0.0;
     match planted {
-        Planted::Wear {
+        PlantedChange::Wear {
             drive,
             day: from,
             per_day,
@@ -481,9 +481,9 @@ fn record(
             dry[*drive] *= grown;
             viscous[*drive] *= grown;
         }
-        Planted::Load { day: from, mass } if day >= *from => load = *mass,
-        Planted::Dead { drive, day: from } if day >= *from => dead = Some(*drive),
-        Planted::Odd { mass } => load = *mass,
+        PlantedChange::Load { day: from, mass } if day >= *from => load = *mass,
+        PlantedChange::Dead { drive, day: from } if day >= *from => dead = Some(*drive),
+        PlantedChange::Odd { mass } => load = *mass,
         _ => {}
     }
     links[1][0] += load * TO_TIP * TO_TIP;
@@ -523,13 +523,13 @@ fn record(
     if let Some(drive) = dead {
         // It dies a tenth into the first recording of its day, and keeps its last reading.
         let from = match planted {
-            Planted::Dead { day: first, .. } if day == *first && k == 0 => all / 10,
+            PlantedChange::Dead { day: first, .. } if day == *first && k == 0 => all / 10,
             _ => 0,
         };
         let last = torques[drive][from];
         torques[drive][from..].fill(last);
     }
-    store(path, &time, &positions, &torques)
+    write_parquet(path, &time, &positions, &torques)
 }
 
 fn sign(x: f64) -> f64 {
@@ -537,13 +537,13 @@ fn sign(x: f64) -> f64 {
 }
 
 /// The columns as Parquet.
-fn store(
+fn write_parquet(
     path: &Path,
     time: &[f64],
     positions: &[Vec<f64>; 2],
     torques: &[Vec<f32>; 2],
-) -> Result<(), Fault> {
-    let fault = |error: &dyn std::fmt::Display| unwritten(path, error);
+) -> Result<(), FleetFault> {
+    let fault = |error: &dyn std::fmt::Display| write_fault(path, error);
     let column = |name: &str, kind: Physical| {
         Type::primitive_type_builder(name, kind)
             .with_repetition(Repetition::REQUIRED)
@@ -604,7 +604,7 @@ mod tests {
     /// The rig's columns add up to the rig's forces with all links as they are.
     #[test]
     fn columns_of_the_rig_add_up_to_its_forces() {
-        let size = Size {
+        let size = FleetSize {
             robots: 1,
             days: 6,
             per_day: 1,
@@ -615,20 +615,20 @@ mod tests {
             changes: 1.0,
         };
         let motion = motion(&size, 1).expect("a motion");
-        let files = modelmill::files::Memory::default();
+        let files = modelmill::files::MemoryFiles::default();
         let mut rig = modelmill_rig::load("rig", RIG, &files).expect("a rig").rig;
         for (body, numbers) in rig.bodies.iter_mut().zip(LINKS) {
-            set(body, numbers);
+            set_link(body, numbers);
         }
         // Positions and rates of a sample; accelerations from their neighbours.
         let i = 40;
         let qdd = (0..2).map(|j| (motion.qd[j][i + 1] - motion.qd[j][i - 1]) * size.rate / 2.0);
-        let state = State {
+        let state = RigState {
             q: vec![motion.q[0][i], motion.q[1][i]],
             qd: vec![motion.qd[0][i], motion.qd[1][i]],
             qdd: qdd.collect(),
         };
-        let moved = Tracker::new(&rig).unwrap().follow(&state).unwrap();
+        let moved = RigTracker::new(&rig).unwrap().follow(&state).unwrap();
         let expected = forces(&rig, &moved).unwrap();
         for d in 0..2 {
             let sum: f64 = LINKS

@@ -6,22 +6,22 @@ use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
-use modelmill::recording::Reading;
-use modelmill_fleet::folder::{self, File};
-use modelmill_fleet::outliers::{One, outliers};
-use modelmill_fleet::robot::{Robot, robot};
-use modelmill_fleet::{Fault, Ground, Plan, Summary};
+use modelmill::recording::RecordingOptions;
+use modelmill_fleet::folder::{self, FleetFile};
+use modelmill_fleet::outliers::{RobotSummary, outliers};
+use modelmill_fleet::robot::{RobotHistory, robot_history};
+use modelmill_fleet::{FleetFault, FleetModel, FleetPlan, FleetSummary};
 use rayon::prelude::*;
 use serde_json::{Value, json};
 
 use crate::page;
-use crate::state::State;
+use crate::state::SummaryStore;
 
 /// Robots of which a plan is made.
 const REFERENCE: usize = 8;
 
 /// What is asked.
-pub struct Asked<'a> {
+pub struct FleetRequest<'a> {
     /// The model file.
     pub model: &'a Path,
     /// The folder of recordings.
@@ -31,21 +31,21 @@ pub struct Asked<'a> {
     /// The plan; made from recordings of several robots where there is none.
     pub plan: Option<&'a Path>,
     /// How recordings are read, where no plan says it.
-    pub reading: &'a Reading,
+    pub reading: &'a RecordingOptions,
 }
 
 /// What was found.
-pub(crate) struct Found {
-    pub(crate) ground: Ground,
-    pub(crate) robots: Vec<Robot>,
-    pub(crate) ones: Vec<One>,
-    pub(crate) outliers: modelmill_fleet::outliers::Outliers,
+pub(crate) struct FleetResults {
+    pub(crate) ground: FleetModel,
+    pub(crate) robots: Vec<RobotHistory>,
+    pub(crate) ones: Vec<RobotSummary>,
+    pub(crate) outliers: modelmill_fleet::outliers::FleetOutliers,
     pub(crate) recordings: usize,
     pub(crate) samples: u64,
 }
 
-impl Found {
-    pub(crate) fn bad(&self) -> impl Iterator<Item = &modelmill_fleet::Bad> {
+impl FleetResults {
+    pub(crate) fn bad(&self) -> impl Iterator<Item = &modelmill_fleet::BadRecording> {
         self.robots
             .iter()
             .flat_map(|robot| robot.days.iter().flat_map(|day| &day.bad))
@@ -55,12 +55,12 @@ impl Found {
 /// Identifies a fleet; the result is what is said in the end.
 ///
 /// Fails where the folder holds no recordings, the model has no meaning, or results cannot be written.
-pub fn identify(asked: &Asked<'_>) -> Result<String, Fault> {
+pub fn identify(asked: &FleetRequest<'_>) -> Result<String, FleetFault> {
     let begin = Instant::now();
     let robots = folder::robots(asked.recordings)?;
     let states = asked.out.join("state");
     fs::create_dir_all(&states).map_err(|error| {
-        Fault::new(format!(
+        FleetFault::new(format!(
             "{} cannot be made: {error}; choose another place",
             states.display()
         ))
@@ -69,15 +69,15 @@ pub fn identify(asked: &Asked<'_>) -> Result<String, Fault> {
         asked,
         &robots.values().map(Vec::as_slice).collect::<Vec<_>>(),
     )?;
-    let ground = plan.ground()?;
+    let ground = plan.derive_model()?;
     let total: usize = robots.values().map(Vec::len).sum();
     let [done, kept_ones] = [AtomicUsize::new(0), AtomicUsize::new(0)];
     let planned = begin.elapsed();
-    let looked_at: Vec<Robot> = robots
+    let looked_at: Vec<RobotHistory> = robots
         .par_iter()
         .map(|(name, files)| {
-            let days = days(&ground, &states, name, files, &kept_ones)?;
-            let robot = robot(&ground, name, &days)?;
+            let days = daily_summaries(&ground, &states, name, files, &kept_ones)?;
+            let robot = robot_history(&ground, name, &days)?;
             let before = done.fetch_add(files.len(), Ordering::Relaxed);
             let now = before + files.len();
             if now * 20 / total != before * 20 / total {
@@ -85,18 +85,18 @@ pub fn identify(asked: &Asked<'_>) -> Result<String, Fault> {
             }
             Ok(robot)
         })
-        .collect::<Result<_, Fault>>()?;
+        .collect::<Result<_, FleetFault>>()?;
     let summed = begin.elapsed();
-    let ones: Vec<One> = looked_at
+    let ones: Vec<RobotSummary> = looked_at
         .iter()
-        .map(|robot| One {
+        .map(|robot| RobotSummary {
             name: robot.name.clone(),
             summary: robot.before.clone(),
         })
         .collect();
     let outliers = outliers(&ground, &ones)?;
     let samples = looked_at.iter().map(|robot| robot.samples).sum();
-    let found = Found {
+    let found = FleetResults {
         ground,
         robots: looked_at,
         ones,
@@ -104,18 +104,18 @@ pub fn identify(asked: &Asked<'_>) -> Result<String, Fault> {
         recordings: total,
         samples,
     };
-    folder::write(
+    folder::write_atomic(
         &asked.out.join("results.json"),
         format!("{}\n", json(&found)).as_bytes(),
     )?;
-    folder::write(&asked.out.join("fleet.html"), page::page(&found).as_bytes())?;
+    folder::write_atomic(&asked.out.join("fleet.html"), page::page(&found).as_bytes())?;
     let kept = kept_ones.into_inner();
     let seconds = summed.saturating_sub(planned).as_secs_f64();
     let rate = found.samples as f64 * (total - kept) as f64 / total as f64 / seconds.max(1e-9);
     Ok(format!(
         "{}\n{} recordings, {} of which were done before; {:.3e} samples; {seconds:.1} s to sum them up{}; {:.1} s in all; \
          at most {} in memory\n{} and {} written\n",
-        says(&found),
+        summary_sentence(&found),
         total,
         kept,
         found.samples as f64,
@@ -132,11 +132,11 @@ pub fn identify(asked: &Asked<'_>) -> Result<String, Fault> {
 }
 
 /// In one sentence.
-pub(crate) fn says(found: &Found) -> String {
+pub(crate) fn summary_sentence(found: &FleetResults) -> String {
     let changed = found
         .robots
         .iter()
-        .filter(|robot| !robot.since.is_empty())
+        .filter(|robot| !robot.changes.is_empty())
         .count();
     let dead = found
         .robots
@@ -162,25 +162,25 @@ fn most_memory() -> String {
 }
 
 /// The plan of the folder: the one that is given, the one that is there, or a new one.
-fn plan(asked: &Asked<'_>, robots: &[&[File]]) -> Result<Plan, Fault> {
+fn plan(asked: &FleetRequest<'_>, robots: &[&[FleetFile]]) -> Result<FleetPlan, FleetFault> {
     let there = asked.out.join("plan.json");
     let path = asked.plan.unwrap_or(&there);
     if asked.plan.is_some() || path.exists() {
         let text = fs::read_to_string(path).map_err(|error| {
-            Fault::new(format!(
+            FleetFault::new(format!(
                 "{} cannot be read: {error}; name a plan that is there",
                 path.display()
             ))
         })?;
-        let plan = Plan::parse(&path.display().to_string(), &text)?;
+        let plan = FleetPlan::parse(&path.display().to_string(), &text)?;
         let model = fs::read_to_string(asked.model).map_err(|error| {
-            Fault::new(format!(
+            FleetFault::new(format!(
                 "{} cannot be read: {error}; name the model file",
                 asked.model.display()
             ))
         })?;
         if plan.files.first().is_none_or(|(_, text)| *text != model) {
-            return Err(Fault::new(format!(
+            return Err(FleetFault::new(format!(
                 "{} is of another model than {}: what was summed up by it does not fit; choose another folder with `--out`, or \
                  the model as it was",
                 path.display(),
@@ -188,7 +188,7 @@ fn plan(asked: &Asked<'_>, robots: &[&[File]]) -> Result<Plan, Fault> {
             )));
         }
         if asked.plan.is_some() {
-            folder::write(&there, text.as_bytes())?;
+            folder::write_atomic(&there, text.as_bytes())?;
         }
         return Ok(plan);
     }
@@ -199,35 +199,35 @@ fn plan(asked: &Asked<'_>, robots: &[&[File]]) -> Result<Plan, Fault> {
         .step_by(every)
         .filter_map(|files| Some(files.first()?.path.as_path()))
         .collect();
-    let plan = Plan::make(asked.model, asked.reading, &reference)?;
-    folder::write(&there, plan.json().as_bytes())?;
+    let plan = FleetPlan::from_recordings(asked.model, asked.reading, &reference)?;
+    folder::write_atomic(&there, plan.json().as_bytes())?;
     Ok(plan)
 }
 
 /// The summaries of a robot's recordings, day by day; those that are not kept are made.
-fn days(
-    ground: &Ground,
+fn daily_summaries(
+    ground: &FleetModel,
     states: &Path,
     name: &str,
-    files: &[File],
+    files: &[FleetFile],
     kept_ones: &AtomicUsize,
-) -> Result<Vec<(String, Summary)>, Fault> {
-    let (state, mut kept) = State::open(states, name, ground.empty().mark)?;
-    let done: Vec<Option<Summary>> = files.iter().map(|file| kept.remove(&file.key)).collect();
+) -> Result<Vec<(String, FleetSummary)>, FleetFault> {
+    let (state, mut kept) = SummaryStore::open(states, name, ground.empty_summary().mark)?;
+    let done: Vec<Option<FleetSummary>> = files.iter().map(|file| kept.remove(&file.key)).collect();
     kept_ones.fetch_add(done.iter().flatten().count(), Ordering::Relaxed);
-    let summaries: Vec<Summary> = files
+    let summaries: Vec<FleetSummary> = files
         .par_iter()
         .zip(done)
         .map(|(file, done)| match done {
             Some(summary) => Ok(summary),
             None => {
                 let summary = ground.summarise_file(&file.name, &file.path);
-                state.keep(&file.key, &summary)?;
+                state.append(&file.key, &summary)?;
                 Ok(summary)
             }
         })
-        .collect::<Result<_, Fault>>()?;
-    let mut days: Vec<(String, Summary)> = Vec::new();
+        .collect::<Result<_, FleetFault>>()?;
+    let mut days: Vec<(String, FleetSummary)> = Vec::new();
     for (file, summary) in files.iter().zip(summaries) {
         match days.last_mut() {
             Some((day, sum)) if *day == file.day => sum.merge(&summary)?,
@@ -238,7 +238,7 @@ fn days(
 }
 
 /// All that was found.
-fn json(found: &Found) -> Value {
+fn json(found: &FleetResults) -> Value {
     let ground = &found.ground;
     let parameters = ground.parameters();
     let parameters = parameters

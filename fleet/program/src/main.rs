@@ -7,26 +7,26 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use modelmill::recording::{Preparation, Reading};
-use modelmill_fleet::{Fault, folder};
+use modelmill::recording::{StatePreparation, RecordingOptions};
+use modelmill_fleet::{FleetFault, folder};
 use modelmill_fleet_program::{generate, identify, score};
 
 /// Recordings of many machines of one kind: parameters per robot and day, what changed and when, and who differs.
 #[derive(Parser)]
 #[command(name = "modelmill-fleet", version)]
-struct Cli {
+struct FleetCli {
     #[command(subcommand)]
-    command: Command,
+    command: FleetCommand,
 }
 
 #[derive(Subcommand)]
-enum Command {
+enum FleetCommand {
     /// Make a fleet of five-bars with a truth, as Parquet.
-    Make(Make),
+    Make(MakeArgs),
     /// Settle how every recording is summed up, from a few of sound machines.
     Plan(PlanArgs),
     /// Sum up a folder of recordings and say what is different.
-    Identify(Identify),
+    Identify(FleetIdentifyArgs),
     /// Hold what `identify` found against the truth of `make`.
     Score {
         /// The folder that `identify` wrote.
@@ -37,7 +37,7 @@ enum Command {
 }
 
 #[derive(clap::Args)]
-struct Make {
+struct MakeArgs {
     /// Where it goes.
     folder: PathBuf,
     /// How many robots.
@@ -84,24 +84,24 @@ struct ReadingArgs {
 }
 
 impl ReadingArgs {
-    fn reading(&self) -> Result<Reading, Fault> {
+    fn reading(&self) -> Result<RecordingOptions, FleetFault> {
         let columns = self.map.iter().map(|text| {
             let (ours, theirs) = text.split_once('=').ok_or_else(|| {
-                Fault::new(format!(
+                FleetFault::new(format!(
                     "`--map {text}` names no column; write it as `--map q1=pos_left`"
                 ))
             })?;
             Ok((ours.to_owned(), theirs.to_owned()))
         });
-        Ok(Reading {
-            columns: columns.collect::<Result<_, Fault>>()?,
-            preparation: Preparation {
+        Ok(RecordingOptions {
+            columns: columns.collect::<Result<_, FleetFault>>()?,
+            preparation: StatePreparation {
                 cutoff_hz: self.cutoff,
                 decimate: self.decimate.max(1),
-                ..Preparation::default()
+                ..StatePreparation::default()
             },
             skip_bad_samples: self.skip_bad_samples,
-            ..Reading::default()
+            ..RecordingOptions::default()
         })
     }
 }
@@ -121,7 +121,7 @@ struct PlanArgs {
 }
 
 #[derive(clap::Args)]
-struct Identify {
+struct FleetIdentifyArgs {
     /// The model file.
     model: PathBuf,
     /// The folder: `robot=R/day=D/.../FILE`, `R/D/FILE`, or `R/FILE` with the day at the front of the file's name.
@@ -140,7 +140,7 @@ struct Identify {
 }
 
 fn main() -> ExitCode {
-    let cli = match Cli::try_parse() {
+    let cli = match FleetCli::try_parse() {
         Ok(cli) => cli,
         Err(error) => {
             let status = u8::try_from(error.exit_code()).unwrap_or(2);
@@ -160,10 +160,10 @@ fn main() -> ExitCode {
     }
 }
 
-fn run(command: Command) -> Result<String, Fault> {
+fn run(command: FleetCommand) -> Result<String, FleetFault> {
     match command {
-        Command::Make(args) => {
-            let size = generate::Size {
+        FleetCommand::Make(args) => {
+            let size = generate::FleetSize {
                 robots: args.robots,
                 days: args.days,
                 per_day: args.per_day,
@@ -181,12 +181,12 @@ fn run(command: Command) -> Result<String, Fault> {
                 args.folder.display()
             ))
         }
-        Command::Plan(args) => {
+        FleetCommand::Plan(args) => {
             let reference: Vec<&std::path::Path> =
                 args.reference.iter().map(PathBuf::as_path).collect();
             let plan =
-                modelmill_fleet::Plan::make(&args.model, &args.reading.reading()?, &reference)?;
-            folder::write(&args.out, plan.json().as_bytes())?;
+                modelmill_fleet::FleetPlan::from_recordings(&args.model, &args.reading.reading()?, &reference)?;
+            folder::write_atomic(&args.out, plan.json().as_bytes())?;
             Ok(format!(
                 "{} from {} reference recordings: cut-off {} Hz, one in {} samples kept\n",
                 args.out.display(),
@@ -197,14 +197,14 @@ fn run(command: Command) -> Result<String, Fault> {
                 plan.preparation.decimate
             ))
         }
-        Command::Identify(args) => {
+        FleetCommand::Identify(args) => {
             if let Some(threads) = args.threads {
                 let pool = rayon::ThreadPoolBuilder::new()
                     .num_threads(threads)
                     .build_global();
-                pool.map_err(Fault::new)?;
+                pool.map_err(FleetFault::new)?;
             }
-            identify::identify(&identify::Asked {
+            identify::identify(&identify::FleetRequest {
                 model: &args.model,
                 recordings: &args.recordings,
                 out: &args.out,
@@ -212,6 +212,6 @@ fn run(command: Command) -> Result<String, Fault> {
                 reading: &args.reading.reading()?,
             })
         }
-        Command::Score { found, truth } => score::score(&found, &truth),
+        FleetCommand::Score { found, truth } => score::score(&found, &truth),
     }
 }

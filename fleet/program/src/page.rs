@@ -2,38 +2,38 @@
 
 use std::fmt::Write as _;
 
-use modelmill::report::{Cell, begin_page, end_page, over_runs, scripts, table};
-use modelmill::runs::Changed;
+use modelmill::report::{TableCell, begin_page, end_page, parameter_history, scripts, table};
+use modelmill::runs::RunChange;
 use modelmill::text::svg::escape;
 use modelmill::text::table::significant;
-use modelmill_fleet::robot::Robot;
+use modelmill_fleet::robot::RobotHistory;
 
-use crate::identify::{Found, says};
+use crate::identify::{FleetResults, summary_sentence};
 
 /// Robots that are shown with pictures; all others stand in the tables and in the JSON.
-const SHOWN: usize = 60;
+const MOST_PICTURED: usize = 60;
 
 /// The page's text.
-pub(crate) fn page(found: &Found) -> String {
+pub(crate) fn page(found: &FleetResults) -> String {
     let title = format!("A fleet of {} robots", found.robots.len());
     let mut page = begin_page(&title);
-    let is_quiet = found.outliers.found.is_empty() && found.robots.iter().all(Robot::is_quiet);
+    let is_quiet = found.outliers.found.is_empty() && found.robots.iter().all(RobotHistory::is_quiet);
     let class = if is_quiet { "adequate" } else { "missing" };
     let _ = writeln!(
         page,
         "<p class=\"verdict {class}\">{}.</p>",
-        escape(&says(found))
+        escape(&summary_sentence(found))
     );
     let sections = [
-        ("changed", "Robots that changed", changed(found)),
+        ("changed", "Robots that changed", changed_robots(found)),
         (
             "differ",
             "Robots that differ from the others",
-            differ(found),
+            outlier_table(found),
         ),
-        ("sensors", "Sensors that died", sensors(found)),
-        ("usual", "What is usual in this fleet", usual(found)),
-        ("bad", "Recordings that gave no answer", bad(found)),
+        ("sensors", "Sensors that died", dead_sensor_table(found)),
+        ("usual", "What is usual in this fleet", usual_values_table(found)),
+        ("bad", "Recordings that gave no answer", bad_recordings_table(found)),
     ];
     for (id, title, html) in sections {
         let _ = write!(
@@ -45,7 +45,7 @@ pub(crate) fn page(found: &Found) -> String {
     page
 }
 
-fn said(changes: &[Changed]) -> String {
+fn change_list(changes: &[RunChange]) -> String {
     if changes.is_empty() {
         return "<p>No single change in physics explains it.</p>\n".to_owned();
     }
@@ -66,29 +66,29 @@ fn said(changes: &[Changed]) -> String {
 }
 
 /// How clear the changes of a robot are.
-fn clear(robot: &Robot) -> f64 {
-    let steps = robot.since.iter().flat_map(|since| &since.steps);
+fn change_clarity(robot: &RobotHistory) -> f64 {
+    let steps = robot.changes.iter().flat_map(|since| &since.steps);
     steps
-        .map(|step| (step.now.value - step.before.value).abs() / step.before.beside(step.now))
+        .map(|step| (step.now.value - step.before.value).abs() / step.before.difference_deviation(step.now))
         .filter(|x| x.is_finite())
         .fold(0.0, f64::max)
 }
 
-fn changed(found: &Found) -> String {
-    let mut robots: Vec<&Robot> = found
+fn changed_robots(found: &FleetResults) -> String {
+    let mut robots: Vec<&RobotHistory> = found
         .robots
         .iter()
-        .filter(|robot| !robot.since.is_empty())
+        .filter(|robot| !robot.changes.is_empty())
         .collect();
     if robots.is_empty() {
         return "<p>No robot changed and stayed changed.</p>\n".to_owned();
     }
-    robots.sort_by(|a, b| clear(b).total_cmp(&clear(a)));
+    robots.sort_by(|a, b| change_clarity(b).total_cmp(&change_clarity(a)));
     let infos = found.ground.parameters();
     let mut html = String::new();
-    for robot in robots.iter().take(SHOWN) {
+    for robot in robots.iter().take(MOST_PICTURED) {
         let _ = writeln!(html, "<h3>{}</h3>", escape(&robot.name));
-        for since in &robot.since {
+        for since in &robot.changes {
             let grows = match (since.per_day, since.steps.first()) {
                 (Some(per_day), Some(step)) => {
                     let info = &infos[step.parameter];
@@ -107,10 +107,10 @@ fn changed(found: &Found) -> String {
                 escape(&robot.days[since.day].name),
                 escape(&grows)
             );
-            html.push_str(&said(&since.changes));
+            html.push_str(&change_list(&since.changes));
         }
         // The clearest parameter says it in one picture.
-        let Some(step) = robot.since.first().and_then(|since| since.steps.first()) else {
+        let Some(step) = robot.changes.first().and_then(|since| since.steps.first()) else {
             continue;
         };
         let k = step.parameter;
@@ -120,13 +120,13 @@ fn changed(found: &Found) -> String {
                 Some((at, [fitted.value, fitted.deviation?]))
             })
             .collect();
-        let steps: Vec<(usize, [f64; 2])> = (robot.since.iter())
+        let steps: Vec<(usize, [f64; 2])> = (robot.changes.iter())
             .filter_map(|since| {
                 let own = since.steps.iter().find(|step| step.parameter == k)?;
                 Some((since.day, [own.before.value, own.now.value]))
             })
             .collect();
-        html.push_str(&over_runs(
+        html.push_str(&parameter_history(
             &infos[k],
             "day",
             robot.days.len(),
@@ -134,20 +134,20 @@ fn changed(found: &Found) -> String {
             &steps,
         ));
     }
-    if robots.len() > SHOWN {
+    if robots.len() > MOST_PICTURED {
         let _ = writeln!(
             html,
             "<p>And {} more, which stand in <code>results.json</code>:</p>",
-            robots.len() - SHOWN
+            robots.len() - MOST_PICTURED
         );
-        let rows: Vec<Vec<Cell>> = robots[SHOWN..]
+        let rows: Vec<Vec<TableCell>> = robots[MOST_PICTURED..]
             .iter()
             .flat_map(|robot| {
-                robot.since.iter().map(|since| {
+                robot.changes.iter().map(|since| {
                     vec![
-                        Cell::text(&robot.name),
-                        Cell::text(&robot.days[since.day].name),
-                        Cell::html(said(&since.changes)),
+                        TableCell::text(&robot.name),
+                        TableCell::text(&robot.days[since.day].name),
+                        TableCell::html(change_list(&since.changes)),
                     ]
                 })
             })
@@ -161,20 +161,20 @@ fn changed(found: &Found) -> String {
     html
 }
 
-fn differ(found: &Found) -> String {
+fn outlier_table(found: &FleetResults) -> String {
     if found.outliers.found.is_empty() {
         return "<p>No robot differs from the others by far more than they differ by among themselves.</p>\n".to_owned();
     }
-    let rows: Vec<Vec<Cell>> = (found.outliers.found.iter())
+    let rows: Vec<Vec<TableCell>> = (found.outliers.found.iter())
         .map(|one| {
-            let apart = found.outliers.apart[one.which]
+            let apart = found.outliers.distances[one.robot]
                 .iter()
                 .flatten()
                 .fold(0.0_f64, |most, x| most.max(x.abs()));
             vec![
-                Cell::text(&found.robots[one.which].name),
-                Cell::html(said(&one.changes)),
-                Cell::number(&significant(apart, 3), apart),
+                TableCell::text(&found.robots[one.robot].name),
+                TableCell::html(change_list(&one.changes)),
+                TableCell::number(&significant(apart, 3), apart),
             ]
         })
         .collect();
@@ -186,20 +186,20 @@ fn differ(found: &Found) -> String {
     table("changes", &head, &rows)
 }
 
-fn sensors(found: &Found) -> String {
-    let rows: Vec<Vec<Cell>> = (found.robots.iter())
+fn dead_sensor_table(found: &FleetResults) -> String {
+    let rows: Vec<Vec<TableCell>> = (found.robots.iter())
         .flat_map(|robot| {
             robot.dead.iter().map(|dead| {
                 vec![
-                    Cell::text(&robot.name),
-                    Cell::text(&dead.of),
-                    Cell::text(&robot.days[dead.day].name),
-                    Cell::number(&dead.days.to_string(), dead.days as f64),
-                    Cell::number(
+                    TableCell::text(&robot.name),
+                    TableCell::text(&dead.sensor),
+                    TableCell::text(&robot.days[dead.day].name),
+                    TableCell::number(&dead.days.to_string(), dead.days as f64),
+                    TableCell::number(
                         &format!("{:.0} %", 100.0 * dead.first.still),
                         dead.first.still,
                     ),
-                    Cell::text(&dead.first.recording),
+                    TableCell::text(&dead.first.recording),
                 ]
             })
         })
@@ -218,18 +218,18 @@ fn sensors(found: &Found) -> String {
     table("sensors", &head, &rows)
 }
 
-fn usual(found: &Found) -> String {
+fn usual_values_table(found: &FleetResults) -> String {
     let infos = found.ground.parameters();
-    let rows: Vec<Vec<Cell>> = (infos.iter().zip(&found.outliers.usual))
+    let rows: Vec<Vec<TableCell>> = (infos.iter().zip(&found.outliers.usual))
         .filter_map(|(info, usual)| {
             let usual = (*usual)?;
             let spread = usual.deviation?;
             Some(vec![
-                Cell::text(&info.name),
-                Cell::number(&significant(usual.value, 5), usual.value),
-                Cell::number(&significant(spread, 2), spread),
-                Cell::text(&info.unit),
-                Cell::html(format!(
+                TableCell::text(&info.name),
+                TableCell::number(&significant(usual.value, 5), usual.value),
+                TableCell::number(&significant(spread, 2), spread),
+                TableCell::text(&info.unit),
+                TableCell::html(format!(
                     "<code class=\"expression\">{}</code>",
                     escape(&info.expression)
                 )),
@@ -249,10 +249,10 @@ fn usual(found: &Found) -> String {
     )
 }
 
-fn bad(found: &Found) -> String {
-    let rows: Vec<Vec<Cell>> = found
+fn bad_recordings_table(found: &FleetResults) -> String {
+    let rows: Vec<Vec<TableCell>> = found
         .bad()
-        .map(|one| vec![Cell::text(&one.recording), Cell::text(&one.says)])
+        .map(|one| vec![TableCell::text(&one.recording), TableCell::text(&one.says)])
         .collect();
     if rows.is_empty() {
         return "<p>All gave one.</p>\n".to_owned();

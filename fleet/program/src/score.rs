@@ -5,22 +5,22 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
-use modelmill_fleet::Fault;
+use modelmill_fleet::FleetFault;
 use serde_json::Value;
 
-fn read(path: &Path) -> Result<Value, Fault> {
+fn read(path: &Path) -> Result<Value, FleetFault> {
     let text = fs::read_to_string(path).map_err(|error| {
-        Fault::new(format!(
+        FleetFault::new(format!(
             "{} cannot be read: {error}; name what `identify` or `make` wrote",
             path.display()
         ))
     })?;
-    serde_json::from_str(&text).map_err(|error| Fault::new(format!("{}: {error}", path.display())))
+    serde_json::from_str(&text).map_err(|error| FleetFault::new(format!("{}: {error}", path.display())))
 }
 
 /// How many of a kind there are, how many were found, and with their day within a day.
 #[derive(Default)]
-struct Tally {
+struct ScoreTally {
     planted: usize,
     found: usize,
     in_time: usize,
@@ -31,7 +31,7 @@ struct Tally {
 /// Holds results, in a folder that [`crate::identify`] wrote, against a truth.
 ///
 /// Fails where either cannot be read, or they are of two fleets.
-pub fn score(found: &Path, truth: &Path) -> Result<String, Fault> {
+pub fn score(found: &Path, truth: &Path) -> Result<String, FleetFault> {
     let results = read(&found.join("results.json"))?;
     let truth = read(truth)?;
     let days: Vec<String> = list(&truth["days"]).iter().map(text).collect();
@@ -47,12 +47,12 @@ pub fn score(found: &Path, truth: &Path) -> Result<String, Fault> {
         .into_iter()
         .map(|one| (text(&one["robot"]), one))
         .collect();
-    let mut tallies: BTreeMap<String, Tally> = BTreeMap::new();
+    let mut tallies: BTreeMap<String, ScoreTally> = BTreeMap::new();
     let (mut sound, mut alarms) = (0_u32, Vec::new());
     for one in list(&truth["robots"]) {
         let (name, planted) = (text(&one["robot"]), &one["planted"]);
         let Some(robot) = robots.get(&name) else {
-            return Err(Fault::new(format!(
+            return Err(FleetFault::new(format!(
                 "{} has no robot {name}; the truth is of another fleet",
                 found.display()
             )));
@@ -99,14 +99,14 @@ pub fn score(found: &Path, truth: &Path) -> Result<String, Fault> {
             }
             "odd" => {
                 let own = differ.get(&name);
-                let is_named = own.is_some_and(|one| names(&one["changes"], "payload", None));
+                let is_named = own.is_some_and(|one| has_change(&one["changes"], "payload", None));
                 (own.is_some(), own.is_some() && since.is_empty(), is_named)
             }
             _ => {
                 let near = since.iter().any(|one| is_near(&one["day"]));
                 let is_named = since.iter().any(|one| match kind.as_str() {
-                    "wear" => names(&one["changes"], "friction", planted["at"].as_str()),
-                    _ => names(&one["changes"], "payload", None),
+                    "wear" => has_change(&one["changes"], "friction", planted["at"].as_str()),
+                    _ => has_change(&one["changes"], "payload", None),
                 });
                 (!since.is_empty(), near, is_named)
             }
@@ -127,13 +127,13 @@ pub fn score(found: &Path, truth: &Path) -> Result<String, Fault> {
                 .push(format!("{name} planted {planted}, found {days:?} {says:?}"));
         }
     }
-    let mut says = told(&tallies, sound, &alarms);
-    says.push_str(&of_bad(&results, &truth));
+    let mut says = score_text(&tallies, sound, &alarms);
+    says.push_str(&bad_recordings_text(&results, &truth));
     Ok(says)
 }
 
 /// Whether one of the changes is of a kind, at a place if one is named.
-fn names(changes: &Value, kind: &str, at: Option<&str>) -> bool {
+fn has_change(changes: &Value, kind: &str, at: Option<&str>) -> bool {
     list(changes).iter().any(|change| {
         let is_there = at.is_none_or(|at| {
             list(&change["at"])
@@ -153,7 +153,7 @@ fn text(value: &Value) -> String {
 }
 
 /// What was found of each kind, and which sound robots raised an alarm.
-fn told(tallies: &BTreeMap<String, Tally>, sound: u32, alarms: &[String]) -> String {
+fn score_text(tallies: &BTreeMap<String, ScoreTally>, sound: u32, alarms: &[String]) -> String {
     let mut says = String::new();
     for (kind, tally) in tallies.iter().filter(|(_, tally)| tally.planted > 0) {
         let _ = writeln!(
@@ -178,7 +178,7 @@ fn told(tallies: &BTreeMap<String, Tally>, sound: u32, alarms: &[String]) -> Str
 }
 
 /// Which recordings were said to give no answer.
-fn of_bad(results: &Value, truth: &Value) -> String {
+fn bad_recordings_text(results: &Value, truth: &Value) -> String {
     let mut bad: Vec<String> = list(&results["bad"])
         .iter()
         .map(|one| text(&one["recording"]))

@@ -7,22 +7,22 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
-use modelmill_fleet::{Fault, Summary};
+use modelmill_fleet::{FleetFault, FleetSummary};
 
 /// The summaries of a robot that are kept.
-pub(crate) struct State {
+pub(crate) struct SummaryStore {
     path: PathBuf,
     file: Mutex<File>,
 }
 
-impl State {
+impl SummaryStore {
     /// Opens the file of a robot, with the summaries that it holds by the keys of their recordings; those of another plan do not
     /// count.
     pub(crate) fn open(
         folder: &Path,
         robot: &str,
         mark: u64,
-    ) -> Result<(Self, HashMap<String, Summary>), Fault> {
+    ) -> Result<(Self, HashMap<String, FleetSummary>), FleetFault> {
         let name: String = robot
             .chars()
             .map(|c| {
@@ -39,7 +39,7 @@ impl State {
             .fold(0_u32, |n, b| n.wrapping_mul(31).wrapping_add(u32::from(b)));
         let path = folder.join(format!("{name}-{number:08x}.sums"));
         let fault = |error: std::io::Error| {
-            Fault::new(format!(
+            FleetFault::new(format!(
                 "{} cannot be kept: {error}; choose another folder, or make room",
                 path.display()
             ))
@@ -70,7 +70,7 @@ impl State {
     }
 
     /// Keeps the summary of a recording.
-    pub(crate) fn keep(&self, key: &str, summary: &Summary) -> Result<(), Fault> {
+    pub(crate) fn append(&self, key: &str, summary: &FleetSummary) -> Result<(), FleetFault> {
         let bytes = summary.bytes();
         let mut entry = Vec::with_capacity(key.len() + bytes.len() + 16);
         for part in [key.as_bytes(), &bytes] {
@@ -82,7 +82,7 @@ impl State {
             .lock()
             .unwrap_or_else(std::sync::PoisonError::into_inner);
         file.write_all(&entry).map_err(|error| {
-            Fault::new(format!(
+            FleetFault::new(format!(
                 "{} cannot be kept: {error}; make room and start again: it goes on",
                 self.path.display()
             ))
@@ -91,7 +91,7 @@ impl State {
 }
 
 /// The entry at a place, and where it ends; `None` where there is none, or it is cut off.
-fn entry(bytes: &[u8], at: usize) -> Option<(String, Summary, usize)> {
+fn entry(bytes: &[u8], at: usize) -> Option<(String, FleetSummary, usize)> {
     let part = |at: usize| -> Option<(&[u8], usize)> {
         let length = bytes.get(at..at.checked_add(8)?)?;
         let length = usize::try_from(u64::from_le_bytes(length.try_into().ok()?)).ok()?;
@@ -101,5 +101,5 @@ fn entry(bytes: &[u8], at: usize) -> Option<(String, Summary, usize)> {
     let (key, end) = part(at)?;
     let (summary, end) = part(end)?;
     let key = String::from_utf8(key.to_vec()).ok()?;
-    Some((key, Summary::of_bytes(summary).ok()?, end))
+    Some((key, FleetSummary::from_bytes(summary).ok()?, end))
 }

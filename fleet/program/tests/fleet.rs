@@ -3,11 +3,11 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use modelmill::recording::Reading;
+use modelmill::recording::RecordingOptions;
 use modelmill_fleet::folder::robots;
-use modelmill_fleet::{Ground, Plan, Summary};
-use modelmill_fleet_program::generate::{Size, generate};
-use modelmill_fleet_program::identify::{Asked, identify};
+use modelmill_fleet::{FleetModel, FleetPlan, FleetSummary};
+use modelmill_fleet_program::generate::{FleetSize, generate};
+use modelmill_fleet_program::identify::{FleetRequest, identify};
 use modelmill_fleet_program::score::score;
 use serde_json::Value;
 
@@ -17,7 +17,7 @@ struct Fleet(PathBuf);
 impl Fleet {
     fn new(name: &str, robots: usize, bad: usize) -> Self {
         let folder = std::env::temp_dir().join(format!("modelmill-{name}-{}", std::process::id()));
-        let size = Size {
+        let size = FleetSize {
             robots,
             days: 7,
             per_day: 1,
@@ -37,12 +37,12 @@ impl Fleet {
 
     fn identify(&self, out: &str) -> String {
         let (model, recordings, out) = (self.at("model.toml"), self.at("recordings"), self.at(out));
-        let asked = Asked {
+        let asked = FleetRequest {
             model: &model,
             recordings: &recordings,
             out: &out,
             plan: None,
-            reading: &Reading::default(),
+            reading: &RecordingOptions::default(),
         };
         identify(&asked).expect("results")
     }
@@ -54,12 +54,12 @@ impl Fleet {
         .expect("JSON")
     }
 
-    fn ground(&self) -> Ground {
+    fn ground(&self) -> FleetModel {
         let first = self.at("recordings/robot=R00000/day=2026-03-01/recording=0/data.parquet");
         let plan =
-            Plan::make(&self.at("model.toml"), &Reading::default(), &[&first]).expect("a plan");
-        assert_eq!(Plan::parse("the plan", &plan.json()).expect("a plan"), plan);
-        plan.ground().expect("a ground")
+            FleetPlan::from_recordings(&self.at("model.toml"), &RecordingOptions::default(), &[&first]).expect("a plan");
+        assert_eq!(FleetPlan::parse("the plan", &plan.json()).expect("a plan"), plan);
+        plan.derive_model().expect("a ground")
     }
 }
 
@@ -69,7 +69,7 @@ impl Drop for Fleet {
     }
 }
 
-fn near(a: &Summary, b: &Summary, ground: &Ground) {
+fn near(a: &FleetSummary, b: &FleetSummary, ground: &FleetModel) {
     let [a, b] = [a, b].map(|one| ground.solve(one).expect("parameters"));
     for (a, b) in a.parameters.iter().zip(&b.parameters) {
         assert!(
@@ -117,12 +117,12 @@ fn what_was_planted_is_found_and_a_killed_job_goes_on() {
         fleet.at("recordings"),
         fleet.at("out"),
     );
-    let asked = Asked {
+    let asked = FleetRequest {
         model: &model,
         recordings: &recordings,
         out: &out,
         plan: None,
-        reading: &Reading::default(),
+        reading: &RecordingOptions::default(),
     };
     assert!(
         identify(&asked)
@@ -142,12 +142,12 @@ fn summaries_add_in_any_order_and_samples_come_in_any() {
         .flatten()
         .map(|file| (file.name, file.path))
         .collect();
-    let summaries: Vec<Summary> = all
+    let summaries: Vec<FleetSummary> = all
         .iter()
         .map(|(name, path)| ground.summarise_file(name, path))
         .collect();
-    let sum = |order: &mut dyn Iterator<Item = &Summary>| {
-        let mut sum = ground.empty();
+    let sum = |order: &mut dyn Iterator<Item = &FleetSummary>| {
+        let mut sum = ground.empty_summary();
         order.for_each(|one| sum.merge(one).expect("one plan"));
         sum
     };
@@ -155,22 +155,22 @@ fn summaries_add_in_any_order_and_samples_come_in_any() {
     assert_eq!(whole.recordings, 21);
     near(&whole, &sum(&mut summaries.iter().rev()), &ground);
     // Parts of parts.
-    let parts: Vec<Summary> = summaries
+    let parts: Vec<FleetSummary> = summaries
         .chunks(4)
         .map(|some| sum(&mut some.iter()))
         .collect();
     near(&whole, &sum(&mut parts.iter().rev()), &ground);
     // As bytes, which are told apart from bytes that were changed.
     let bytes = whole.bytes();
-    let again = Summary::of_bytes(&bytes).expect("a summary");
+    let again = FleetSummary::from_bytes(&bytes).expect("a summary");
     assert_eq!(again.bytes(), bytes);
     near(&again, &whole, &ground);
     for broken in [&bytes[..bytes.len() - 3], &bytes[1..], &[][..]] {
-        assert!(Summary::of_bytes(broken).is_err());
+        assert!(FleetSummary::from_bytes(broken).is_err());
     }
     let mut changed = bytes.clone();
     changed[200] ^= 1;
-    assert!(Summary::of_bytes(&changed).is_err());
+    assert!(FleetSummary::from_bytes(&changed).is_err());
     // Samples of a recording in another order are the same recording, to the last digit.
     let columns = read(&all[3].1, &ground);
     let n = columns[0].1.len();
@@ -182,7 +182,7 @@ fn summaries_add_in_any_order_and_samples_come_in_any() {
     assert_ne!(shuffled, columns);
     let [a, b] = [columns, shuffled].map(|columns| ground.summarise("one", columns));
     assert_eq!(a, b);
-    assert_eq!((a.recordings, &a.whole), (1, &summaries[3].whole));
+    assert_eq!((a.recordings, &a.all_columns), (1, &summaries[3].all_columns));
 }
 
 #[test]
@@ -224,7 +224,7 @@ fn recordings_that_give_no_answer_are_named() {
 }
 
 /// The columns of a file.
-fn read(path: &Path, ground: &Ground) -> Vec<(String, Vec<f64>)> {
+fn read(path: &Path, ground: &FleetModel) -> Vec<(String, Vec<f64>)> {
     let model = modelmill::Model::open(
         path.ancestors()
             .nth(5)
@@ -233,7 +233,7 @@ fn read(path: &Path, ground: &Ground) -> Vec<(String, Vec<f64>)> {
     )
     .expect("a model");
     let recording = model
-        .recording(path, &Reading::default())
+        .recording(path, &RecordingOptions::default())
         .expect("a recording");
     let column = |name: String| {
         let values = recording.raw_column(&name).expect("a column").to_vec();

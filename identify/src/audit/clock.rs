@@ -5,15 +5,15 @@
 use std::collections::BTreeMap;
 
 use crate::motion::mean_rate;
-use crate::recording::{Note, Recording};
+use crate::recording::{RecordingNote, SignalRecording};
 use crate::signal::median;
-use crate::words::{list, with_digits};
+use crate::words::{backquoted_list, with_digits};
 
 /// A clock that is off by less may be the scale of a sensor, or its noise.
-const OFF: f64 = 0.005;
+const MIN_CLOCK_ERROR: f64 = 0.005;
 /// Two thirds of the coordinates must see this part of what the clock is off: one that walks is off otherwise at other times, when
 /// others move.
-const AGREE: f64 = 0.4;
+const AGREEMENT_SHARE: f64 = 0.4;
 /// Ratios beyond are slips of units, which are told elsewhere.
 const CLOCKS: std::ops::Range<f64> = 0.9..1.1;
 /// Pieces of the recording, at most, over which rates are summed.
@@ -23,22 +23,22 @@ const SHORTEST: usize = 8;
 /// Part of all samples that repeat their neighbour before it is told.
 const REPEATED: f64 = 0.02;
 
-impl Recording {
+impl SignalRecording {
     /// Warnings about the times of samples. `coordinates` are names of positions.
-    pub(crate) fn clock(&self, coordinates: &[&str]) -> Vec<Note> {
+    pub(crate) fn clock_notes(&self, coordinates: &[&str]) -> Vec<RecordingNote> {
         let Ok(time) = self.column("t") else {
             return Vec::new();
         };
-        let mut notes: Vec<Note> = self.wrong_clock(time, coordinates).into_iter().collect();
-        notes.extend(self.repeated(time, coordinates));
+        let mut notes: Vec<RecordingNote> = self.clock_error_note(time, coordinates).into_iter().collect();
+        notes.extend(self.repeated_samples_note(time, coordinates));
         notes
     }
 
-    fn wrong_clock(&self, time: &[f64], coordinates: &[&str]) -> Option<Note> {
+    fn clock_error_note(&self, time: &[f64], coordinates: &[&str]) -> Option<RecordingNote> {
         let mut ratios: BTreeMap<String, f64> = BTreeMap::new();
         for name in coordinates {
             let rate = format!("{name}_d");
-            let (Ok(q), true) = (self.column(name), self.has(&rate)) else {
+            let (Ok(q), true) = (self.column(name), self.has_column(&rate)) else {
                 continue;
             };
             if let Ok(qd) = self.column(&rate)
@@ -49,12 +49,12 @@ impl Recording {
         }
         let middle = median(ratios.values().copied().collect());
         let off = middle - 1.0;
-        if ratios.is_empty() || !CLOCKS.contains(&middle) || off.abs() < OFF {
+        if ratios.is_empty() || !CLOCKS.contains(&middle) || off.abs() < MIN_CLOCK_ERROR {
             return None;
         }
         let agree = ratios
             .values()
-            .filter(|ratio| (*ratio - 1.0) * off.signum() > AGREE * off.abs());
+            .filter(|ratio| (*ratio - 1.0) * off.signum() > AGREEMENT_SHARE * off.abs());
         if 3 * agree.count() < 2 * ratios.len() {
             return None;
         }
@@ -65,13 +65,13 @@ impl Recording {
             ("too fast", "shorter")
         };
         let duration = time[time.len() - 1] - time[0];
-        Some(Note::warning(format!(
+        Some(RecordingNote::warning(format!(
             "`t` in {} runs {runs}: positions change by {} times what the recorded {} tell, so that the run takes {} s rather \
              than {} s, {should} by {} %. Are samples counted (steps of {} s) instead of stamps read? Give the true times as `t`; \
              derivatives made of positions are off by as much, accelerations twice.",
             self.file(),
             with_digits(middle, 4),
-            list(&names),
+            backquoted_list(&names),
             with_digits(duration * middle, 5),
             with_digits(duration, 5),
             with_digits(100.0 * off.abs(), 2),
@@ -79,7 +79,7 @@ impl Recording {
         )))
     }
 
-    fn repeated(&self, time: &[f64], coordinates: &[&str]) -> Option<Note> {
+    fn repeated_samples_note(&self, time: &[f64], coordinates: &[&str]) -> Option<RecordingNote> {
         let positions: Vec<&[f64]> = coordinates
             .iter()
             .filter_map(|name| self.column(name).ok())
@@ -109,7 +109,7 @@ impl Recording {
             .product();
         let part = all as f64 / n as f64;
         (part > REPEATED + 3.0 * by_chance).then(|| {
-            Note::warning(format!(
+            RecordingNote::warning(format!(
                 "In {all} of {n} samples of {} all positions stay exactly as they were while the mechanism moves: samples were \
                  written twice, or read later than they are stamped. Derivatives of positions hear of it; recorded rates, \
                  or a lower cut-off (option `cutoff_hz`), help.",
@@ -164,7 +164,7 @@ mod tests {
     use super::*;
     use crate::ReadOptions;
 
-    fn recording(stamp: impl Fn(u32) -> f64, repeated: bool) -> Vec<Note> {
+    fn recording(stamp: impl Fn(u32) -> f64, repeated: bool) -> Vec<RecordingNote> {
         let mut text = "t,a,a_d,b,b_d\n".to_owned();
         for i in 0..4000 {
             let k = if repeated && i % 40 == 7 { i - 1 } else { i };
@@ -174,8 +174,8 @@ mod tests {
             let (a_d, b_d) = (2.0 * (2.0 * t).cos(), -3.0 * (3.0 * t).sin());
             writeln!(text, "{},{a},{a_d},{b},{b_d}", stamp(i)).unwrap();
         }
-        let read = Recording::from_bytes(text.as_bytes(), "run.csv", &ReadOptions::default());
-        read.unwrap().clock(&["a", "b"])
+        let read = SignalRecording::from_bytes(text.as_bytes(), "run.csv", &ReadOptions::default());
+        read.unwrap().clock_notes(&["a", "b"])
     }
 
     #[test]

@@ -5,10 +5,10 @@
 
 use std::f64::consts::PI;
 
-use crate::motion::{DerivativeSource, Run};
-use crate::recording::{GAP, Note, Recording};
+use crate::motion::{DerivativeSource, PreparedRun};
+use crate::recording::{GAP, RecordingNote, SignalRecording};
 use crate::signal::median;
-use crate::words::{list, with_digits};
+use crate::words::{backquoted_list, with_digits};
 
 /// Ratios of a rate to the derivative of its position that pass as 1; drift and coarse sampling make a few per cent.
 const RATIO_TOLERANCE: f64 = 0.1;
@@ -19,9 +19,9 @@ const SLOWEST: f64 = 0.5;
 /// Nobody samples forces of a machine in shorter steps, s.
 const FASTEST: f64 = 2e-6;
 
-impl Run {
+impl PreparedRun {
     /// Warnings about measured forces of the given drives that are 0 throughout, which fit parameters of 0 exactly.
-    pub fn suspicious_forces(&self, drives: &[String], undriven: &[String]) -> Vec<Note> {
+    pub fn zero_force_notes(&self, drives: &[String], undriven: &[String]) -> Vec<RecordingNote> {
         let forces = self.force.iter().flatten();
         let idle: Vec<String> = drives
             .iter()
@@ -32,47 +32,47 @@ impl Run {
         if idle.is_empty() {
             return Vec::new();
         }
-        vec![Note::warning(format!(
+        vec![RecordingNote::warning(format!(
             "The measured force of {} in {} is 0 throughout: nothing was measured, or the column is another one (option `columns`); \
              errors relative to it have no value, and it pulls parameters to 0.",
-            list(&idle),
+            backquoted_list(&idle),
             self.file
         ))]
     }
 }
 
-impl Recording {
+impl SignalRecording {
     /// Warnings about columns that can be read but hardly are what they should be. `coordinates` are
     /// `(name, whether it is an angle)`; columns that cannot be used are passed over.
-    pub fn suspicions(
+    pub fn suspicious_columns(
         &self,
         coordinates: &[(String, bool)],
         source: DerivativeSource,
-    ) -> Vec<Note> {
+    ) -> Vec<RecordingNote> {
         let Ok(time) = self.column("t") else {
             return Vec::new();
         };
-        let mut notes: Vec<Note> = coordinates
+        let mut notes: Vec<RecordingNote> = coordinates
             .iter()
             .filter(|(_, is_angle)| *is_angle)
-            .filter_map(|(name, _)| self.wrapped(name, time))
+            .filter_map(|(name, _)| self.wrapped_angle_note(name, time))
             .collect();
         let (rates, settled) = if source == DerivativeSource::Positions {
             (Vec::new(), false)
         } else {
-            self.rates(coordinates, time)
+            self.rate_mismatch_notes(coordinates, time)
         };
         let step = median(time.windows(2).map(|w| w[1] - w[0]).collect());
         // One sample has no steps.
         if time.len() > 1 && step <= FASTEST {
-            notes.push(Note::warning(format!(
+            notes.push(RecordingNote::warning(format!(
                 "The steps of `t` in {} are {} s, which is fast for a recording of forces; time must be in s.",
                 self.file(),
                 with_digits(step, 3)
             )));
         }
         if step >= SLOWEST && rates.is_empty() && !settled {
-            notes.push(Note::warning(format!(
+            notes.push(RecordingNote::warning(format!(
                 "The steps of `t` in {} are {} s, which is slow for a recording of forces; time must be in s: is it in ms?",
                 self.file(),
                 with_digits(step, 3)
@@ -80,13 +80,13 @@ impl Recording {
         }
         notes.extend(rates);
         let names: Vec<&str> = coordinates.iter().map(|(name, _)| name.as_str()).collect();
-        notes.extend(self.clock(&names));
+        notes.extend(self.clock_notes(&names));
         notes
     }
 
     /// The options that read an angle recorded in degrees, and with it those of its recorded derivatives that are in
     /// degrees too: all but those that are the derivatives in rad of what stands beside them.
-    pub fn maps_from_degrees(&self, name: &str) -> String {
+    pub fn degree_conversion_options(&self, name: &str) -> String {
         let map =
             |column: &str, unit: &str| format!("option `columns` = `{column}={column} [{unit}]`");
         let mut maps = vec![map(name, "deg")];
@@ -96,7 +96,7 @@ impl Recording {
                 continue;
             };
             let beside = self.column("t").ok().zip(self.column(&of).ok());
-            let compared = beside.and_then(|(time, of)| compare(time, of, values));
+            let compared = beside.and_then(|(time, of)| compare_rate(time, of, values));
             let is_rad = compared.is_some_and(|(ratio, misfit)| {
                 misfit < MISFIT && (ratio * 180.0 / PI - 1.0).abs() < RATIO_TOLERANCE
             });
@@ -109,7 +109,7 @@ impl Recording {
     }
 
     /// Jumps by a whole turn between neighbouring samples.
-    fn wrapped(&self, name: &str, time: &[f64]) -> Option<Note> {
+    fn wrapped_angle_note(&self, name: &str, time: &[f64]) -> Option<RecordingNote> {
         let q = self.column(name).ok()?;
         let steps: Vec<f64> = q.windows(2).map(|w| w[1] - w[0]).collect();
         let usual = median(steps.iter().map(|step| step.abs()).collect());
@@ -128,7 +128,7 @@ impl Recording {
             } else {
                 format!(", {n} times in all")
             };
-            return Some(Note::warning(format!(
+            return Some(RecordingNote::warning(format!(
                 "`{name}` in {} jumps by {name_of_turn}, {times} from {} to {} at t = {} s (line {}){all}: the angle \
                  seems to be wrapped{besides}. Record it without jumps, or add whole turns; derivatives and filters \
                  take them for motion.",
@@ -144,7 +144,7 @@ impl Recording {
 
     /// Rates and accelerations that are not the derivatives of what stands beside them, one note for each
     /// explanation; and whether there were any rates that are.
-    fn rates(&self, coordinates: &[(String, bool)], time: &[f64]) -> (Vec<Note>, bool) {
+    fn rate_mismatch_notes(&self, coordinates: &[(String, bool)], time: &[f64]) -> (Vec<RecordingNote>, bool) {
         let mut found: Vec<(String, Vec<String>, Vec<String>, f64)> = Vec::new();
         let mut settled = false;
         for (name, is_angle) in coordinates {
@@ -153,7 +153,7 @@ impl Recording {
                 let (Ok(q), Ok(qd)) = (self.column(&of), self.column(&rate)) else {
                     continue;
                 };
-                let Some((ratio, misfit)) = compare(time, q, qd) else {
+                let Some((ratio, misfit)) = compare_rate(time, q, qd) else {
                     continue;
                 };
                 if misfit < MISFIT && (ratio - 1.0).abs() < RATIO_TOLERANCE {
@@ -161,7 +161,7 @@ impl Recording {
                     continue;
                 }
                 let why = if misfit < MISFIT {
-                    explain(ratio, *is_angle)
+                    explain_ratio(ratio, *is_angle)
                 } else {
                     String::new()
                 };
@@ -187,12 +187,12 @@ impl Recording {
             } else {
                 format!("but about {} times as large: {why}", with_digits(ratio, 3))
             };
-            Note::warning(format!(
+            RecordingNote::warning(format!(
                 "{} in {} {is} not {derivative} of {} with respect to `t`, {how}. Mend the columns, or take derivatives \
                  from positions (option `source` = `positions`).",
-                list(&rates),
+                backquoted_list(&rates),
                 self.file(),
-                list(&ofs),
+                backquoted_list(&ofs),
             ))
         });
         (notes.collect(), settled)
@@ -204,7 +204,7 @@ impl Recording {
 ///
 /// The integral of the rate is held against the position, for differences of the position would amplify its noise.
 /// Each stretch between gaps counts from its own mean.
-fn compare(time: &[f64], position: &[f64], rate: &[f64]) -> Option<(f64, f64)> {
+fn compare_rate(time: &[f64], position: &[f64], rate: &[f64]) -> Option<(f64, f64)> {
     let usual = median(time.windows(2).map(|w| w[1] - w[0]).collect());
     let (mut qq, mut qi, mut ii, mut steps) = (0.0, 0.0, 0.0, 0.0);
     let largest = position.iter().fold(0.0_f64, |most, q| most.max(q.abs()));
@@ -244,7 +244,7 @@ fn compare(time: &[f64], position: &[f64], rate: &[f64]) -> Option<(f64, f64)> {
 }
 
 /// The slip of units behind a ratio of a rate to the derivative of its position.
-fn explain(ratio: f64, is_angle: bool) -> String {
+fn explain_ratio(ratio: f64, is_angle: bool) -> String {
     let degree = 180.0 / PI;
     let is = |value: f64| (ratio.abs() / value - 1.0).abs() < RATIO_TOLERANCE;
     let mut why = if is(1.0) {
@@ -284,8 +284,8 @@ mod tests {
     use std::fmt::Write as _;
 
     use super::*;
-    use crate::test_noise::Noise;
-    use crate::{Preparation, ReadOptions};
+    use crate::test_noise::TestNoise;
+    use crate::{StatePreparation, ReadOptions};
 
     /// A recording of one angle with its rate, each number by its own function of the time.
     fn recording(
@@ -293,18 +293,18 @@ mod tests {
         time: impl Fn(f64) -> f64,
         q: impl Fn(f64) -> f64,
         qd: impl Fn(f64) -> f64,
-    ) -> Recording {
+    ) -> SignalRecording {
         let mut text = "t,q,q_d,motor\n".to_owned();
         for i in 0..samples {
             let t = f64::from(i) * 0.004;
             let _ = writeln!(text, "{},{},{},{}", time(t), q(t), qd(t), t.sin());
         }
-        Recording::from_reader(text.as_bytes(), "run.csv", &ReadOptions::default()).unwrap()
+        SignalRecording::from_reader(text.as_bytes(), "run.csv", &ReadOptions::default()).unwrap()
     }
 
-    fn says(recording: &Recording) -> String {
+    fn says(recording: &SignalRecording) -> String {
         recording
-            .suspicions(&[("q".to_owned(), true)], DerivativeSource::RecordedFirst)
+            .suspicious_columns(&[("q".to_owned(), true)], DerivativeSource::RecordedFirst)
             .iter()
             .map(|note| note.says.as_str())
             .collect::<Vec<_>>()
@@ -312,7 +312,7 @@ mod tests {
     }
 
     #[track_caller]
-    fn check(recording: &Recording, expected: &str) {
+    fn check(recording: &SignalRecording, expected: &str) {
         let says = says(recording);
         if expected.is_empty() {
             assert_eq!(says, "");
@@ -350,7 +350,7 @@ mod tests {
 
     #[test]
     fn noise_bias_and_coarse_steps_are_no_suspicion() {
-        let noise = std::cell::RefCell::new(Noise::new(3));
+        let noise = std::cell::RefCell::new(TestNoise::new(3));
         let draw = |size: f64| size * noise.borrow_mut().normal();
         // A quantised and noisy position, a rate with noise and some offset.
         let rough = recording(
@@ -370,7 +370,7 @@ mod tests {
     #[test]
     fn time_in_milliseconds_is_seen_without_rates() {
         let slow = recording(500, |t| 1e3 * t, q, qd);
-        let notes = slow.suspicions(&[("q".to_owned(), true)], DerivativeSource::Positions);
+        let notes = slow.suspicious_columns(&[("q".to_owned(), true)], DerivativeSource::Positions);
         assert!(
             notes.len() == 1 && notes[0].says.contains("is it in ms?"),
             "{notes:?}"
@@ -381,7 +381,7 @@ mod tests {
     fn a_wrapped_angle_is_named_with_its_line() {
         let wrap = |t: f64| (0.8 * t + PI).rem_euclid(2.0 * PI) - PI;
         let wrapped = recording(4000, |t| t, wrap, |_| 0.8);
-        let notes = wrapped.suspicions(&[("q".to_owned(), true)], DerivativeSource::Positions);
+        let notes = wrapped.suspicious_columns(&[("q".to_owned(), true)], DerivativeSource::Positions);
         assert!(
             notes.len() == 1
                 && notes[0].says.contains("jumps by 2 pi")
@@ -391,7 +391,7 @@ mod tests {
         );
         // A length may jump as it likes.
         assert_eq!(
-            wrapped.suspicions(&[("q".to_owned(), false)], DerivativeSource::Positions),
+            wrapped.suspicious_columns(&[("q".to_owned(), false)], DerivativeSource::Positions),
             []
         );
     }
@@ -407,9 +407,9 @@ mod tests {
         );
         let names = ["q".to_owned()];
         let drives = ["motor".to_owned()];
-        let positions = Preparation {
+        let positions = StatePreparation {
             source: DerivativeSource::Positions,
-            ..Preparation::default()
+            ..StatePreparation::default()
         };
         let runs = broken.runs_with(&names, &drives, &positions).unwrap();
         assert_eq!(runs.len(), 2);
@@ -428,6 +428,6 @@ mod tests {
         assert_eq!(runs[1].lines.len(), runs[1].samples());
         // Recorded rates need no filter, hence no cut.
         let recorded = recording(100, |t| if t < 0.2 { t } else { t + 1.0 }, q, qd);
-        assert_eq!(recorded.stretches(0.0).len(), 2);
+        assert_eq!(recorded.split_at_gaps(0.0).len(), 2);
     }
 }

@@ -6,13 +6,13 @@
 
 use nalgebra::{Cholesky, DVector, Dyn};
 
-use super::by_channel::ByChannel;
-use super::robust::factored;
+use super::by_channel::ChannelRegressor;
+use super::robust::factor_normal;
 
 /// How well a regressor can explain forces.
 #[derive(Debug, Clone)]
 pub struct ForceAudit {
-    regressor: ByChannel,
+    regressor: ChannelRegressor,
     /// Of the normal equations of scaled columns, with the scales.
     factor: Cholesky<f64, Dyn>,
     scale: DVector<f64>,
@@ -20,24 +20,24 @@ pub struct ForceAudit {
 
 /// Something about the forces that would explain them better.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Suspect {
+pub enum WiringFault {
     /// Two channels are exchanged.
     Swapped(usize, usize),
     /// A channel has another sign than the others; of two channels it is not known which.
-    Turned(usize),
+    Reversed(usize),
 }
 
 impl ForceAudit {
     /// Factorises a regressor; `None` if it has fewer rows than twice its columns, or a number that is not finite.
-    pub fn new(regressor: ByChannel) -> Option<Self> {
+    pub fn new(regressor: ChannelRegressor) -> Option<Self> {
         let rows = regressor.samples() * regressor.channels();
         if rows == 0 || rows < 2 * regressor.columns() {
             return None;
         }
         let alike = DVector::from_element(rows, 1.0);
         let none = DVector::zeros(rows);
-        let (normal, _) = regressor.normal(&alike, &none, 0..regressor.samples());
-        let (factor, scale) = factored(normal)?;
+        let (normal, _) = regressor.normal_equations(&alike, &none, 0..regressor.samples());
+        let (factor, scale) = factor_normal(normal)?;
         Some(Self {
             regressor,
             factor,
@@ -48,28 +48,28 @@ impl ForceAudit {
     /// Relative error of the best fit to forces interleaved per sample; `None` where they are all zero.
     pub fn error(&self, forces: &DVector<f64>) -> Option<f64> {
         let size = forces.norm_squared();
-        let right = (self.regressor.transposed_times(forces)).component_mul(&self.scale);
+        let right = (self.regressor.multiply_transposed(forces)).component_mul(&self.scale);
         let explained = right.dot(&self.factor.solve(&right));
         (size > 0.0).then(|| ((size - explained).max(0.0) / size).sqrt())
     }
 
     /// The exchange or change of sign of forces that lowers the error most, with the error without and with it.
-    pub fn suspect(&self, forces: &DVector<f64>) -> Option<(Suspect, [f64; 2])> {
+    pub fn find_wiring_fault(&self, forces: &DVector<f64>) -> Option<(WiringFault, [f64; 2])> {
         let n = self.regressor.channels();
         let now = self.error(forces)?;
-        let changed = |change: Suspect| {
+        let changed = |change: WiringFault| {
             let mut changed = forces.clone();
             for row in 0..forces.len() / n {
                 match change {
-                    Suspect::Swapped(a, b) => changed.swap((row * n + a, 0), (row * n + b, 0)),
-                    Suspect::Turned(a) => changed[row * n + a] *= -1.0,
+                    WiringFault::Swapped(a, b) => changed.swap((row * n + a, 0), (row * n + b, 0)),
+                    WiringFault::Reversed(a) => changed[row * n + a] *= -1.0,
                 }
             }
             changed
         };
-        let swaps = (0..n).flat_map(|a| (a + 1..n).map(move |b| Suspect::Swapped(a, b)));
+        let swaps = (0..n).flat_map(|a| (a + 1..n).map(move |b| WiringFault::Swapped(a, b)));
         swaps
-            .chain((0..n).map(Suspect::Turned))
+            .chain((0..n).map(WiringFault::Reversed))
             .filter_map(|change| Some((change, [now, self.error(&changed(change))?])))
             .min_by(|a, b| a.1[1].total_cmp(&b.1[1]))
     }
@@ -80,7 +80,7 @@ mod tests {
     use nalgebra::DMatrix;
 
     use super::*;
-    use crate::test_noise::Noise;
+    use crate::test_noise::TestNoise;
 
     /// Two joints with inertia and friction each, coupled by gravity.
     fn rows(time: impl Fn(usize) -> f64, samples: &[usize]) -> DMatrix<f64> {
@@ -101,7 +101,7 @@ mod tests {
         let n = 3000;
         let all: Vec<usize> = (0..n).collect();
         let y = rows(|k| k as f64 * 0.002, &all) * DVector::from_row_slice(&TRUTH);
-        let mut random = Noise::new(7);
+        let mut random = TestNoise::new(7);
         let channels = (0..2).map(|c| {
             let values = (0..n).map(|k| y[2 * k + c] + 0.01 * random.normal());
             values.collect()
@@ -114,7 +114,7 @@ mod tests {
     fn exchanged_and_turned_forces_are_found() {
         let (samples, forces) = forces();
         let explained =
-            ForceAudit::new(ByChannel::new(&rows(|k| k as f64 * 0.002, &samples), 2)).unwrap();
+            ForceAudit::new(ChannelRegressor::new(&rows(|k| k as f64 * 0.002, &samples), 2)).unwrap();
         let interleaved = |channels: [&Vec<f64>; 2], sign: f64| {
             let rows = samples
                 .iter()
@@ -122,13 +122,13 @@ mod tests {
             DVector::from_iterator(2 * samples.len(), rows)
         };
         let swapped = interleaved([&forces[1], &forces[0]], 1.0);
-        let (found, [before, after]) = explained.suspect(&swapped).unwrap();
-        assert_eq!(found, Suspect::Swapped(0, 1));
+        let (found, [before, after]) = explained.find_wiring_fault(&swapped).unwrap();
+        assert_eq!(found, WiringFault::Swapped(0, 1));
         assert!(before > 0.2 && after < 0.02, "{before} {after}");
         let turned = interleaved([&forces[0], &forces[1]], -1.0);
         // With two channels the one cannot be told from the other: all parameters may change their signs.
-        let (found, [before, after]) = explained.suspect(&turned).unwrap();
-        assert!(matches!(found, Suspect::Turned(_)));
+        let (found, [before, after]) = explained.find_wiring_fault(&turned).unwrap();
+        assert!(matches!(found, WiringFault::Reversed(_)));
         assert!(before > 0.2 && after < 0.02, "{before} {after}");
     }
 }

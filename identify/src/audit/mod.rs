@@ -10,8 +10,8 @@ mod positions;
 mod robust;
 mod signals;
 
-pub use by_channel::ByChannel;
-pub use delay::{Delay, DelayAudit, Delays};
-pub use exchange::{ForceAudit, Suspect};
+pub use by_channel::ChannelRegressor;
+pub use delay::{DelayEstimate, DelayAudit, ForceDelays};
+pub use exchange::{ForceAudit, WiringFault};
 pub use positions::PositionFault;
 pub use robust::{RobustFit, robust_fit};

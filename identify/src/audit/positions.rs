@@ -4,7 +4,7 @@
 //! Where stamps are wrong by a time, positions are wrong by that time and their rate: in proportion to the rate, and for all
 //! coordinates by the same time. Where there is play, the reading jumps each time the load changes sides, by one length to and fro.
 
-use crate::recording::Recording;
+use crate::recording::SignalRecording;
 use crate::signal::median;
 
 /// Neighbours on either side of a sample.
@@ -13,22 +13,22 @@ const SIDE: usize = 5;
 const SLOW: f64 = 0.1;
 const FAST: f64 = 0.4;
 /// How many times as large errors must be where a coordinate runs.
-const GROWS: f64 = 3.0;
+const MIN_ERROR_GROWTH: f64 = 3.0;
 /// How much alike the times must be that two coordinates tell.
-const ALIKE: f64 = 0.7;
+const MIN_AGREEMENT: f64 = 0.7;
 /// Samples on either side of a place from which a jump there is told.
-const ABOUT: usize = 10;
+const JUMP_NEIGHBOURS: usize = 10;
 /// Jumps that must tell of play, and by how many deviations each must stand out.
 const JUMPS: usize = 3;
-const OUT: f64 = 8.0;
+const MIN_JUMP_DEVIATIONS: f64 = 8.0;
 /// An encoder's own steps are no play: jumps must be so many of them.
 const STEPS: f64 = 8.0;
 /// Nor is what is less than this part of the travel.
-const LEAST: f64 = 5e-5;
+const MIN_TRAVEL_SHARE: f64 = 5e-5;
 /// How much jumps may differ.
 const SPREAD: f64 = 0.35;
 /// Samples that are looked at.
-const LOOKED_AT: usize = 20_000;
+const MAX_SAMPLES: usize = 20_000;
 
 /// A fault of the positions of a recording.
 #[derive(Clone, Debug, PartialEq)]
@@ -39,7 +39,7 @@ pub enum PositionFault {
         time: f64,
     },
     /// A coordinate's reading jumps to and fro by so many rad or m.
-    Play {
+    Backlash {
         /// The coordinate.
         coordinate: String,
         /// The jump, rad or m.
@@ -47,14 +47,14 @@ pub enum PositionFault {
     },
 }
 
-impl Recording {
+impl SignalRecording {
     /// Faults of positions; columns that cannot be used are passed over.
     pub fn position_faults(&self, coordinates: &[String]) -> Vec<PositionFault> {
         let Ok(time) = self.column("t") else {
             return Vec::new();
         };
-        let n = time.len().min(LOOKED_AT);
-        if n < 20 * ABOUT {
+        let n = time.len().min(MAX_SAMPLES);
+        if n < 20 * JUMP_NEIGHBOURS {
             return Vec::new();
         }
         let time = &time[..n];
@@ -63,15 +63,15 @@ impl Recording {
             let moves = q.iter().any(|x| x.total_cmp(&q[0]).is_ne());
             (moves && q.iter().all(|x| x.is_finite())).then_some(q)
         };
-        let beside: Vec<Beside> = (coordinates.iter())
-            .filter_map(|name| Some(Beside::new(time, position(name)?)))
+        let beside: Vec<CubicResidual> = (coordinates.iter())
+            .filter_map(|name| Some(CubicResidual::new(time, position(name)?)))
             .collect();
-        let jitter = jitter(&beside).map(|time| PositionFault::Jitter { time });
+        let jitter = timing_jitter(&beside).map(|time| PositionFault::Jitter { time });
         let mut faults: Vec<PositionFault> = jitter.into_iter().collect();
         if faults.is_empty() {
             for name in coordinates {
-                let width = position(name).and_then(|q| play(time, q));
-                faults.extend(width.map(|width| PositionFault::Play {
+                let width = position(name).and_then(|q| backlash_width(time, q));
+                faults.extend(width.map(|width| PositionFault::Backlash {
                     coordinate: name.clone(),
                     width,
                 }));
@@ -82,18 +82,18 @@ impl Recording {
 }
 
 /// What a sample is beside the cubic through its neighbours, and the rate there.
-struct Beside {
+struct CubicResidual {
     errors: Vec<f64>,
     rates: Vec<f64>,
 }
 
-impl Beside {
+impl CubicResidual {
     fn new(time: &[f64], q: &[f64]) -> Self {
         let (mut errors, mut rates) = (Vec::new(), Vec::new());
         for i in SIDE..q.len() - SIDE {
             let about = (i - SIDE..=i + SIDE).filter(|k| *k != i);
             let points = about.map(|k| (time[k] - time[i], q[k] - q[i]));
-            let [value, rate] = cubic(points, 0.0);
+            let [value, rate] = fit_cubic(points, 0.0);
             errors.push(-value);
             rates.push(rate);
         }
@@ -103,7 +103,7 @@ impl Beside {
 
 /// Value and slope at zero of the cubic nearest to some points, with a step of `step` for each unit of the time's sign: the
 /// value becomes the step where that is not zero.
-fn cubic(points: impl Iterator<Item = (f64, f64)>, step: f64) -> [f64; 2] {
+fn fit_cubic(points: impl Iterator<Item = (f64, f64)>, step: f64) -> [f64; 2] {
     let points: Vec<(f64, f64)> = points.collect();
     let scale = points
         .iter()
@@ -132,7 +132,7 @@ fn cubic(points: impl Iterator<Item = (f64, f64)>, step: f64) -> [f64; 2] {
 }
 
 /// The time by which stamps are wrong, s, if errors of all coordinates grow with the rate and tell of the same times.
-fn jitter(all: &[Beside]) -> Option<f64> {
+fn timing_jitter(all: &[CubicResidual]) -> Option<f64> {
     if all.len() < 2 {
         return None;
     }
@@ -145,7 +145,7 @@ fn jitter(all: &[Beside]) -> Option<f64> {
             median(sizes.map(|(e, _)| e.abs()).collect())
         };
         let [slow, fast] = [size(&|v| v < SLOW), size(&|v| v > FAST)];
-        if fastest <= 0.0 || fast <= GROWS * slow {
+        if fastest <= 0.0 || fast <= MIN_ERROR_GROWTH * slow {
             return None;
         }
         told.push(
@@ -164,7 +164,7 @@ fn jitter(all: &[Beside]) -> Option<f64> {
                 .collect();
             let sum = |of: &dyn Fn(&(f64, f64)) -> f64| both.iter().map(of).sum::<f64>();
             let alike = sum(&|(a, b)| a * b) / (sum(&|(a, _)| a * a) * sum(&|(_, b)| b * b)).sqrt();
-            if both.len() < 30 || alike.is_nan() || alike < ALIKE {
+            if both.len() < 30 || alike.is_nan() || alike < MIN_AGREEMENT {
                 return None;
             }
             times.extend(both.iter().map(|(a, _)| a * a));
@@ -175,25 +175,25 @@ fn jitter(all: &[Beside]) -> Option<f64> {
 }
 
 /// The length by which a reading jumps to and fro, if all jumps are of one length and alternate.
-fn play(time: &[f64], q: &[f64]) -> Option<f64> {
+fn backlash_width(time: &[f64], q: &[f64]) -> Option<f64> {
     let jump = |i: usize| {
-        let about = (i - ABOUT..=i + ABOUT).filter(|k| *k != i);
-        2.0 * cubic(about.map(|k| (time[k] - time[i], q[k] - q[i])), 1.0)[0]
+        let about = (i - JUMP_NEIGHBOURS..=i + JUMP_NEIGHBOURS).filter(|k| *k != i);
+        2.0 * fit_cubic(about.map(|k| (time[k] - time[i], q[k] - q[i])), 1.0)[0]
     };
-    let jumps: Vec<f64> = (ABOUT..q.len() - ABOUT).map(jump).collect();
+    let jumps: Vec<f64> = (JUMP_NEIGHBOURS..q.len() - JUMP_NEIGHBOURS).map(jump).collect();
     let noise = 1.4826 * median(jumps.iter().map(|x| x.abs()).collect());
     let mut found: Vec<f64> = Vec::new();
     for (i, own) in jumps.iter().enumerate() {
-        let near = i.saturating_sub(ABOUT)..(i + ABOUT + 1).min(jumps.len());
+        let near = i.saturating_sub(JUMP_NEIGHBOURS)..(i + JUMP_NEIGHBOURS + 1).min(jumps.len());
         let is_largest = jumps[near].iter().all(|x| x.abs() <= own.abs());
-        if is_largest && own.abs() > OUT * noise {
+        if is_largest && own.abs() > MIN_JUMP_DEVIATIONS * noise {
             found.push(*own);
         }
     }
     let middle = median(found.iter().map(|x| x.abs()).collect());
     let low = q.iter().copied().fold(f64::INFINITY, f64::min);
     let travel = q.iter().copied().fold(f64::NEG_INFINITY, f64::max) - low;
-    if middle < STEPS * resolution(q) || middle < LEAST * travel {
+    if middle < STEPS * encoder_resolution(q) || middle < MIN_TRAVEL_SHARE * travel {
         return None;
     }
     let is_alike = |x: &&f64| (x.abs() - middle).abs() < SPREAD * middle;
@@ -208,7 +208,7 @@ fn play(time: &[f64], q: &[f64]) -> Option<f64> {
 }
 
 /// The smallest change of a reading from sample to sample, which for an encoder is its step.
-fn resolution(q: &[f64]) -> f64 {
+fn encoder_resolution(q: &[f64]) -> f64 {
     let changes = q.windows(2).map(|pair| (pair[1] - pair[0]).abs());
     let largest = changes.clone().fold(0.0, f64::max);
     let least = changes
@@ -220,7 +220,7 @@ fn resolution(q: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_noise::Noise;
+    use crate::test_noise::TestNoise;
 
     const N: usize = 1800;
 
@@ -236,38 +236,38 @@ mod tests {
     #[test]
     fn a_sound_recording_has_no_fault() {
         for seed in 0..20 {
-            let mut noise = Noise::new(seed);
-            let read = |noise: &mut Noise, k| -> Vec<f64> {
+            let mut noise = TestNoise::new(seed);
+            let read = |noise: &mut TestNoise, k| -> Vec<f64> {
                 let all = time().into_iter();
                 all.map(|t| motion(t, k) + 5e-6 * noise.normal()).collect()
             };
-            let both = [0, 1].map(|k| Beside::new(&time(), &read(&mut noise, k)));
-            assert_eq!(jitter(&both), None);
-            assert_eq!(play(&time(), &read(&mut noise, 0)), None);
+            let both = [0, 1].map(|k| CubicResidual::new(&time(), &read(&mut noise, k)));
+            assert_eq!(timing_jitter(&both), None);
+            assert_eq!(backlash_width(&time(), &read(&mut noise, 0)), None);
         }
     }
 
     #[test]
     fn wrong_stamps_are_told_by_all_coordinates() {
-        let mut noise = Noise::new(3);
+        let mut noise = TestNoise::new(3);
         let late: Vec<f64> = time().iter().map(|t| t + 1e-4 * noise.normal()).collect();
         let both = [0, 1].map(|k| {
             let read: Vec<f64> = (late.iter())
                 .map(|t| motion(*t, k) + 5e-6 * noise.normal())
                 .collect();
-            Beside::new(&time(), &read)
+            CubicResidual::new(&time(), &read)
         });
-        let found = jitter(&both).unwrap();
+        let found = timing_jitter(&both).unwrap();
         assert!((0.7e-4..1.4e-4).contains(&found), "{found}");
     }
 
     #[test]
     fn play_is_seen_by_jumps_to_and_fro() {
-        let mut noise = Noise::new(8);
+        let mut noise = TestNoise::new(8);
         let read: Vec<f64> = (time().iter())
             .map(|t| motion(*t, 0) + 2e-4 * (1.9 * t + 0.3).sin().signum() + 5e-6 * noise.normal())
             .collect();
-        let found = play(&time(), &read).unwrap();
+        let found = backlash_width(&time(), &read).unwrap();
         assert!((3e-4..5e-4).contains(&found), "{found}");
     }
 }

@@ -6,7 +6,7 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-use super::by_channel::ByChannel;
+use super::by_channel::ChannelRegressor;
 use crate::signal::median;
 
 /// Huber's bound in standard deviations, and how often rows are reweighted.
@@ -23,7 +23,7 @@ pub struct RobustFit {
     /// One for each column.
     pub values: DVector<f64>,
     /// Measured less fitted, for each row.
-    pub rest: DVector<f64>,
+    pub residual: DVector<f64>,
     /// Squares of what rows were multiplied by.
     pub weights: DVector<f64>,
 }
@@ -31,7 +31,7 @@ pub struct RobustFit {
 /// Fits measured values interleaved per sample, `row = sample * channels + channel`, of which those count that `counts` says so.
 /// `None` where a number is not finite or nothing counts.
 pub fn robust_fit(
-    regressor: &ByChannel,
+    regressor: &ChannelRegressor,
     measured: &DVector<f64>,
     counts: &[bool],
 ) -> Option<RobustFit> {
@@ -63,29 +63,29 @@ pub fn robust_fit(
         if weights.iter().all(|weight| *weight == 0.0) {
             return None;
         }
-        let (normal, right) = regressor.normal(&weights, measured, 0..regressor.samples());
+        let (normal, right) = regressor.normal_equations(&weights, measured, 0..regressor.samples());
         let values = solve_normal(normal, &right)?;
-        rest = measured - regressor.times(values.as_slice());
+        rest = measured - regressor.multiply(values.as_slice());
         found = Some(values);
     }
     let values = found?;
     let is_finite = rest.iter().all(|x| x.is_finite());
     is_finite.then_some(RobustFit {
         values,
-        rest,
+        residual: rest,
         weights,
     })
 }
 
 /// Values that solve normal equations with a trace of a ridge.
 pub(super) fn solve_normal(normal: DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
-    let (factor, scale) = factored(normal)?;
+    let (factor, scale) = factor_normal(normal)?;
     let solved = factor.solve(&right.component_mul(&scale));
     Some(solved.component_mul(&scale))
 }
 
 /// Normal equations of columns scaled to one, with a trace of a ridge: their factor and the scales.
-pub(super) fn factored(mut normal: DMatrix<f64>) -> Option<(Cholesky<f64, Dyn>, DVector<f64>)> {
+pub(super) fn factor_normal(mut normal: DMatrix<f64>) -> Option<(Cholesky<f64, Dyn>, DVector<f64>)> {
     let scale = normal
         .diagonal()
         .map(|x| if x > 0.0 { x.sqrt().recip() } else { 0.0 });
@@ -101,11 +101,11 @@ pub(super) fn factored(mut normal: DMatrix<f64>) -> Option<(Cholesky<f64, Dyn>, 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_noise::Noise;
+    use crate::test_noise::TestNoise;
 
     #[test]
     fn a_contact_pulls_nothing_and_equal_columns_share() {
-        let mut noise = Noise::new(3);
+        let mut noise = TestNoise::new(3);
         let n = 2000;
         let regressor = DMatrix::from_fn(n, 3, |i, j| match j {
             0 => (0.01 * i as f64).sin(),
@@ -115,11 +115,11 @@ mod tests {
             let push = if (600..700).contains(&i) { 50.0 } else { 0.0 };
             2.0 * regressor[(i, 0)] - 3.0 + push + 0.1 * noise.normal()
         });
-        let regressor = ByChannel::new(&regressor, 1);
+        let regressor = ChannelRegressor::new(&regressor, 1);
         let found = robust_fit(&regressor, &measured, &vec![true; n]).unwrap();
         assert!((found.values[0] - 2.0).abs() < 0.02, "{found:?}");
         assert!((found.values[1] + found.values[2] + 3.0).abs() < 0.02);
-        assert!((found.rest[650] - 50.0).abs() < 1.0);
+        assert!((found.residual[650] - 50.0).abs() < 1.0);
         assert!(robust_fit(&regressor, &measured, &vec![false; n]).is_none());
     }
 }

@@ -3,7 +3,7 @@
 
 use std::f64::consts::PI;
 
-use crate::recording::{Note, Recording, place_word};
+use crate::recording::{RecordingNote, SignalRecording, sample_place_word};
 use crate::signal::white_noise;
 use crate::words::{count_of, seven_digits, with_digits};
 
@@ -23,10 +23,10 @@ const STEEP: f64 = 30.0;
 /// Spread of a limit, as a part of it, at most.
 const SHARP: f64 = 0.01;
 
-impl Recording {
+impl SignalRecording {
     /// Warnings about single signals. `coordinates` are `(name, whether it is an angle)`; columns that cannot be used
     /// are passed over.
-    pub fn oddities(&self, coordinates: &[(String, bool)], drives: &[String]) -> Vec<Note> {
+    pub fn signal_notes(&self, coordinates: &[(String, bool)], drives: &[String]) -> Vec<RecordingNote> {
         let positions: Vec<&[f64]> = coordinates
             .iter()
             .filter_map(|(name, _)| self.column(name).ok())
@@ -34,24 +34,24 @@ impl Recording {
         let mut notes = Vec::new();
         for (name, is_angle) in coordinates {
             let Ok(q) = self.column(name) else { continue };
-            notes.extend(self.held(name, q));
+            notes.extend(self.slow_update_note(name, q));
             if *is_angle {
-                notes.extend(self.too_large(name, q));
+                notes.extend(self.large_angle_note(name, q));
             }
         }
         for drive in drives {
             let Ok(force) = self.column(drive) else {
                 continue;
             };
-            notes.extend(self.held(drive, force));
-            let saturated = self.saturated(drive, force, &positions);
-            notes.extend(saturated.or_else(|| self.saturated_in_noise(drive, force, &positions)));
+            notes.extend(self.slow_update_note(drive, force));
+            let saturated = self.saturation_note(drive, force, &positions);
+            notes.extend(saturated.or_else(|| self.noisy_saturation_note(drive, force, &positions)));
         }
         notes
     }
 
     /// A signal that changes only every so many samples was recorded at a lower rate than it is written.
-    fn held(&self, name: &str, values: &[f64]) -> Option<Note> {
+    fn slow_update_note(&self, name: &str, values: &[f64]) -> Option<RecordingNote> {
         let changes: Vec<usize> = (1..values.len())
             .filter(|i| values[*i].total_cmp(&values[i - 1]).is_ne())
             .collect();
@@ -64,7 +64,7 @@ impl Recording {
         let usual = gaps[n / 2];
         let share = gaps.iter().filter(|gap| **gap == usual).count() as f64 / n as f64;
         (usual > 1 && share > 0.9).then(|| {
-            Note::warning(format!(
+            RecordingNote::warning(format!(
                 "`{name}` in {} changes only every {usual} samples: each value is repeated, so it was recorded at a lower \
                  rate than it is written. Rates from such steps are wrong: keep one sample of each, or a lower cut-off \
                  (option `cutoff_hz`).",
@@ -73,33 +73,33 @@ impl Recording {
         })
     }
 
-    fn too_large(&self, name: &str, q: &[f64]) -> Option<Note> {
+    fn large_angle_note(&self, name: &str, q: &[f64]) -> Option<RecordingNote> {
         let largest = q.iter().map(|v| v.abs()).fold(0.0, f64::max);
         let rounded = |value: f64| match value {
             value if value < 1e7 => format!("{value:.1}"),
             value => seven_digits(value),
         };
         (largest > LARGE_ANGLE).then(|| {
-            Note::warning(format!(
+            RecordingNote::warning(format!(
                 "`{name}` in {} reaches {}, which is {} turns if it is in rad, as it must be; if it is in \
                  degrees, say so: {}.",
                 self.file(),
                 rounded(largest),
                 rounded(largest / (2.0 * PI)),
-                self.maps_from_degrees(name)
+                self.degree_conversion_options(name)
             ))
         })
     }
 
     /// A force that stays at a limit but for noise, although it comes to it and leaves it at a slope.
-    fn saturated_in_noise(&self, name: &str, force: &[f64], positions: &[&[f64]]) -> Option<Note> {
+    fn noisy_saturation_note(&self, name: &str, force: &[f64], positions: &[&[f64]]) -> Option<RecordingNote> {
         let n = force.len();
         if n < 20 * FEWEST_AT_LIMIT {
             return None;
         }
         let mut found: Vec<(f64, usize, usize)> = Vec::new();
         for is_high in [true, false] {
-            let (level, spread) = crowded(force, is_high)?;
+            let (level, spread) = crowded_level(force, is_high)?;
             // Friction holds a level too, but not as sharply.
             if spread > SHARP * level.abs() {
                 continue;
@@ -148,27 +148,27 @@ impl Recording {
             let samples = count_of(*count, "sample", "samples");
             format!(", and {samples} at {}", with_digits(*level, 5))
         });
-        Some(Note::warning(format!(
+        Some(RecordingNote::warning(format!(
             "The force of `{name}` in {} stays at {} but for noise for {}, first in {} {}{}: the drive or its measurement seems \
              to be saturated. The true force is not known there; use a gentler motion, or leave these times out (option \
              `between`).",
             self.file(),
             with_digits(level, 5),
             count_of(count, "sample", "samples"),
-            place_word(self.file()),
+            sample_place_word(self.file()),
             self.line(first).unwrap_or(0),
             other.unwrap_or_default(),
         )))
     }
 
     /// A force that stays exactly at its largest or smallest value while something moves.
-    fn saturated(&self, name: &str, force: &[f64], positions: &[&[f64]]) -> Option<Note> {
+    fn saturation_note(&self, name: &str, force: &[f64], positions: &[&[f64]]) -> Option<RecordingNote> {
         let low = force.iter().copied().fold(f64::INFINITY, f64::min);
         let high = force.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         if low >= high {
             // Forces of 0 are said beside the drives' other ones, by `suspicious_forces`.
             return (force.len() > 1 && low != 0.0).then(|| {
-                Note::warning(format!(
+                RecordingNote::warning(format!(
                     "The force of `{name}` in {} is {low} throughout: it is no measurement of a drive that works.",
                     self.file()
                 ))
@@ -183,9 +183,9 @@ impl Recording {
         ];
         let mut found: Vec<(f64, usize, usize)> = Vec::new();
         for (limit, next) in ends {
-            let (count, first) = stays(force, limit, positions);
+            let (count, first) = count_at_value(force, limit, positions);
             // A force that is read in coarse steps stays at each of them.
-            let (at_next, _) = stays(force, next, positions);
+            let (at_next, _) = count_at_value(force, next, positions);
             if let Some(first) = first
                 && count >= FEWEST_AT_LIMIT
                 && count > CROWDED * at_next
@@ -198,24 +198,24 @@ impl Recording {
             .get(1)
             .map(|(limit, count, _)| {
                 let samples = count_of(*count, "sample", "samples");
-                format!(", and {samples} at {}", plain(*limit))
+                format!(", and {samples} at {}", format_recorded(*limit))
             })
             .unwrap_or_default();
-        Some(Note::warning(format!(
+        Some(RecordingNote::warning(format!(
             "The force of `{name}` in {} stays exactly at {} for {} while the mechanism moves, first in {} {}{other}: \
              the drive or its measurement seems to be saturated. The true force is not known there; use a gentler motion, \
              or leave these times out (option `between`).",
             self.file(),
-            plain(limit),
+            format_recorded(limit),
             count_of(count, "sample", "samples"),
-            place_word(self.file()),
+            sample_place_word(self.file()),
             self.line(first).unwrap_or(0),
         )))
     }
 }
 
 /// Samples in which a force stays exactly at a value, three of them or more one after the other, while something moves; and the first.
-fn stays(force: &[f64], value: f64, positions: &[&[f64]]) -> (usize, Option<usize>) {
+fn count_at_value(force: &[f64], value: f64, positions: &[&[f64]]) -> (usize, Option<usize>) {
     let (mut count, mut first) = (0, None);
     let mut i = 0;
     while i < force.len() {
@@ -234,7 +234,7 @@ fn stays(force: &[f64], value: f64, positions: &[&[f64]]) -> (usize, Option<usiz
 }
 
 /// A level near an end of the range of a force at which samples crowd: its value and how far they spread about it.
-fn crowded(force: &[f64], is_high: bool) -> Option<(f64, f64)> {
+fn crowded_level(force: &[f64], is_high: bool) -> Option<(f64, f64)> {
     let mut sorted = force.to_vec();
     sorted.sort_unstable_by(f64::total_cmp);
     if !is_high {
@@ -253,7 +253,7 @@ fn crowded(force: &[f64], is_high: bool) -> Option<(f64, f64)> {
 }
 
 /// A recorded number as it stands in the file, unless it is very long.
-fn plain(value: f64) -> String {
+fn format_recorded(value: f64) -> String {
     if value.abs() < 1e12 {
         value.to_string()
     } else {
@@ -275,8 +275,8 @@ mod tests {
             let _ = writeln!(text, "{t},{},{}", q(t), force(t));
         }
         let recording =
-            Recording::from_reader(text.as_bytes(), "run.csv", &ReadOptions::default()).unwrap();
-        let notes = recording.oddities(&[("q".to_owned(), true)], &["motor".to_owned()]);
+            SignalRecording::from_reader(text.as_bytes(), "run.csv", &ReadOptions::default()).unwrap();
+        let notes = recording.signal_notes(&[("q".to_owned(), true)], &["motor".to_owned()]);
         notes.into_iter().map(|note| note.says).collect()
     }
 
@@ -349,8 +349,8 @@ mod tests {
                 writeln!(text, "{t},{q},{},{}", scale * rate, scale * acceleration).unwrap();
             }
             let recording =
-                Recording::from_bytes(text.as_bytes(), "run.csv", &ReadOptions::default());
-            recording.unwrap().maps_from_degrees("q")
+                SignalRecording::from_bytes(text.as_bytes(), "run.csv", &ReadOptions::default());
+            recording.unwrap().degree_conversion_options("q")
         };
         assert_eq!(
             of(1.0),

@@ -21,8 +21,8 @@ mod moments;
 mod search;
 mod segments;
 
-pub use coloured::Coloured;
-pub use joint::{Joint, Part, Values, joint};
-pub use moments::{Moments, Solved};
-pub use search::{Candidate, Change, Runs, Search, alone, gains, search, within};
-pub use segments::{Told, mean, segments};
+pub use coloured::AutoregressiveNoise;
+pub use joint::{JointFit, JointRun, JointValues, fit_jointly};
+pub use moments::{NormalEquations, NormalSolution};
+pub use search::{PossibleChange, SelectedChange, RunPair, ChangeHypotheses, fit_single_change, single_change_gains, search_changes, within_run_spread};
+pub use segments::{UncertainValue, weighted_mean, change_points};

@@ -3,14 +3,14 @@
 use nalgebra::{DMatrix, DVector};
 
 /// A column whose rest beside the others is below this part of it says nothing of its own.
-const TELLING: f64 = 1e-7;
+const INDEPENDENCE_TOLERANCE: f64 = 1e-7;
 
 /// A column of norm 1 that hangs on another by less than this hardly does.
-const HARDLY: f64 = 1e-3;
+const WEAK_DEPENDENCE: f64 = 1e-3;
 
 /// Inner products of all columns of a least-squares problem among themselves and with the measured values.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Moments {
+pub struct NormalEquations {
     /// `Z' Z`.
     pub gram: DMatrix<f64>,
     /// `Z' y`.
@@ -23,7 +23,7 @@ pub struct Moments {
 
 /// A least-squares solution for some of the columns.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Solved {
+pub struct NormalSolution {
     /// One value for each column that was asked for; 0 for one that is a combination of those before it.
     pub values: DVector<f64>,
     /// `(Z' Z)^-1`: the covariance of the values if rows are of variance 1; 0 where a value is held at 0.
@@ -31,14 +31,14 @@ pub struct Solved {
     /// Which values are their own, and no combination of the others.
     pub determined: Vec<bool>,
     /// What is left: `|y - Z x|^2`.
-    pub rest: f64,
+    pub residual_squares: f64,
     /// How many columns say something of their own.
     pub rank: usize,
     /// Which columns these are: of columns that say the same the first.
-    pub kept: Vec<bool>,
+    pub independent: Vec<bool>,
 }
 
-impl Moments {
+impl NormalEquations {
     /// Of no rows.
     pub fn new(columns: usize) -> Self {
         Self {
@@ -80,7 +80,7 @@ impl Moments {
 
     /// The same with rows of another weight.
     #[must_use]
-    pub fn times(&self, weight: f64) -> Self {
+    pub fn scale_weight(&self, weight: f64) -> Self {
         Self {
             gram: &self.gram * weight,
             rhs: &self.rhs * weight,
@@ -91,7 +91,7 @@ impl Moments {
 
     /// The same for some of the columns.
     #[must_use]
-    pub fn of(&self, columns: &[usize]) -> Self {
+    pub fn select_columns(&self, columns: &[usize]) -> Self {
         Self {
             gram: DMatrix::from_fn(columns.len(), columns.len(), |i, j| {
                 self.gram[(columns[i], columns[j])]
@@ -103,25 +103,25 @@ impl Moments {
     }
 
     /// `|y - Z x|^2` for given values.
-    pub fn rest(&self, x: &DVector<f64>) -> f64 {
+    pub fn residual_squares(&self, x: &DVector<f64>) -> f64 {
         (self.total - 2.0 * self.rhs.dot(x) + x.dot(&(&self.gram * x))).max(0.0)
     }
 
     /// The columns from `fitted` on, beside those before it.
-    pub(crate) fn beside(&self, fitted: usize) -> Beside {
-        let (mut table, _) = self.scaled();
+    pub(crate) fn schur_complement(&self, fitted: usize) -> SchurComplement {
+        let (mut table, _) = self.scaled_equations();
         for k in 0..fitted {
             sweep(&mut table, k);
         }
         let n = table.nrows() - fitted;
-        Beside {
+        SchurComplement {
             table: table.view((fitted, fitted), (n, n)).into_owned(),
         }
     }
 
     /// Eliminates the first columns: what is left for the others, and how the first follow from them.
-    pub(crate) fn eliminate(&self, first: usize) -> (Self, Eliminated) {
-        let (mut table, scale) = self.scaled();
+    pub(crate) fn eliminate(&self, first: usize) -> (Self, EliminatedValues) {
+        let (mut table, scale) = self.scaled_equations();
         let n = self.rhs.len();
         let kept: Vec<bool> = (0..first).map(|k| sweep(&mut table, k)).collect();
         let others = n - first;
@@ -134,15 +134,15 @@ impl Moments {
             total: table[(n, n)].max(0.0),
             rows: self.rows,
         };
-        let of = |i: usize, x: f64| if kept[i] { by(x, scale[i]) } else { 0.0 };
-        let eliminated = Eliminated {
-            alone: DVector::from_fn(first, |i, _| of(i, table[(i, n)])),
-            by_others: DMatrix::from_fn(first, others, |i, j| {
+        let of = |i: usize, x: f64| if kept[i] { divide_by_scale(x, scale[i]) } else { 0.0 };
+        let eliminated = EliminatedValues {
+            offset: DVector::from_fn(first, |i, _| of(i, table[(i, n)])),
+            coefficients: DMatrix::from_fn(first, others, |i, j| {
                 of(i, table[(i, first + j)]) * scale[first + j]
             }),
             covariance: DMatrix::from_fn(first, first, |i, j| {
                 if kept[j] {
-                    by(of(i, table[(i, j)]), scale[j])
+                    divide_by_scale(of(i, table[(i, j)]), scale[j])
                 } else {
                     0.0
                 }
@@ -150,12 +150,12 @@ impl Moments {
             determined: (0..first)
                 .map(|i| {
                     let is_free =
-                        |k: usize| kept[k] || scale[k] == 0.0 || table[(k, i)].abs() < HARDLY;
+                        |k: usize| kept[k] || scale[k] == 0.0 || table[(k, i)].abs() < WEAK_DEPENDENCE;
                     kept[i] && (0..first).all(is_free)
                 })
                 .collect(),
-            hangs_on: (0..first)
-                .map(|i| (first..n).map(|j| table[(i, j)].abs() > HARDLY).collect())
+            depends_on: (0..first)
+                .map(|i| (first..n).map(|j| table[(i, j)].abs() > WEAK_DEPENDENCE).collect())
                 .collect(),
             rank: kept.iter().filter(|kept| **kept).count(),
         };
@@ -163,13 +163,13 @@ impl Moments {
     }
 
     /// The normal equations with columns of norm 1, and these norms; the last row and column are those of the measured values.
-    fn scaled(&self) -> (DMatrix<f64>, DVector<f64>) {
+    fn scaled_equations(&self) -> (DMatrix<f64>, DVector<f64>) {
         let n = self.rhs.len();
         let scale = DVector::from_fn(n, |i, _| self.gram[(i, i)].sqrt());
         let table = DMatrix::from_fn(n + 1, n + 1, |i, j| match (i < n, j < n) {
-            (true, true) => by(by(self.gram[(i, j)], scale[i]), scale[j]),
-            (true, false) => by(self.rhs[i], scale[i]),
-            (false, true) => by(self.rhs[j], scale[j]),
+            (true, true) => divide_by_scale(divide_by_scale(self.gram[(i, j)], scale[i]), scale[j]),
+            (true, false) => divide_by_scale(self.rhs[i], scale[i]),
+            (false, true) => divide_by_scale(self.rhs[j], scale[j]),
             (false, false) => self.total,
         });
         (table, scale)
@@ -177,61 +177,61 @@ impl Moments {
 
     /// Least squares for all columns, by sweeps of the scaled normal equations; columns that say nothing of their own are held
     /// at 0.
-    pub fn solve(&self) -> Solved {
+    pub fn solve(&self) -> NormalSolution {
         let n = self.rhs.len();
-        let (mut table, scale) = self.scaled();
+        let (mut table, scale) = self.scaled_equations();
         let kept: Vec<bool> = (0..n).map(|k| sweep(&mut table, k)).collect();
-        let value = |x: f64, i: usize| if kept[i] { by(x, scale[i]) } else { 0.0 };
+        let value = |x: f64, i: usize| if kept[i] { divide_by_scale(x, scale[i]) } else { 0.0 };
         // A column that was held is a combination of kept ones, which therefore are not determined.
         let determined = |i: usize| {
-            kept[i] && (0..n).all(|k| kept[k] || scale[k] == 0.0 || table[(k, i)].abs() < HARDLY)
+            kept[i] && (0..n).all(|k| kept[k] || scale[k] == 0.0 || table[(k, i)].abs() < WEAK_DEPENDENCE)
         };
-        Solved {
+        NormalSolution {
             values: DVector::from_fn(n, |i, _| value(table[(i, n)], i)),
             covariance: DMatrix::from_fn(n, n, |i, j| {
                 if kept[j] {
-                    by(value(table[(i, j)], i), scale[j])
+                    divide_by_scale(value(table[(i, j)], i), scale[j])
                 } else {
                     0.0
                 }
             }),
             determined: (0..n).map(determined).collect(),
-            rest: table[(n, n)].max(0.0),
+            residual_squares: table[(n, n)].max(0.0),
             rank: kept.iter().filter(|kept| **kept).count(),
-            kept,
+            independent: kept,
         }
     }
 }
 
 /// Values that follow from others: `o = a - B x`.
 #[derive(Clone, Debug)]
-pub(crate) struct Eliminated {
+pub(crate) struct EliminatedValues {
     /// `a`.
-    alone: DVector<f64>,
+    offset: DVector<f64>,
     /// `B`.
-    by_others: DMatrix<f64>,
+    coefficients: DMatrix<f64>,
     /// Their covariance for given others.
     covariance: DMatrix<f64>,
     /// Which of them are told by themselves for given others.
     determined: Vec<bool>,
     /// Which others each of them hangs on.
-    hangs_on: Vec<Vec<bool>>,
+    depends_on: Vec<Vec<bool>>,
     rank: usize,
 }
 
-impl Eliminated {
+impl EliminatedValues {
     /// The values for given others.
     pub(crate) fn values(&self, others: &DVector<f64>) -> DVector<f64> {
-        &self.alone - &self.by_others * others
+        &self.offset - &self.coefficients * others
     }
 
     /// Their covariance for that of the others.
     pub(crate) fn covariance(&self, others: &DMatrix<f64>) -> DMatrix<f64> {
-        &self.covariance + &self.by_others * others * self.by_others.transpose()
+        &self.covariance + &self.coefficients * others * self.coefficients.transpose()
     }
 
     /// Which of them are told, where these of the others are.
-    pub(crate) fn determined(&self, others: &[bool]) -> Vec<bool> {
+    pub(crate) fn determined_flags(&self, others: &[bool]) -> Vec<bool> {
         let is_told = |(alone, hangs): (&bool, &Vec<bool>)| {
             *alone
                 && hangs
@@ -241,7 +241,7 @@ impl Eliminated {
         };
         self.determined
             .iter()
-            .zip(&self.hangs_on)
+            .zip(&self.depends_on)
             .map(is_told)
             .collect()
     }
@@ -252,20 +252,20 @@ impl Eliminated {
     }
 }
 
-fn by(x: f64, scale: f64) -> f64 {
+fn divide_by_scale(x: f64, scale: f64) -> f64 {
     if scale > 0.0 { x / scale } else { 0.0 }
 }
 
 /// What columns say beside others that are fitted with them.
 #[derive(Clone, Debug)]
-pub(crate) struct Beside {
+pub(crate) struct SchurComplement {
     /// Their scaled normal equations with those of the others eliminated; the last row and column are the measured values'.
     table: DMatrix<f64>,
 }
 
-impl Beside {
+impl SchurComplement {
     /// What fitting some of the columns leaves, and which of them say something of their own.
-    pub(crate) fn rest(&self, columns: &[usize]) -> (f64, Vec<bool>) {
+    pub(crate) fn residual_squares(&self, columns: &[usize]) -> (f64, Vec<bool>) {
         let last = self.table.nrows() - 1;
         let all: Vec<usize> = columns.iter().copied().chain([last]).collect();
         let mut table = self.table.select_rows(&all).select_columns(&all);
@@ -278,7 +278,7 @@ impl Beside {
 /// all others upon it (Goodnight, The American Statistician 33, 1979).
 fn sweep(table: &mut DMatrix<f64>, k: usize) -> bool {
     let pivot = table[(k, k)];
-    if pivot < TELLING {
+    if pivot < INDEPENDENCE_TOLERANCE {
         return false;
     }
     let n = table.nrows();
@@ -305,22 +305,22 @@ fn sweep(table: &mut DMatrix<f64>, k: usize) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_noise::Noise;
+    use crate::test_noise::TestNoise;
 
     #[test]
     fn sums_of_blocks_give_the_least_squares_of_all_rows() {
-        let mut noise = Noise::new(3);
+        let mut noise = TestNoise::new(3);
         let rows = 200;
         let column =
-            |noise: &mut Noise| -> Vec<f64> { (0..rows).map(|_| noise.normal()).collect() };
+            |noise: &mut TestNoise| -> Vec<f64> { (0..rows).map(|_| noise.normal()).collect() };
         let (a, b) = (column(&mut noise), column(&mut noise));
         let twin: Vec<f64> = a.iter().map(|x| -2.0 * x).collect();
         let y: Vec<f64> = (0..rows)
             .map(|i| 3.0 * a[i] - 0.5 * b[i] + 0.01 * noise.normal())
             .collect();
-        let mut all = Moments::new(4);
+        let mut all = NormalEquations::new(4);
         for part in [0..70, 70..rows] {
-            let mut one = Moments::new(4);
+            let mut one = NormalEquations::new(4);
             let z = [
                 Some(&a[part.clone()]),
                 None,
@@ -347,9 +347,9 @@ mod tests {
         );
         let inverse = (matrix.transpose() * &matrix).try_inverse().unwrap();
         assert!((solved.covariance[(0, 2)] - inverse[(0, 1)]).abs() < 1e-14);
-        assert!((all.rest(&solved.values) - solved.rest).abs() < 1e-9);
+        assert!((all.residual_squares(&solved.values) - solved.residual_squares).abs() < 1e-9);
         // The first column and its twin share their value; the other is its own.
         assert_eq!(solved.determined, [false, false, true, false]);
-        assert_eq!(all.of(&[2]).solve().determined, [true]);
+        assert_eq!(all.select_columns(&[2]).solve().determined, [true]);
     }
 }

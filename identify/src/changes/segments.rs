@@ -6,21 +6,21 @@ use crate::signal::median;
 const SHORTEST: usize = 2;
 /// A value that lies apart from both of its neighbours by so many deviations is single; one that is nearer cannot pay for a
 /// segment with a neighbour.
-const APART: f64 = 3.5;
+const OUTLIER_DEVIATIONS: f64 = 3.5;
 /// How many times the logarithm of the number of values a change must gain.
 const STRICTER: f64 = 3.0;
 /// The median of the square of a number from the normal distribution.
 const MEDIAN_OF_SQUARE: f64 = 0.4549;
 
 /// A value with its standard deviation.
-pub type Told = (f64, f64);
+pub type UncertainValue = (f64, f64);
 
 /// Where each segment but the first begins, by optimal partitioning (Jackson et al., IEEE Signal Processing Letters 12, 2005): the
 /// values of a segment have one mean, and each segment has a price. `among` is how many series are looked at together, so that
 /// all of them seldom have a change by chance. Values that nobody knows count for nothing; where neighbours scatter more than
 /// their deviations say, deviations are taken to be that much larger.
-pub fn segments(values: &[Option<Told>], among: usize) -> Vec<usize> {
-    let known: Vec<(usize, Told)> = (values.iter().enumerate())
+pub fn change_points(values: &[Option<UncertainValue>], among: usize) -> Vec<usize> {
+    let known: Vec<(usize, UncertainValue)> = (values.iter().enumerate())
         .filter_map(|(at, one)| Some((at, (*one)?)))
         .filter(|(_, (x, deviation))| x.is_finite() && *deviation > 0.0)
         .collect();
@@ -28,13 +28,13 @@ pub fn segments(values: &[Option<Told>], among: usize) -> Vec<usize> {
     if n < 2 * SHORTEST {
         return Vec::new();
     }
-    let square = |pair: &[(usize, Told)]| {
+    let square = |pair: &[(usize, UncertainValue)]| {
         let [(_, (a, da)), (_, (b, db))] = [pair[0], pair[1]];
         (a - b).powi(2) / (da * da + db * db)
     };
     let scatter = median(known.windows(2).map(square).collect()) / MEDIAN_OF_SQUARE;
     let scatter = scatter.max(1.0);
-    let known = without_single(&known, APART * scatter.sqrt());
+    let known = drop_outliers(&known, OUTLIER_DEVIATIONS * scatter.sqrt());
     let n = known.len();
     if n < 2 * SHORTEST {
         return Vec::new();
@@ -71,7 +71,7 @@ pub fn segments(values: &[Option<Told>], among: usize) -> Vec<usize> {
 }
 
 /// The values without those that lie apart, by so many deviations, from both of their neighbours.
-fn without_single(known: &[(usize, Told)], apart: f64) -> Vec<(usize, Told)> {
+fn drop_outliers(known: &[(usize, UncertainValue)], apart: f64) -> Vec<(usize, UncertainValue)> {
     let is_near = |a: usize, b: usize| {
         let ((_, (a, da)), (_, (b, db))) = (known[a], known[b]);
         (a - b).abs() < apart * da.hypot(db)
@@ -84,7 +84,7 @@ fn without_single(known: &[(usize, Told)], apart: f64) -> Vec<(usize, Told)> {
 }
 
 /// The mean of some values by their deviations, and its own; `None` where none is known.
-pub fn mean(values: &[Option<Told>]) -> Option<Told> {
+pub fn weighted_mean(values: &[Option<UncertainValue>]) -> Option<UncertainValue> {
     let known = values.iter().flatten().filter(|(_, d)| *d > 0.0);
     let [w, wx] = known.fold([0.0; 2], |[w, wx], (x, d)| {
         [w + d.powi(-2), wx + x * d.powi(-2)]
@@ -95,10 +95,10 @@ pub fn mean(values: &[Option<Told>]) -> Option<Told> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_noise::Noise;
+    use crate::test_noise::TestNoise;
 
-    fn series(seed: u64, steps: &[(usize, f64)], scatter: f64) -> Vec<Option<Told>> {
-        let mut noise = Noise::new(seed);
+    fn series(seed: u64, steps: &[(usize, f64)], scatter: f64) -> Vec<Option<UncertainValue>> {
+        let mut noise = TestNoise::new(seed);
         let value = |k: usize| {
             let level: f64 = steps.iter().filter(|s| k >= s.0).map(|s| s.1).sum();
             Some((1e6 + level + scatter * noise.normal(), 1.0))
@@ -111,13 +111,13 @@ mod tests {
         for seed in 0..50 {
             let mut values = series(seed, &[(20, 6.0), (41, -7.0)], 1.0);
             values[33] = None;
-            let found = segments(&values, 30);
+            let found = change_points(&values, 30);
             let is_near = |(a, b): (&usize, usize)| a.abs_diff(b) <= 1;
             assert!(
                 found.len() == 2 && found.iter().zip([20, 41]).all(is_near),
                 "{seed}: {found:?}"
             );
-            let (before, deviation) = mean(&values[..20]).expect("a mean");
+            let (before, deviation) = weighted_mean(&values[..20]).expect("a mean");
             assert!(
                 (before - 1e6).abs() < 5.0 * deviation
                     && (deviation - 0.05_f64.sqrt()).abs() < 1e-12
@@ -128,11 +128,11 @@ mod tests {
     /// Neither chance, nor deviations that are too small, nor a single value make a change.
     #[test]
     fn nothing_is_found_where_nothing_stays_changed() {
-        let found = (0..200).filter(|seed| !segments(&series(*seed, &[], 1.0), 30).is_empty());
+        let found = (0..200).filter(|seed| !change_points(&series(*seed, &[], 1.0), 30).is_empty());
         assert_eq!(found.count(), 0);
-        let found = (0..200).filter(|seed| !segments(&series(*seed, &[], 5.0), 30).is_empty());
+        let found = (0..200).filter(|seed| !change_points(&series(*seed, &[], 5.0), 30).is_empty());
         assert!(found.count() <= 4);
-        assert!(segments(&series(1, &[(20, 30.0), (21, -30.0)], 1.0), 30).is_empty());
-        assert!(segments(&[None, Some((1.0, 0.1))], 1).is_empty());
+        assert!(change_points(&series(1, &[(20, 30.0), (21, -30.0)], 1.0), 30).is_empty());
+        assert!(change_points(&[None, Some((1.0, 0.1))], 1).is_empty());
     }
 }

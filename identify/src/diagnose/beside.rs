@@ -3,73 +3,73 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::bench::{Bench, Pick};
-use super::column::Column;
-use super::factored::Factored;
-use super::pool::{On, solve};
+use super::bench::{EffectSelector, SelectedEffect};
+use super::column::ForceColumn;
+use super::factored::GramFactor;
+use super::pool::{FitScope, solve_gram};
 
 /// A column of which the others leave a smaller share of squares than this says nothing new.
-const SAID: f64 = 1e-6;
+const INDEPENDENCE_TOLERANCE: f64 = 1e-6;
 /// Shares of a column's squares below this are rounding.
 const ROUNDING: f64 = 1e-7;
 
 /// A set that is fitted to all samples with the base parameters.
 #[derive(Default)]
-pub(crate) struct Beside {
+pub(crate) struct ConditioningSet {
     /// Its columns, those of the base first.
-    which: Vec<usize>,
-    factor: Factored,
+    columns: Vec<usize>,
+    factor: GramFactor,
     pub(crate) factors: DVector<f64>,
     squares: f64,
 }
 
 /// Weighted inner products of some columns.
-struct Products {
+struct InnerProductBlocks {
     /// With each other.
     own: DMatrix<f64>,
     /// With those of the set, a column for each.
-    with: DMatrix<f64>,
+    with_set: DMatrix<f64>,
     /// With the measured forces.
     measured: DVector<f64>,
 }
 
-impl Bench<'_> {
-    pub(crate) fn beside(&self, picks: &[Pick]) -> Beside {
+impl EffectSelector<'_> {
+    pub(crate) fn conditioning_set(&self, picks: &[SelectedEffect]) -> ConditioningSet {
         let mut all = self.columns(picks);
         all.push(self.measured);
-        let gram = self.pool.gram(&all, &self.weights, On::All);
+        let gram = self.pool.gram(&all, &self.weights, FitScope::All);
         let n = all.len() - 1;
-        let (factors, squares) = solve(&gram);
+        let (factors, squares) = solve_gram(&gram);
         all.pop();
-        Beside {
-            which: all,
-            factor: Factored::new(&gram.view((0, 0), (n, n)).into_owned()),
+        ConditioningSet {
+            columns: all,
+            factor: GramFactor::new(&gram.view((0, 0), (n, n)).into_owned()),
             factors,
             squares,
         }
     }
 
     /// By how much columns of the pool would lower the weighted sum of squares beside a set.
-    pub(crate) fn explained(&self, columns: &[usize], beside: &Beside) -> f64 {
-        beside.explained(&self.products_of(columns, beside))
+    pub(crate) fn explained_squares(&self, columns: &[usize], beside: &ConditioningSet) -> f64 {
+        beside.explained_squares(&self.products_of(columns, beside))
     }
 
     /// The same of columns that are not in the pool.
-    pub(crate) fn explained_by(&self, columns: &[Column], beside: &Beside) -> f64 {
-        let product = |a: &Column, b: &Column| self.pool.product_of(a, b, &self.weights);
+    pub(crate) fn explained_by_columns(&self, columns: &[ForceColumn], beside: &ConditioningSet) -> f64 {
+        let product = |a: &ForceColumn, b: &ForceColumn| self.pool.weighted_product_of(a, b, &self.weights);
         let in_pool = |k: usize| self.pool.column(k);
-        let (n, m) = (columns.len(), beside.which.len());
-        beside.explained(&Products {
+        let (n, m) = (columns.len(), beside.columns.len());
+        beside.explained_squares(&InnerProductBlocks {
             own: DMatrix::from_fn(n, n, |i, j| product(&columns[i], &columns[j])),
-            with: DMatrix::from_fn(m, n, |i, j| product(in_pool(beside.which[i]), &columns[j])),
+            with_set: DMatrix::from_fn(m, n, |i, j| product(in_pool(beside.columns[i]), &columns[j])),
             measured: DVector::from_fn(n, |i, _| product(in_pool(self.measured), &columns[i])),
         })
     }
 
     /// How many of some columns say something that a set does not say already.
-    pub(crate) fn rank(&self, columns: &[usize], beside: &Beside) -> usize {
+    pub(crate) fn conditional_rank(&self, columns: &[usize], beside: &ConditioningSet) -> usize {
         let products = self.products_of(columns, beside);
-        let mut left = beside.left(&products);
+        let mut left = beside.project_out_set(&products);
         let scale = products
             .own
             .diagonal()
@@ -80,37 +80,37 @@ impl Bench<'_> {
             }
         }
         let values = left.symmetric_eigenvalues();
-        values.iter().filter(|value| **value > SAID).count()
+        values.iter().filter(|value| **value > INDEPENDENCE_TOLERANCE).count()
     }
 
     /// Whether some columns lie in the span of others and a set.
-    pub(crate) fn lies_within(&self, some: &[usize], others: &[usize], beside: &Beside) -> bool {
+    pub(crate) fn is_in_joint_span(&self, some: &[usize], others: &[usize], beside: &ConditioningSet) -> bool {
         let all = [others, some].concat();
         let products = self.products_of(&all, beside);
-        let left = beside.left(&products);
+        let left = beside.project_out_set(&products);
         (others.len()..all.len()).all(|k| {
             let mut which: Vec<usize> = (0..others.len()).collect();
             which.push(k);
             let gram = left.select_rows(&which).select_columns(&which);
-            solve(&gram).1 <= SAID * products.own[(k, k)]
+            solve_gram(&gram).1 <= INDEPENDENCE_TOLERANCE * products.own[(k, k)]
         })
     }
 
-    fn products_of(&self, columns: &[usize], beside: &Beside) -> Products {
-        let product = |a: usize, b: usize| self.pool.product(a, b, &self.weights);
-        let (n, m) = (columns.len(), beside.which.len());
-        Products {
+    fn products_of(&self, columns: &[usize], beside: &ConditioningSet) -> InnerProductBlocks {
+        let product = |a: usize, b: usize| self.pool.weighted_product(a, b, &self.weights);
+        let (n, m) = (columns.len(), beside.columns.len());
+        InnerProductBlocks {
             own: DMatrix::from_fn(n, n, |i, j| product(columns[i], columns[j])),
-            with: DMatrix::from_fn(m, n, |i, j| product(beside.which[i], columns[j])),
+            with_set: DMatrix::from_fn(m, n, |i, j| product(beside.columns[i], columns[j])),
             measured: DVector::from_fn(n, |i, _| product(self.measured, columns[i])),
         }
     }
 }
 
-impl Beside {
+impl ConditioningSet {
     /// What the set leaves of inner products; what is rounding beside a column's own is nothing.
-    fn left(&self, products: &Products) -> DMatrix<f64> {
-        let halves = self.factor.halves(&products.with);
+    fn project_out_set(&self, products: &InnerProductBlocks) -> DMatrix<f64> {
+        let halves = self.factor.forward_substitute(&products.with_set);
         let mut left = &products.own - halves.transpose() * &halves;
         for i in 0..left.nrows() {
             if left[(i, i)] < ROUNDING * products.own[(i, i)] {
@@ -120,15 +120,15 @@ impl Beside {
         left
     }
 
-    fn explained(&self, products: &Products) -> f64 {
+    fn explained_squares(&self, products: &InnerProductBlocks) -> f64 {
         let n = products.own.nrows();
-        let right = &products.measured - products.with.transpose() * &self.factors;
-        let mut gram = self.left(products).resize(n + 1, n + 1, 0.0);
+        let right = &products.measured - products.with_set.transpose() * &self.factors;
+        let mut gram = self.project_out_set(products).resize(n + 1, n + 1, 0.0);
         for i in 0..n {
             gram[(i, n)] = right[i];
             gram[(n, i)] = right[i];
         }
         gram[(n, n)] = self.squares;
-        self.squares - solve(&gram).1
+        self.squares - solve_gram(&gram).1
     }
 }

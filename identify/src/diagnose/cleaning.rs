@@ -4,18 +4,18 @@
 //! Both are looked for in what base parameters and friction leave. An outlier stands above its neighbours' median by many
 //! robust deviations, and not where a drive reverses.
 
-use super::disturbance::{Disturbance, Quantity};
-use super::hum::{self, Line};
-use super::pool::{On, Pool, dot, solve};
-use super::problem::Problem;
+use super::disturbance::{Disturbance, EstimatedQuantity};
+use super::hum::{self, SlowSpectralLine};
+use super::pool::{FitScope, ColumnPool, dot, solve_gram};
+use super::problem::DiagnosisProblem;
 use crate::signal::median;
 
 /// Samples whose median an outlier stands out from.
 const NEIGHBOURS: usize = 9;
 /// By how many robust deviations.
-const OUT: f64 = 7.0;
+const OUTLIER_DEVIATIONS: f64 = 7.0;
 /// What is less than this part of the force is rounding.
-const SLIGHT: f64 = 1e-3;
+const ROUNDING_SHARE: f64 = 1e-3;
 /// What happens more often is how the force is.
 const RARE: f64 = 0.05;
 /// Samples about a reversal that are left alone.
@@ -25,30 +25,30 @@ const JUMP: usize = 1;
 const MOST_JUMPS: f64 = 0.1;
 
 /// Takes outliers and lines off the measured forces and says which there were.
-pub(crate) fn clean(problem: &mut Problem) -> Vec<Disturbance> {
-    counted(problem, |problem| {
-        let mut found = outliers(problem);
-        let left = rest(problem);
-        found.extend(hum::lines(problem, &left));
+pub(crate) fn clean_forces(problem: &mut DiagnosisProblem) -> Vec<Disturbance> {
+    count_removed_squares(problem, |problem| {
+        let mut found = remove_outliers(problem);
+        let left = base_residual(problem);
+        found.extend(hum::remove_lines(problem, &left));
         found
     })
 }
 
 /// Takes slow lines off forces that were not cleaned yet, and cleans what they leave: their crests are taken for outliers where
 /// nobody knows of them. Says what there was.
-pub(crate) fn clean_beside(problem: &mut Problem, slow: &[Line]) -> Vec<Disturbance> {
-    let mut found = counted(problem, |problem| {
+pub(crate) fn clean_with_slow_lines(problem: &mut DiagnosisProblem, slow: &[SlowSpectralLine]) -> Vec<Disturbance> {
+    let mut found = count_removed_squares(problem, |problem| {
         let lines = slow.iter();
-        lines.filter_map(|line| line.take_off(problem)).collect()
+        lines.filter_map(|line| line.remove_from_force(problem)).collect()
     });
-    found.extend(clean(problem));
+    found.extend(clean_forces(problem));
     found
 }
 
 /// Counts what `clean` takes off among what was removed.
-fn counted(
-    problem: &mut Problem,
-    clean: impl FnOnce(&mut Problem) -> Vec<Disturbance>,
+fn count_removed_squares(
+    problem: &mut DiagnosisProblem,
+    clean: impl FnOnce(&mut DiagnosisProblem) -> Vec<Disturbance>,
 ) -> Vec<Disturbance> {
     let before = problem.measured.clone();
     let found = clean(problem);
@@ -65,8 +65,8 @@ fn counted(
 }
 
 /// What base parameters and friction leave, channels weighed alike.
-fn rest(problem: &Problem) -> Vec<Vec<f64>> {
-    let mut pool = Pool::new(&problem.layout).without(&problem.undecided());
+fn base_residual(problem: &DiagnosisProblem) -> Vec<Vec<f64>> {
+    let mut pool = ColumnPool::new(&problem.layout).exclude_samples(&problem.undecided_samples());
     let columns = problem.base.iter().chain(&problem.friction);
     let mut which: Vec<usize> = columns.map(|c| pool.add(c)).collect();
     let measured = pool.add(&problem.measured);
@@ -80,8 +80,8 @@ fn rest(problem: &Problem) -> Vec<Vec<f64>> {
     which.push(measured);
     let mut rest = Vec::new();
     for _ in 0..2 {
-        let (factors, _) = solve(&pool.gram(&which, &weights, On::All));
-        rest = pool.rest(measured, &which[..which.len() - 1], factors.as_slice());
+        let (factors, _) = solve_gram(&pool.gram(&which, &weights, FitScope::All));
+        rest = pool.residual(measured, &which[..which.len() - 1], factors.as_slice());
         for (weight, rest) in weights.iter_mut().zip(&rest) {
             // The middle of squares is none of the outliers'.
             let middle = median(rest.iter().map(|r| r * r).collect());
@@ -91,20 +91,20 @@ fn rest(problem: &Problem) -> Vec<Vec<f64>> {
     rest
 }
 
-fn outliers(problem: &mut Problem) -> Vec<Disturbance> {
+fn remove_outliers(problem: &mut DiagnosisProblem) -> Vec<Disturbance> {
     let mut flagged: Vec<Vec<bool>> =
         vec![vec![false; problem.layout.samples()]; problem.layout.channels.len()];
     let mut sizes: Vec<Vec<f64>> = vec![Vec::new(); flagged.len()];
     for _ in 0..3 {
-        let rest = rest(problem);
+        let rest = base_residual(problem);
         let mut more = false;
         for (d, rest) in rest.iter().enumerate() {
-            let reverses = reversals(problem, d, REVERSAL);
-            let apart = from_neighbours(problem, rest);
+            let reverses = reversal_samples(problem, d, REVERSAL);
+            let apart = deviation_from_neighbours(problem, rest);
             let spread = 1.4826 * median(apart.iter().map(|x| x.abs()).collect());
-            let force = problem.force(d);
+            let force = problem.measured_force(d);
             let size = (dot(&force, &force) / force.len().max(1) as f64).sqrt();
-            let bound = (OUT * spread.max(problem.noise[d])).max(SLIGHT * size);
+            let bound = (OUTLIER_DEVIATIONS * spread.max(problem.noise[d])).max(ROUNDING_SHARE * size);
             let new: Vec<usize> = (0..rest.len())
                 .filter(|i| apart[*i].abs() > bound && !reverses[*i])
                 .collect();
@@ -132,19 +132,19 @@ fn outliers(problem: &mut Problem) -> Vec<Disturbance> {
             kind: "outliers".to_owned(),
             at: vec![problem.layout.channels[d].clone()],
             estimates: vec![
-                Quantity::new("share", count / flagged.len().max(1) as f64, "1"),
-                Quantity::new("size", size, ""),
+                EstimatedQuantity::new("share", count / flagged.len().max(1) as f64, "1"),
+                EstimatedQuantity::new("size", size, ""),
             ],
             recordings: Vec::new(),
             interval: None,
-            says: None,
+            description: None,
         }
     })
     .collect()
 }
 
 /// Samples about which a channel's drive reverses, where friction jumps.
-fn reversals(problem: &Problem, channel: usize, samples: usize) -> Vec<bool> {
+fn reversal_samples(problem: &DiagnosisProblem, channel: usize, samples: usize) -> Vec<bool> {
     let n = problem.layout.samples();
     let mut about = vec![false; n];
     let sign = problem.friction.get(3 * channel + 1);
@@ -161,10 +161,10 @@ fn reversals(problem: &Problem, channel: usize, samples: usize) -> Vec<bool> {
 }
 
 /// How far each sample is from the middle of those about it.
-fn from_neighbours(problem: &Problem, rest: &[f64]) -> Vec<f64> {
+fn deviation_from_neighbours(problem: &DiagnosisProblem, rest: &[f64]) -> Vec<f64> {
     let mut apart = Vec::with_capacity(rest.len());
     let mut start = 0;
-    for stretch in &problem.layout.stretches {
+    for stretch in &problem.layout.segments {
         let part = &rest[start..start + stretch.samples];
         for i in 0..part.len() {
             let low = i.saturating_sub(NEIGHBOURS / 2);
@@ -177,7 +177,7 @@ fn from_neighbours(problem: &Problem, rest: &[f64]) -> Vec<f64> {
 }
 
 /// The step in which a force is read, if all of its values are multiples of one that is coarser than its noise; in its unit.
-pub fn step_of_values(values: &[f64], noise: f64) -> Option<f64> {
+pub fn quantisation_step(values: &[f64], noise: f64) -> Option<f64> {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
     let largest = sorted.first()?.abs().max(sorted.last()?.abs());
@@ -192,12 +192,12 @@ pub fn step_of_values(values: &[f64], noise: f64) -> Option<f64> {
     (all && step / 12.0_f64.sqrt() > 0.3 * noise).then_some(step)
 }
 
-impl Problem {
+impl DiagnosisProblem {
     /// Finds the samples next to a reversal of their drive, unless these are many: friction jumps there, and on which side of the
     /// jump a sample lies no derivative of positions tells.
-    pub(crate) fn find_jumps(&mut self) {
+    pub(crate) fn find_reversal_samples(&mut self) {
         let of = |d: usize| {
-            let jumps = reversals(self, d, JUMP);
+            let jumps = reversal_samples(self, d, JUMP);
             let count = jumps.iter().filter(|jumps| **jumps).count() as f64;
             if count < MOST_JUMPS * jumps.len() as f64 {
                 jumps
@@ -209,7 +209,7 @@ impl Problem {
     }
 
     /// Samples that decide nothing, by channel.
-    pub(crate) fn undecided(&self) -> Vec<Vec<bool>> {
+    pub(crate) fn undecided_samples(&self) -> Vec<Vec<bool>> {
         let of = |d: usize| {
             let out = |all: &[Vec<bool>], i: usize| {
                 all.get(d)
@@ -231,12 +231,12 @@ mod tests {
     use std::f64::consts::TAU;
 
     use super::*;
-    use crate::diagnose::column::Column;
-    use crate::diagnose::problem::{Layout, Stretch};
-    use crate::test_noise::Noise;
+    use crate::diagnose::column::ForceColumn;
+    use crate::diagnose::problem::{SampleLayout, SampleSegment};
+    use crate::test_noise::TestNoise;
 
-    fn problem(seed: u64, more: impl Fn(usize, &mut Noise) -> f64) -> Problem {
-        let mut noise = Noise::new(seed);
+    fn problem(seed: u64, more: impl Fn(usize, &mut TestNoise) -> f64) -> DiagnosisProblem {
+        let mut noise = TestNoise::new(seed);
         let n = 2000;
         let base: Vec<f64> = (0..n).map(|i| (0.02 * f64::from(i)).sin()).collect();
         let measured: Vec<f64> = base
@@ -244,30 +244,30 @@ mod tests {
             .enumerate()
             .map(|(i, b)| 50.0 * b + noise.normal() + more(i, &mut noise))
             .collect();
-        Problem {
-            layout: Layout {
+        DiagnosisProblem {
+            layout: SampleLayout {
                 channels: vec!["a".into()],
-                stretches: vec![Stretch {
+                segments: vec![SampleSegment {
                     name: "run".into(),
                     samples: base.len(),
                     step: 0.004,
-                    sampled: 0.004,
+                    recorded_step: 0.004,
                     is_check: false,
                 }],
                 left_out: Vec::new(),
             },
-            measured: Column(vec![Some(measured)]),
-            base: vec![Column(vec![Some(base)])],
+            measured: ForceColumn(vec![Some(measured)]),
+            base: vec![ForceColumn(vec![Some(base)])],
             noise: vec![1.0],
             removed: vec![0.0],
-            ..Problem::default()
+            ..DiagnosisProblem::default()
         }
     }
 
     #[test]
     fn noise_has_neither_outliers_nor_lines() {
         for seed in 0..40 {
-            assert_eq!(clean(&mut problem(seed, |_, _| 0.0)), [], "seed {seed}");
+            assert_eq!(clean_forces(&mut problem(seed, |_, _| 0.0)), [], "seed {seed}");
         }
     }
 
@@ -277,13 +277,13 @@ mod tests {
             let hum = |i: usize| 3.0 * (TAU * 50.02 * 0.004 * i as f64 + 0.4).sin();
             let wild = |i: usize| if i % 211 == 17 { 90.0 } else { 0.0 };
             let mut problem = problem(seed, |i, _| hum(i) + wild(i));
-            let found = clean(&mut problem);
+            let found = clean_forces(&mut problem);
             let kinds: Vec<&str> = found.iter().map(|one| one.kind.as_str()).collect();
             assert_eq!(kinds, ["outliers", "periodic_in_time"], "seed {seed}");
             let values = &found[1].estimates;
             assert!((values[0].value - 3.0).abs() < 0.2, "{values:?}");
             assert!((values[1].value - 50.02).abs() < 0.02, "{values:?}");
-            let rest = rest(&problem);
+            let rest = base_residual(&problem);
             let left = dot(&rest[0], &rest[0]) / rest[0].len() as f64;
             assert!((0.85..1.15).contains(&left), "{left}");
         }
@@ -291,14 +291,14 @@ mod tests {
 
     #[test]
     fn steps_of_a_reading_are_seen() {
-        let mut noise = Noise::new(5);
+        let mut noise = TestNoise::new(5);
         let force: Vec<f64> = (0..3000)
             .map(|i| 300.0 * (0.01 * f64::from(i)).sin() + noise.normal())
             .collect();
         let coarse: Vec<f64> = force.iter().map(|f| 20.0 * (f / 20.0).round()).collect();
-        assert_eq!(step_of_values(&coarse, 1.0), Some(20.0));
-        assert_eq!(step_of_values(&force, 1.0), None);
+        assert_eq!(quantisation_step(&coarse, 1.0), Some(20.0));
+        assert_eq!(quantisation_step(&force, 1.0), None);
         let fine: Vec<f64> = force.iter().map(|f| 0.1 * (f / 0.1).round()).collect();
-        assert_eq!(step_of_values(&fine, 1.0), None);
+        assert_eq!(quantisation_step(&fine, 1.0), None);
     }
 }

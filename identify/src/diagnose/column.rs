@@ -5,9 +5,9 @@ use std::borrow::Cow;
 /// Numbers along all recordings, for each channel one for every sample: recordings of the fit first, then those of the
 /// check; `None` for a channel on which the column is zero throughout.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Column(pub Vec<Option<Vec<f64>>>);
+pub struct ForceColumn(pub Vec<Option<Vec<f64>>>);
 
-impl Column {
+impl ForceColumn {
     /// A column from all of its channels; those that are zero throughout are left out.
     pub fn new(channels: Vec<Vec<f64>>) -> Self {
         let sparse = |values: Vec<f64>| values.iter().any(|x| *x != 0.0).then_some(values);
@@ -38,7 +38,7 @@ impl Column {
     }
 
     /// Channels on which both columns act, with the values of both.
-    pub(crate) fn common<'a>(
+    pub(crate) fn common_channels<'a>(
         &'a self,
         other: &'a Self,
     ) -> impl Iterator<Item = (usize, &'a [f64], &'a [f64])> {
@@ -52,14 +52,14 @@ impl Column {
     }
 }
 
-impl<'a> From<&'a Column> for Cow<'a, Column> {
-    fn from(column: &'a Column) -> Self {
+impl<'a> From<&'a ForceColumn> for Cow<'a, ForceColumn> {
+    fn from(column: &'a ForceColumn) -> Self {
         Cow::Borrowed(column)
     }
 }
 
-impl From<Column> for Cow<'_, Column> {
-    fn from(column: Column) -> Self {
+impl From<ForceColumn> for Cow<'_, ForceColumn> {
+    fn from(column: ForceColumn) -> Self {
         Cow::Owned(column)
     }
 }

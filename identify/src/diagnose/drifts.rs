@@ -1,19 +1,19 @@
 //! What changes in the course of a recording: the zero of a force's sensor, and friction that warms up. Each recording has
 //! numbers of its own, and a zero that drifts has a level besides, since nobody knows when it was right.
 
-use super::column::Column;
-use super::problem::{Candidate, Choice, Effect, EffectParameter, Nature, Problem, Sign, Source};
+use super::column::ForceColumn;
+use super::problem::{CandidateEffect, ColumnChoice, LocatedEffect, EffectParameter, CandidateNature, DiagnosisProblem, SignConstraint, ColumnSource};
 
 /// A drift of the offset and of the friction of every channel; `units` are those of the forces.
-pub fn drifts(problem: &Problem, units: &[String]) -> Vec<Candidate> {
+pub fn drift_candidates(problem: &DiagnosisProblem, units: &[String]) -> Vec<CandidateEffect> {
     let layout = &problem.layout;
-    let mut recordings: Vec<&str> = layout.stretches.iter().map(|s| s.name.as_str()).collect();
+    let mut recordings: Vec<&str> = layout.segments.iter().map(|s| s.name.as_str()).collect();
     recordings.dedup();
-    let ramps: Vec<[Vec<f64>; 2]> = recordings.iter().map(|name| ramp(problem, name)).collect();
+    let ramps: Vec<[Vec<f64>; 2]> = recordings.iter().map(|name| recording_ramp(problem, name)).collect();
     let mut candidates = Vec::new();
     for (d, channel) in layout.channels.iter().enumerate() {
-        let product = |ramp: &[f64], column: &Column| -> Column {
-            let mut only = Column(vec![None; layout.channels.len()]);
+        let product = |ramp: &[f64], column: &ForceColumn| -> ForceColumn {
+            let mut only = ForceColumn(vec![None; layout.channels.len()]);
             let values = column.0[d].iter().flatten();
             only.0[d] = Some(values.zip(ramp).map(|(x, r)| x * r).collect());
             only
@@ -50,7 +50,7 @@ pub fn drifts(problem: &Problem, units: &[String]) -> Vec<Candidate> {
                     parameters.push(EffectParameter {
                         symbol: format!("{lead}{symbol} in {name}"),
                         unit: unit.to_owned(),
-                        sign: Sign::Any,
+                        sign: SignConstraint::Any,
                     });
                     columns.push(column);
                 }
@@ -58,18 +58,18 @@ pub fn drifts(problem: &Problem, units: &[String]) -> Vec<Candidate> {
             if columns.is_empty() {
                 continue;
             }
-            candidates.push(Candidate {
-                effect: Effect {
+            candidates.push(CandidateEffect {
+                effect: LocatedEffect {
                     kind: kind.to_owned(),
                     at: vec![channel.clone()],
                 },
                 parameters,
-                searched: 0,
+                searched_constants: 0,
                 is_part_of_load: false,
                 refines: None,
-                nature: Nature::Disturbance,
+                nature: CandidateNature::Disturbance,
                 is_per_run: true,
-                source: Source::Columns(vec![Choice {
+                source: ColumnSource::Columns(vec![ColumnChoice {
                     constants: Vec::new(),
                     columns,
                 }]),
@@ -80,8 +80,8 @@ pub fn drifts(problem: &Problem, units: &[String]) -> Vec<Candidate> {
 }
 
 /// One along one recording and zero along the others, and the same from minus to plus a half.
-fn ramp(problem: &Problem, recording: &str) -> [Vec<f64>; 2] {
-    let stretches = &problem.layout.stretches;
+fn recording_ramp(problem: &DiagnosisProblem, recording: &str) -> [Vec<f64>; 2] {
+    let stretches = &problem.layout.segments;
     let of = stretches.iter().filter(|s| s.name == recording);
     let samples: usize = of.map(|s| s.samples).sum();
     let last = samples.saturating_sub(1).max(1) as f64;

@@ -2,26 +2,26 @@
 
 use nalgebra::DMatrix;
 
-use super::bench::{Bench, Pick};
-use super::pool::On;
+use super::bench::{EffectSelector, SelectedEffect};
+use super::pool::FitScope;
 
 /// Odds beyond which nothing speaks louder, in twice their logarithm.
-const LOUDEST: f64 = 20.0;
+const MAX_LOG_ODDS: f64 = 20.0;
 /// How likely it is that the cause of what a found effect explains is another one, which no candidate says: where the rest is
 /// noise, and where some of it comes again unexplained.
-const OUTSIDE: f64 = 0.02;
-const OUTSIDE_BESIDE_UNEXPLAINED: f64 = 0.25;
+const UNKNOWN_CAUSE_PROBABILITY: f64 = 0.02;
+const UNKNOWN_CAUSE_IF_UNEXPLAINED: f64 = 0.25;
 
-impl Bench<'_> {
+impl EffectSelector<'_> {
     /// Values of each member's parameters with their standard deviations; none where others say the same. Rows count as
     /// many samples as the residual is worth.
-    pub(crate) fn estimates(&self, picks: &[Pick], on: On) -> Vec<Vec<(f64, Option<f64>)>> {
+    pub(crate) fn estimate_parameters(&self, picks: &[SelectedEffect], on: FitScope) -> Vec<Vec<(f64, Option<f64>)>> {
         let which = self.columns(picks);
         let (factors, _) = self.fit(picks, on);
-        let rest = self.rest(picks, &factors);
+        let rest = self.residual(picks, &factors);
         let mut weights = self.weights.clone();
         for (d, weight) in weights.iter_mut().enumerate() {
-            *weight *= self.worth(&rest, &[d]) / rest[d].len().max(1) as f64;
+            *weight *= self.effective_equations(&rest, &[d]) / rest[d].len().max(1) as f64;
         }
         let gram = self.pool.gram(&which, &weights, on);
         let n = gram.nrows();
@@ -57,22 +57,22 @@ impl Bench<'_> {
     /// likelier where something of its channels stays unexplained.
     pub(crate) fn probability(
         &self,
-        picks: &[Pick],
+        picks: &[SelectedEffect],
         member: usize,
         rivals: &[f64],
         unexplained: &[usize],
     ) -> f64 {
         let mut without = picks.to_vec();
         let pick = without.remove(member);
-        let channels = self.acted_on(&[pick]);
+        let channels = self.affected_channels(&[pick]);
         let evidence = self.evidence(&without, picks, &channels);
-        let for_it = (0.5 * evidence.bic.clamp(-LOUDEST, LOUDEST)).exp();
+        let for_it = (0.5 * evidence.bic.clamp(-MAX_LOG_ODDS, MAX_LOG_ODDS)).exp();
         let others = rivals.iter().map(|worse| (-0.5 * worse).exp());
         let share = 1.0 / (1.0 + others.sum::<f64>());
         let outside = if channels.iter().any(|d| unexplained.contains(d)) {
-            OUTSIDE_BESIDE_UNEXPLAINED
+            UNKNOWN_CAUSE_IF_UNEXPLAINED
         } else {
-            OUTSIDE
+            UNKNOWN_CAUSE_PROBABILITY
         };
         (1.0 - outside) * share * for_it / (1.0 + for_it)
     }

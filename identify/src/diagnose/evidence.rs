@@ -12,8 +12,8 @@
 use nalgebra::DMatrix;
 use serde::Serialize;
 
-use super::bench::{Bench, Pick};
-use super::pool::{On, dot, solve};
+use super::bench::{EffectSelector, SelectedEffect};
+use super::pool::{FitScope, dot, solve_gram};
 
 /// Blocks that the error of a stretch is cut into.
 const BLOCKS: usize = 12;
@@ -28,9 +28,9 @@ const LEAST_T_OF_NOISE: f64 = 1.0;
 const WHITE: f64 = 0.5;
 const LIKE_NOISE: f64 = 1.5;
 /// What adds less than this part of the squares that other effects explain may be how well these are known.
-const BESIDE_OTHERS: f64 = 1e-4;
+const MIN_SHARE_OF_OTHERS: f64 = 1e-4;
 /// What adds less than this part of a force's squares may be what smoothing made of the positions.
-const OF_FORCE: f64 = 1e-5;
+const MIN_SHARE_OF_FORCE: f64 = 1e-5;
 /// Squared errors below this, in units of what counts as noise, are nobody's.
 const BELOW_NOISE: f64 = 0.8;
 /// How many of its own deviations over the blocks the gain must be above zero.
@@ -41,7 +41,7 @@ const LEAST_SHARES_T: f64 = 4.0;
 
 /// What speaks for one set of effects beside another.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Evidence {
+pub struct SelectionEvidence {
     /// Share of the squared error that leaves, on the channels where the change acts, where the sets were not fitted.
     pub gain: f64,
     /// The gain in units of its standard deviation over contiguous blocks.
@@ -59,9 +59,9 @@ pub struct Evidence {
     pub least_gain: f64,
 }
 
-impl Evidence {
+impl SelectionEvidence {
     /// Whether it is enough to believe in a change.
-    pub fn holds(&self) -> bool {
+    pub fn is_sufficient(&self) -> bool {
         self.gain >= self.least_gain
             && self.is_steady()
             && self.bic > 0.0
@@ -69,9 +69,9 @@ impl Evidence {
     }
 
     /// Whether a change that was found before is worth keeping.
-    pub(crate) fn would_be_missed(&self) -> bool {
+    pub(crate) fn is_worth_keeping(&self) -> bool {
         let is_large = self.gain >= LARGE_GAIN && self.bic > 0.0 && self.above_noise > BELOW_NOISE;
-        self.holds() || is_large
+        self.is_sufficient() || is_large
     }
 
     /// Whether the gain is the same all along: in the mean over the blocks, or, if it is large, block by block.
@@ -85,7 +85,7 @@ impl Evidence {
     }
 
     /// What is lacking, in words.
-    pub fn lacks(&self, has_check: bool) -> Option<&'static str> {
+    pub fn insufficiency_reason(&self, has_check: bool) -> Option<&'static str> {
         if self.above_noise <= BELOW_NOISE {
             Some("what is left is rounding")
         } else if self.gain <= 0.0 || !self.is_steady() {
@@ -104,12 +104,12 @@ impl Evidence {
     }
 }
 
-impl Bench<'_> {
+impl EffectSelector<'_> {
     /// Evidence for the set `after` beside `before`; `channels` are those on which they differ.
-    pub(crate) fn evidence(&self, before: &[Pick], after: &[Pick], channels: &[usize]) -> Evidence {
+    pub(crate) fn evidence(&self, before: &[SelectedEffect], after: &[SelectedEffect], channels: &[usize]) -> SelectionEvidence {
         let [old_rest, new_rest] = [before, after].map(|picks| {
-            let (factors, _) = self.fit(picks, On::All);
-            self.rest(picks, &factors)
+            let (factors, _) = self.fit(picks, FitScope::All);
+            self.residual(picks, &factors)
         });
         let squares = |rest: &[Vec<f64>]| -> f64 {
             let of = |d: &usize| self.weights[*d] * dot(&rest[*d], &rest[*d]);
@@ -117,14 +117,14 @@ impl Bench<'_> {
         };
         let [old_squares, new_squares] = [squares(&old_rest), squares(&new_rest)];
         let is_noise_known = self.is_white(&new_rest, channels)
-            && self.is_no_remainder(before, old_squares - new_squares, channels);
+            && self.is_above_fit_error(before, old_squares - new_squares, channels);
         let held_out =
-            |by_folds: bool| [before, after].map(|picks| self.held_out(picks, channels, by_folds));
-        let is_per_run = |pick: &Pick| self.candidate(pick).is_per_run;
+            |by_folds: bool| [before, after].map(|picks| self.validation_errors(picks, channels, by_folds));
+        let is_per_run = |pick: &SelectedEffect| self.candidate(pick).is_per_run;
         let mut compared = held_out(before.iter().chain(after).any(is_per_run));
         // A check that speaks for a change, however softly, joins the fit where all that is left is white noise: both together
         // show effects that neither shows alone.
-        if is_noise_known && sum(&compared[0]) > sum(&compared[1]) {
+        if is_noise_known && sum_errors(&compared[0]) > sum_errors(&compared[1]) {
             compared = held_out(true);
         }
         let [old, new] = compared;
@@ -142,27 +142,27 @@ impl Bench<'_> {
         let spread = shares.iter().map(|s| (s - mean_share).powi(2)).sum::<f64>();
         let error_share = (spread / (n * (n - 1.0).max(1.0))).sqrt().max(1e-3);
         let shares_t = mean_share / error_share;
-        let total = sum(&old);
-        let count = |picks: &[Pick]| -> f64 {
+        let total = sum_errors(&old);
+        let count = |picks: &[SelectedEffect]| -> f64 {
             let freedoms = picks.iter().map(|p| self.freedoms(p));
             freedoms.sum::<usize>() as f64
         };
-        let worth = self.worth(&new_rest, channels);
+        let worth = self.effective_equations(&new_rest, channels);
         // The best of so many fits chance better than any one of them.
         let choices = (self.problem.candidates.len().max(1) as f64).ln();
-        let price = |picks: &[Pick]| count(picks) * worth.ln() + 2.0 * picks.len() as f64 * choices;
-        Evidence {
+        let price = |picks: &[SelectedEffect]| count(picks) * worth.ln() + 2.0 * picks.len() as f64 * choices;
+        SelectionEvidence {
             gain: if total > 0.0 { n * mean / total } else { 0.0 },
             blocks_t: t,
             shares_t,
             bic: worth * (old_squares / new_squares.max(f64::MIN_POSITIVE)).ln()
                 - (price(after) - price(before)),
             effective_samples: worth,
-            above_noise: self.above_noise(&old_rest, channels),
+            above_noise: self.squares_over_noise(&old_rest, channels),
             least_gain: {
                 // Weights are one over the variance of what is left, which is the noise where it is known.
                 let of_noise = LEAST_OF_NOISE / total.max(f64::MIN_POSITIVE);
-                if !self.is_beyond_smoothing(old_squares - new_squares, channels) {
+                if !self.is_above_smoothing_error(old_squares - new_squares, channels) {
                     f64::INFINITY
                 } else if is_noise_known {
                     of_noise.min(LEAST_GAIN)
@@ -177,34 +177,34 @@ impl Bench<'_> {
     fn is_white(&self, rest: &[Vec<f64>], channels: &[usize]) -> bool {
         channels.iter().all(|d| {
             let counted = rest[*d].iter().filter(|r| **r != 0.0).count() as f64;
-            self.worth(rest, &[*d]) > WHITE * counted && self.above_noise(rest, &[*d]) < LIKE_NOISE
+            self.effective_equations(rest, &[*d]) > WHITE * counted && self.squares_over_noise(rest, &[*d]) < LIKE_NOISE
         })
     }
 
     /// Whether squares that a change takes off are more than what may be wrong with the effects beside it.
-    fn is_no_remainder(&self, before: &[Pick], less: f64, channels: &[usize]) -> bool {
-        let explained = |picks: &[Pick]| {
-            let (factors, _) = self.fit(picks, On::All);
-            let rest = self.rest(picks, &factors);
+    fn is_above_fit_error(&self, before: &[SelectedEffect], less: f64, channels: &[usize]) -> bool {
+        let explained = |picks: &[SelectedEffect]| {
+            let (factors, _) = self.fit(picks, FitScope::All);
+            let rest = self.residual(picks, &factors);
             let of = |d: &usize| self.weights[*d] * dot(&rest[*d], &rest[*d]);
             channels.iter().map(of).sum::<f64>()
         };
-        before.is_empty() || less > BESIDE_OTHERS * (explained(&[]) - explained(before))
+        before.is_empty() || less > MIN_SHARE_OF_OTHERS * (explained(&[]) - explained(before))
     }
 
     /// Whether squares that a change takes off are more than what smoothing the positions may have made, where parameters are
     /// held and cannot take that up; those of a fit have taken it up.
-    fn is_beyond_smoothing(&self, less: f64, channels: &[usize]) -> bool {
+    fn is_above_smoothing_error(&self, less: f64, channels: &[usize]) -> bool {
         let squares = |d: &usize| {
-            let force = self.problem.force(*d);
+            let force = self.problem.measured_force(*d);
             self.weights[*d] * dot(&force, &force)
         };
-        let is_exact = self.problem.held.is_some() && self.problem.prior.is_none();
-        !is_exact || less > OF_FORCE * channels.iter().map(squares).sum::<f64>()
+        let is_exact = self.problem.fixed_forces.is_some() && self.problem.prior.is_none();
+        !is_exact || less > MIN_SHARE_OF_FORCE * channels.iter().map(squares).sum::<f64>()
     }
 
     /// Squares of a residual relative to those of the white noise, over some channels.
-    fn above_noise(&self, rest: &[Vec<f64>], channels: &[usize]) -> f64 {
+    fn squares_over_noise(&self, rest: &[Vec<f64>], channels: &[usize]) -> f64 {
         let of = |d: &usize| {
             let noise = self.problem.noise[*d].powi(2).max(f64::MIN_POSITIVE);
             dot(&rest[*d], &rest[*d]) / rest[*d].len().max(1) as f64 / noise
@@ -214,7 +214,7 @@ impl Bench<'_> {
 
     /// Weighted squared errors of some channels in blocks of time to which the set was not fitted: those of the check, or
     /// each fold of all recordings where there is none or where they have parameters of their own.
-    pub(crate) fn held_out(&self, picks: &[Pick], channels: &[usize], by_folds: bool) -> Vec<f64> {
+    pub(crate) fn validation_errors(&self, picks: &[SelectedEffect], channels: &[usize], by_folds: bool) -> Vec<f64> {
         let layout = &self.problem.layout;
         let square = |rest: &[Vec<f64>], range: &std::ops::Range<usize>| -> f64 {
             let of = |d: &usize| {
@@ -225,8 +225,8 @@ impl Bench<'_> {
         };
         let blocks = layout.blocks(BLOCKS);
         if layout.has_check() && !by_folds {
-            let (factors, _) = self.fit(picks, On::Fit);
-            let rest = self.rest(picks, &factors);
+            let (factors, _) = self.fit(picks, FitScope::Fit);
+            let rest = self.residual(picks, &factors);
             let fit = layout.fit_samples();
             let checked = blocks.iter().filter(|block| block.start >= fit);
             return checked.map(|block| square(&rest, block)).collect();
@@ -238,7 +238,7 @@ impl Bench<'_> {
         let whole = (folds.iter()).fold(DMatrix::zeros(n, n), |sum, (_, part)| sum + part);
         let fold_errors = folds.iter().map(|(fold, own)| {
             let part = &whole - own;
-            let (factors, _) = solve(&part);
+            let (factors, _) = solve_gram(&part);
             // Only the fold itself is of interest.
             let mut error = 0.0;
             for d in channels {
@@ -252,7 +252,7 @@ impl Bench<'_> {
                         }
                     }
                 }
-                self.pool.silence(*d, fold.start, &mut rest);
+                self.pool.zero_excluded(*d, fold.start, &mut rest);
                 error += self.weights[*d] * dot(&rest, &rest);
             }
             error
@@ -261,7 +261,7 @@ impl Bench<'_> {
     }
 
     /// Channels on which some effects act.
-    pub(crate) fn acted_on(&self, picks: &[Pick]) -> Vec<usize> {
+    pub(crate) fn affected_channels(&self, picks: &[SelectedEffect]) -> Vec<usize> {
         let mut channels: Vec<usize> = picks
             .iter()
             .flat_map(|pick| &pick.columns)
@@ -273,6 +273,6 @@ impl Bench<'_> {
     }
 }
 
-fn sum(errors: &[f64]) -> f64 {
+fn sum_errors(errors: &[f64]) -> f64 {
     errors.iter().sum()
 }

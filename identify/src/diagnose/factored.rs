@@ -6,14 +6,14 @@ use super::pool::{DEPENDENT, dot};
 
 /// A decomposed matrix of inner products; columns that depend on earlier ones are passed over.
 #[derive(Default)]
-pub(crate) struct Factored {
+pub(crate) struct GramFactor {
     /// Cholesky's factor of the columns that are kept, each scaled to one.
     lower: DMatrix<f64>,
     /// Those columns, with their scales.
-    kept: Vec<(usize, f64)>,
+    independent_columns: Vec<(usize, f64)>,
 }
 
-impl Factored {
+impl GramFactor {
     pub(crate) fn new(gram: &DMatrix<f64>) -> Self {
         let n = gram.nrows();
         // Rows of the factor are the columns of `upper`, which lie in one piece.
@@ -39,16 +39,16 @@ impl Factored {
         }
         let m = kept.len();
         let lower = upper.view((0, 0), (m, m)).transpose();
-        Self { lower, kept }
+        Self { lower, independent_columns: kept }
     }
 
     /// `L^-1 x` for each column: its square is what the columns explain.
-    pub(crate) fn halves(&self, products: &DMatrix<f64>) -> DMatrix<f64> {
+    pub(crate) fn forward_substitute(&self, products: &DMatrix<f64>) -> DMatrix<f64> {
         let scaled = |i: usize, j: usize| {
-            let (k, scale) = self.kept[i];
+            let (k, scale) = self.independent_columns[i];
             products[(k, j)] / scale
         };
-        let mut halves = DMatrix::from_fn(self.kept.len(), products.ncols(), scaled);
+        let mut halves = DMatrix::from_fn(self.independent_columns.len(), products.ncols(), scaled);
         self.lower.solve_lower_triangular_unchecked_mut(&mut halves);
         halves
     }

@@ -5,29 +5,29 @@ use std::collections::{HashMap, HashSet};
 
 use nalgebra::DVector;
 
-use super::bench::{Bench, Pick};
-use super::column::Column;
-use super::pool::{On, solve};
-use super::problem::{Candidate, Carried, Source};
+use super::bench::{EffectSelector, SelectedEffect};
+use super::column::ForceColumn;
+use super::pool::{FitScope, solve_gram};
+use super::problem::{CandidateEffect, LoadDependentQuery, ColumnSource};
 
-impl Bench<'_> {
+impl EffectSelector<'_> {
     /// Candidates that depend on what the drives carry, with the columns that a fit gives them.
-    pub(crate) fn carried(&mut self, picks: &[Pick]) -> HashMap<usize, Pick> {
-        let is_carried = |c: &Candidate| matches!(c.source, Source::Carried);
+    pub(crate) fn load_dependent_effects(&mut self, picks: &[SelectedEffect]) -> HashMap<usize, SelectedEffect> {
+        let is_carried = |c: &CandidateEffect| matches!(c.source, ColumnSource::LoadDependent);
         if !self.problem.candidates.iter().any(is_carried) {
             return HashMap::new();
         }
         let load = self.load(picks);
-        self.rubbing_on(&load, Carried::All)
+        self.load_friction_effects(&load, LoadDependentQuery::All)
     }
 
     /// What the drives carry by a set's fit: masses and weight, and no friction.
-    pub(crate) fn load(&self, picks: &[Pick]) -> Column {
+    pub(crate) fn load(&self, picks: &[SelectedEffect]) -> ForceColumn {
         let mut which = self.columns(picks);
         let n = which.len();
         which.extend(&self.friction);
         which.push(self.measured);
-        let (factors, _) = solve(&self.pool.gram(&which, &self.weights, On::All));
+        let (factors, _) = solve_gram(&self.pool.gram(&which, &self.weights, FitScope::All));
         let of_picks = picks.iter().flat_map(|pick| {
             let candidate = self.candidate(pick);
             pick.columns.iter().map(|_| candidate.is_part_of_load)
@@ -37,25 +37,25 @@ impl Bench<'_> {
             .collect();
         let parts = which[..n].iter().copied().zip(factors.iter().copied());
         let parts = parts.zip(is_part_of_load);
-        self.sum(parts.filter_map(|(part, is_part_of_load)| is_part_of_load.then_some(part)))
+        self.sum_columns(parts.filter_map(|(part, is_part_of_load)| is_part_of_load.then_some(part)))
     }
 
     /// The same where drives carry the other friction of the set too: which friction lies between load and drive no model says.
-    fn load_with_friction(&self, picks: &[Pick]) -> Column {
-        let (factors, _) = self.fit(picks, On::All);
+    fn load_with_friction(&self, picks: &[SelectedEffect]) -> ForceColumn {
+        let (factors, _) = self.fit(picks, FitScope::All);
         let is_own = picks.iter().flat_map(|pick| {
-            let is_carried = matches!(self.candidate(pick).source, Source::Carried);
+            let is_carried = matches!(self.candidate(pick).source, ColumnSource::LoadDependent);
             pick.columns.iter().map(move |_| is_carried)
         });
         let is_own: Vec<bool> = (self.base.iter().map(|_| false)).chain(is_own).collect();
         let which = self.columns(picks);
         let parts = which.into_iter().zip(factors.iter().copied()).zip(is_own);
-        self.sum(parts.filter_map(|(part, is_own)| (!is_own).then_some(part)))
+        self.sum_columns(parts.filter_map(|(part, is_own)| (!is_own).then_some(part)))
     }
 
     /// The sum of some columns times factors and of what is held.
-    fn sum(&self, parts: impl Iterator<Item = (usize, f64)>) -> Column {
-        let mut sum = self.problem.held.clone().unwrap_or_default();
+    fn sum_columns(&self, parts: impl Iterator<Item = (usize, f64)>) -> ForceColumn {
+        let mut sum = self.problem.fixed_forces.clone().unwrap_or_default();
         sum.0.resize(self.weights.len(), None);
         for (k, factor) in parts {
             sum.add(factor, self.pool.column(k));
@@ -64,10 +64,10 @@ impl Bench<'_> {
     }
 
     /// Candidates that depend on what the drives carry.
-    fn rubbing_on(&mut self, load: &Column, which: Carried) -> HashMap<usize, Pick> {
-        let made = self.supply.carried(load, which);
+    fn load_friction_effects(&mut self, load: &ForceColumn, which: LoadDependentQuery) -> HashMap<usize, SelectedEffect> {
+        let made = self.provider.load_dependent_columns(load, which);
         let picks = made.into_iter().map(|(candidate, choice)| {
-            let pick = Pick {
+            let pick = SelectedEffect {
                 candidate,
                 constants: choice.constants,
                 rank: choice.columns.len(),
@@ -82,23 +82,23 @@ impl Bench<'_> {
 
     /// Columns of a candidate that changes the model as fitted. What it was found to be so far, if it is among the picks,
     /// says where: the columns times the parameters are the change there.
-    pub(crate) fn changed(
+    pub(crate) fn linearise_model_change(
         &mut self,
         candidate: usize,
-        picks: &[Pick],
+        picks: &[SelectedEffect],
         factors: &DVector<f64>,
-    ) -> Pick {
+    ) -> SelectedEffect {
         let mine = picks.iter().position(|pick| pick.candidate == candidate);
         let found = mine.map(|i| {
             let before: usize = picks[..i].iter().map(|p| p.columns.len()).sum();
             let start = self.base.len() + before;
             factors.as_slice()[start..start + picks[i].columns.len()].to_vec()
         });
-        let columns: Vec<Column> = match &self.problem.candidates[candidate].source {
-            Source::Tilt(tilt) => {
+        let columns: Vec<ForceColumn> = match &self.problem.candidates[candidate].source {
+            ColumnSource::Tilt(tilt) => {
                 let angles = found.unwrap_or_else(|| vec![0.0; tilt.axes.len()]);
                 let along = tilt.components.each_ref().map(|component| {
-                    let mut sum = component.held.clone();
+                    let mut sum = component.fixed.clone();
                     sum.0.resize(self.weights.len(), None);
                     // Factors of the base come first, then those of effects, which do not tilt.
                     for (change, factor) in component.base.iter().zip(factors.iter()) {
@@ -109,7 +109,7 @@ impl Bench<'_> {
                 let directions = tilt.directions(&angles).into_iter();
                 directions
                     .map(|direction| {
-                        let mut sum = Column(vec![None; self.weights.len()]);
+                        let mut sum = ForceColumn(vec![None; self.weights.len()]);
                         for (share, along) in direction.iter().zip(&along) {
                             sum.add(*share, along);
                         }
@@ -117,8 +117,8 @@ impl Bench<'_> {
                     })
                     .collect()
             }
-            Source::Reading(reading) => {
-                let mut force = self.problem.held.clone().unwrap_or_default();
+            ColumnSource::ReadingFault(reading) => {
+                let mut force = self.problem.fixed_forces.clone().unwrap_or_default();
                 force.0.resize(self.weights.len(), None);
                 let own = mine.map_or(&[][..], |i| &picks[i].columns);
                 for (k, factor) in self.columns(picks).iter().zip(factors.iter()) {
@@ -126,20 +126,20 @@ impl Bench<'_> {
                         force.add(*factor, self.pool.column(*k));
                     }
                 }
-                vec![self.misread(*reading, &force, found.map_or(0.0, |value| value[0]))]
+                vec![self.reading_fault_column(*reading, &force, found.map_or(0.0, |value| value[0]))]
             }
-            Source::Body(body) => {
+            ColumnSource::Body(body) => {
                 body.columns(found.map_or([0.0; 3], |values| body.centre(&values)))
             }
-            Source::Constant(constant) => {
+            ColumnSource::Constant(constant) => {
                 let error = found.map_or(0.0, |values| values[0]);
                 // Factors of the base come first.
                 let base = &factors.as_slice()[..self.base.len()];
-                vec![constant.column(error, base, self.weights.len())]
+                vec![constant.secant_column(error, base, self.weights.len())]
             }
-            Source::Columns(_) | Source::Carried => unreachable!("they change no model"),
+            ColumnSource::Columns(_) | ColumnSource::LoadDependent => unreachable!("they change no model"),
         };
-        Pick {
+        SelectedEffect {
             candidate,
             constants: Vec::new(),
             rank: columns.len(),
@@ -148,53 +148,53 @@ impl Bench<'_> {
     }
 
     /// A member that depends on what the drives carry, with or without friction as explains more; its constant stays.
-    fn best_carried(&mut self, picks: &[Pick], member: usize) -> Option<Pick> {
+    fn best_load_dependent(&mut self, picks: &[SelectedEffect], member: usize) -> Option<SelectedEffect> {
         let candidate = picks[member].candidate;
         let value = picks[member].constants.first().map(|(_, value)| *value);
-        let which = Carried::One(candidate, value);
+        let which = LoadDependentQuery::One(candidate, value);
         let loads = [self.load(picks), self.load_with_friction(picks)];
-        let ways = loads.map(|load| self.rubbing_on(&load, which).remove(&candidate));
-        let squares = |way: &Pick| {
+        let ways = loads.map(|load| self.load_friction_effects(&load, which).remove(&candidate));
+        let squares = |way: &SelectedEffect| {
             let mut set = picks.to_vec();
             set[member] = way.clone();
-            self.fit(&set, On::All).1
+            self.fit(&set, FitScope::All).1
         };
         let ways = ways.into_iter().flatten();
         ways.min_by(|a, b| squares(a).total_cmp(&squares(b)))
     }
 
     /// Makes the columns of effects that depend on the fit anew.
-    pub(crate) fn refresh(&mut self, mut picks: Vec<Pick>) -> Vec<Pick> {
+    pub(crate) fn refresh_columns(&mut self, mut picks: Vec<SelectedEffect>) -> Vec<SelectedEffect> {
         let known = self.pool.len();
         for _ in 0..3 {
             for i in 0..picks.len() {
                 let candidate = picks[i].candidate;
                 if matches!(
                     self.problem.candidates[candidate].source,
-                    Source::Columns(_)
+                    ColumnSource::Columns(_)
                 ) {
                     continue;
                 }
-                let (factors, _) = self.fit(&picks, On::All);
+                let (factors, _) = self.fit(&picks, FitScope::All);
                 let rank = picks[i].rank;
                 let anew = match self.problem.candidates[candidate].source {
-                    Source::Carried => self.best_carried(&picks, i),
-                    _ => Some(self.changed(candidate, &picks.clone(), &factors)),
+                    ColumnSource::LoadDependent => self.best_load_dependent(&picks, i),
+                    _ => Some(self.linearise_model_change(candidate, &picks.clone(), &factors)),
                 };
                 if let Some(anew) = anew {
-                    picks[i] = Pick { rank, ..anew };
+                    picks[i] = SelectedEffect { rank, ..anew };
                 }
             }
         }
-        self.keep_only(known, &mut picks);
+        self.drop_other_columns(known, &mut picks);
         picks
     }
 
     /// Forgets columns that were made since the pool had a length, but for those of a set.
-    fn keep_only(&mut self, known: usize, picks: &mut [Pick]) {
+    fn drop_other_columns(&mut self, known: usize, picks: &mut [SelectedEffect]) {
         let added = self.pool.split_off(known);
         let is_known = |columns: &[usize]| columns.iter().all(|k| *k < known);
-        (self.within.get_mut()).retain(|(one, other), _| is_known(one) && is_known(other));
+        (self.span_cache.get_mut()).retain(|(one, other), _| is_known(one) && is_known(other));
         for k in picks.iter_mut().flat_map(|pick| &mut pick.columns) {
             if *k >= known {
                 *k = self.pool.add(added[*k - known].clone());
@@ -203,16 +203,16 @@ impl Bench<'_> {
     }
 
     /// Lets go of columns that were made since the pool had a length, but for those of some effects.
-    pub(crate) fn forget_since<'p>(
+    pub(crate) fn drop_columns_since<'p>(
         &mut self,
         known: usize,
-        but: impl IntoIterator<Item = &'p Pick>,
+        but: impl IntoIterator<Item = &'p SelectedEffect>,
     ) {
         let kept: HashSet<usize> = (but.into_iter())
             .flat_map(|pick| pick.columns.iter().copied())
             .collect();
         for k in (known..self.pool.len()).filter(|k| !kept.contains(k)) {
-            self.pool.forget(k);
+            self.pool.release_column(k);
         }
     }
 }

@@ -1,12 +1,12 @@
 //! Channels of which no force is read, since nothing drives there: their equation of motion holds with a force of zero. Nothing
 //! can be wrong with a reading that there is not, and their noise is that of the states, which shows in what a fit leaves.
 
-use super::bench::Bench;
+use super::bench::EffectSelector;
 use super::noise::{ROUNDING, white_noise};
-use super::pool::{On, dot};
-use super::problem::{NoSupply, Problem};
+use super::pool::{FitScope, dot};
+use super::problem::{NoColumnProvider, DiagnosisProblem};
 
-impl Problem {
+impl DiagnosisProblem {
     /// Whether no force of a channel is read.
     pub(crate) fn is_idle(&self, channel: usize) -> bool {
         self.idle.get(channel).is_some_and(|idle| *idle)
@@ -16,13 +16,13 @@ impl Problem {
     ///
     /// Of zeros alone everything follows if all parameters are zero. So the parameters are those of the channels that are
     /// read; by the size of what these say of an idle channel its rows are weighed in a second fit, which leaves its noise.
-    pub(crate) fn find_noise_of_idle(&mut self) {
+    pub(crate) fn estimate_idle_noise(&mut self) {
         if !self.idle.contains(&true) {
             return;
         }
         // Candidates take no part in it.
         let candidates = std::mem::take(&mut self.candidates);
-        let found = Bench::new(self, &NoSupply).noise_of_idle();
+        let found = EffectSelector::new(self, &NoColumnProvider).idle_channel_noise();
         self.candidates = candidates;
         for (channel, noise) in found {
             self.noise[channel] = noise;
@@ -30,8 +30,8 @@ impl Problem {
     }
 }
 
-impl Bench<'_> {
-    fn noise_of_idle(&mut self) -> Vec<(usize, f64)> {
+impl EffectSelector<'_> {
+    fn idle_channel_noise(&mut self) -> Vec<(usize, f64)> {
         let problem = self.problem;
         let channels = 0..problem.layout.channels.len();
         let mean = |values: &[f64]| dot(values, values) / values.len().max(1) as f64;
@@ -41,11 +41,11 @@ impl Bench<'_> {
                 if problem.is_idle(d) {
                     0.0
                 } else {
-                    over(mean(&problem.force(d)))
+                    over(mean(&problem.measured_force(d)))
                 }
             })
             .collect();
-        let (factors, _) = self.fit(&[], On::All);
+        let (factors, _) = self.fit(&[], FitScope::All);
         let idle: Vec<usize> = channels.filter(|d| problem.is_idle(*d)).collect();
         let mut sizes = Vec::new();
         for d in &idle {
@@ -58,8 +58,8 @@ impl Bench<'_> {
         for (d, size) in idle.iter().zip(&sizes) {
             self.weights[*d] = over(*size);
         }
-        let (factors, _) = self.fit(&[], On::All);
-        let rest = self.rest(&[], &factors);
+        let (factors, _) = self.fit(&[], FitScope::All);
+        let rest = self.residual(&[], &factors);
         let noise = |(d, size): (&usize, &f64)| {
             let rounding = ROUNDING * size.max(mean(&rest[*d])).sqrt();
             (*d, white_noise(&rest[*d]).max(rounding))

@@ -45,32 +45,32 @@ mod untold;
 
 use serde::Serialize;
 
-pub use body::Body;
-pub use cleaning::step_of_values;
-pub use column::Column;
-pub use constant::Constant;
-pub use disturbance::{Budget, Disturbance, Quantity};
-pub use drifts::drifts;
-pub use evidence::Evidence;
-pub use laws::{Factor, Law, Product, Proposal, Shape, Site, Term, Variable};
+pub use body::AttachedBody;
+pub use cleaning::quantisation_step;
+pub use column::ForceColumn;
+pub use constant::ConstantCorrection;
+pub use disturbance::{ResidualBudget, Disturbance, EstimatedQuantity};
+pub use drifts::drift_candidates;
+pub use evidence::SelectionEvidence;
+pub use laws::{LawFactor, SiteLaw, LawProduct, LawProposal, LawShape, LawSite, LawTerm, LawVariable};
 pub use noise::{ROUNDING, effective_samples, white_noise};
 pub use problem::{
-    Candidate, Carried, Choice, Effect, EffectParameter, Fault, Layout, Nature, NoSupply, Problem,
-    Reading, Sign, Source, Stretch, Supply,
+    CandidateEffect, LoadDependentQuery, ColumnChoice, LocatedEffect, EffectParameter, ReadingFaultKind, SampleLayout, CandidateNature, NoColumnProvider, DiagnosisProblem,
+    ForceReadingFault, SignConstraint, ColumnSource, SampleSegment, ColumnProvider,
 };
-pub use readings::readings;
-pub use tilt::{Sensitivity, Tilt};
+pub use readings::reading_fault_candidates;
+pub use tilt::{ForceSensitivity, TiltCandidate};
 
-use bench::{Bench, Pick};
+use bench::{EffectSelector, SelectedEffect};
 use evidence::LEAST_GAIN;
-use pool::{On, dot};
-use reproducible::reproducible;
+use pool::{FitScope, dot};
+use reproducible::repeatable_shares;
 
 /// Kinds of friction of which a drift is a change.
 const FRICTION: [&str; 2] = ["viscous_friction", "coulomb_friction"];
 
 /// A law for so much of what is left says what effects that it makes needless were part of.
-const MOST_OF_THE_REST: f64 = 0.5;
+const MIN_LAW_SHARE: f64 = 0.5;
 
 /// Why an effect is refused that does nothing but take back another.
 const CANCELS: &str = "it would only cancel another effect at its place";
@@ -78,7 +78,7 @@ const CANCELS: &str = "it would only cancel another effect at its place";
 /// The answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Verdict {
+pub enum DiagnosisVerdict {
     /// What the model leaves is noise as far as the recordings can tell.
     Adequate,
     /// Effects are missing, and with them the model is adequate.
@@ -89,11 +89,11 @@ pub enum Verdict {
 
 /// A step of the ladder.
 #[derive(Clone, Debug)]
-pub struct Rung {
+pub struct SelectionStep {
     /// What was added; `None` for the model as it is.
-    pub added: Vec<Effect>,
+    pub added: Vec<LocatedEffect>,
     /// What it replaced.
-    pub dropped: Vec<Effect>,
+    pub dropped: Vec<LocatedEffect>,
     /// Relative error on the recordings of the fit.
     pub fit: f64,
     /// The same on those of the check, or of cross-validation if there are none.
@@ -101,14 +101,14 @@ pub struct Rung {
     /// As `check`, of each channel beside its own force.
     pub check_by_channel: Vec<f64>,
     /// What spoke for it.
-    pub evidence: Option<Evidence>,
+    pub evidence: Option<SelectionEvidence>,
 }
 
 /// An effect that is missing.
 #[derive(Clone, Debug)]
-pub struct FoundEffect {
+pub struct IdentifiedEffect {
     /// What and where.
-    pub effect: Effect,
+    pub effect: LocatedEffect,
     /// Position in [`Problem::candidates`].
     pub candidate: usize,
     /// Constants that were searched for.
@@ -116,71 +116,71 @@ pub struct FoundEffect {
     /// Estimates of the parameters, from the recordings of the fit.
     pub estimates: Vec<f64>,
     /// Their standard deviations, where they are known.
-    pub deviations: Vec<Option<f64>>,
+    pub standard_deviations: Vec<Option<f64>>,
     /// How likely it is that it is there.
     pub probability: f64,
     /// What cannot be told from it.
-    pub indistinguishable_from: Vec<Effect>,
+    pub indistinguishable_from: Vec<LocatedEffect>,
 }
 
 /// What became of a candidate.
 #[derive(Clone, Debug)]
-pub struct Considered {
+pub struct CandidateOutcome {
     /// What and where.
-    pub effect: Effect,
+    pub effect: LocatedEffect,
     /// Share of the squared error of the model as it is that it explains alone.
     pub explained: f64,
     /// Held-out gain beside the effects that were found; for a found one, what is lost without it.
     pub gain: f64,
     /// Why it was refused; `None` if it was not.
-    pub refused: Option<String>,
+    pub rejection_reason: Option<String>,
 }
 
 /// What a diagnosis says.
 #[derive(Clone, Debug)]
-pub struct Diagnosis {
+pub struct ModelDiagnosis {
     /// The answer.
-    pub verdict: Verdict,
+    pub verdict: DiagnosisVerdict,
     /// Noise of all channels relative to the measured forces, white or coloured.
     pub noise_floor: f64,
     /// What is left of each channel, by where it comes from.
-    pub budgets: Vec<Budget>,
+    pub budgets: Vec<ResidualBudget>,
     /// What the recordings have and the model does not lack.
     pub disturbances: Vec<Disturbance>,
     /// The ladder, from the model as it is.
-    pub ladder: Vec<Rung>,
+    pub steps: Vec<SelectionStep>,
     /// Effects that are missing.
-    pub effects: Vec<FoundEffect>,
+    pub effects: Vec<IdentifiedEffect>,
     /// All candidates, those that explain most first.
-    pub candidates: Vec<Considered>,
+    pub candidates: Vec<CandidateOutcome>,
     /// What the recordings leave open: effects as large as a drive's force would hide in what the model has.
-    pub untold: Vec<Effect>,
+    pub undetermined_effects: Vec<LocatedEffect>,
     /// What is left in the end, `[channel][sample]`.
-    pub rest: Vec<Vec<f64>>,
+    pub residual: Vec<Vec<f64>>,
     /// Share of each channel's squared rest that comes again where it was not fitted.
-    pub reproducible: Vec<f64>,
+    pub repeatable_share: Vec<f64>,
     /// Channels whose rest is unexplained.
     pub unexplained: Vec<usize>,
     /// Places on which laws may act, where something is unexplained.
-    pub sites: Vec<Site>,
+    pub sites: Vec<LawSite>,
     /// Laws that no library holds and that would explain it.
-    pub laws: Vec<Proposal>,
+    pub laws: Vec<LawProposal>,
 }
 
 /// Finds what is missing. `supply` makes columns that are not known from the start. Outliers and hum are taken off the measured
 /// forces of the problem, and what is to be left out becomes zero.
-pub fn diagnose(problem: &mut Problem, supply: &dyn Supply) -> Diagnosis {
+pub fn diagnose(problem: &mut DiagnosisProblem, supply: &dyn ColumnProvider) -> ModelDiagnosis {
     problem.removed.resize(problem.layout.channels.len(), 0.0);
-    problem.find_jumps();
-    problem.find_noise_of_idle();
+    problem.find_reversal_samples();
+    problem.estimate_idle_noise();
     let known = problem.disturbances.clone();
     let raw = (problem.measured.clone(), problem.removed.clone());
     let with = |found: Vec<Disturbance>| known.iter().cloned().chain(found).collect();
-    let cleaned = cleaning::clean(problem);
-    let diagnosis = search_all(problem, supply, with(cleaned));
-    let Diagnosis {
-        rest,
-        reproducible: again,
+    let cleaned = cleaning::clean_forces(problem);
+    let diagnosis = diagnose_cleaned(problem, supply, with(cleaned));
+    let ModelDiagnosis {
+        residual: rest,
+        repeatable_share: again,
         unexplained,
         ..
     } = &diagnosis;
@@ -189,50 +189,50 @@ pub fn diagnose(problem: &mut Problem, supply: &dyn Supply) -> Diagnosis {
         return diagnosis;
     }
     (problem.measured, problem.removed) = raw;
-    let cleaned = cleaning::clean_beside(problem, &slow);
-    search_all(problem, supply, with(cleaned))
+    let cleaned = cleaning::clean_with_slow_lines(problem, &slow);
+    diagnose_cleaned(problem, supply, with(cleaned))
 }
 
 /// The diagnosis of a problem whose forces were cleaned from `disturbances`.
-fn search_all(
-    problem: &Problem,
-    supply: &dyn Supply,
+fn diagnose_cleaned(
+    problem: &DiagnosisProblem,
+    supply: &dyn ColumnProvider,
     mut disturbances: Vec<Disturbance>,
-) -> Diagnosis {
-    let mut bench = Bench::new(problem, supply);
-    bench.look(&[]);
-    let alone = bench.explained_alone();
-    let found = bench.search();
+) -> ModelDiagnosis {
+    let mut bench = EffectSelector::new(problem, supply);
+    bench.update_choices(&[]);
+    let alone = bench.explained_by_each();
+    let found = bench.search_sets();
     let picks = found.steps.last().map_or(Vec::new(), |s| s.picks.clone());
-    let mut ladder = vec![bench.rung(&[], &[], None)];
-    let mut before: Vec<Pick> = Vec::new();
+    let mut ladder = vec![bench.selection_step(&[], &[], None)];
+    let mut before: Vec<SelectedEffect> = Vec::new();
     for step in &found.steps {
-        ladder.push(bench.rung(&before, &step.picks, step.evidence));
+        ladder.push(bench.selection_step(&before, &step.picks, step.evidence));
         before.clone_from(&step.picks);
     }
-    let (mut picks, mut left) = bench.above_the_unexplained(picks);
+    let (mut picks, mut left) = bench.drop_below_unexplained(picks);
     if picks.len() < before.len() {
-        ladder.push(bench.rung(&before, &picks, None));
+        ladder.push(bench.selection_step(&before, &picks, None));
     }
-    let (mut sites, mut laws) = bench.laws(&picks, &left);
-    let needed = bench.beside_laws(&picks, &laws);
+    let (mut sites, mut laws) = bench.find_laws(&picks, &left);
+    let needed = bench.effects_outside_laws(&picks, &laws);
     if needed.len() < picks.len() {
-        let left_then = bench.left(&needed);
-        let (sites_then, laws_then) = bench.laws(&needed, &left_then);
-        let stands = |law: &Proposal| {
-            let is_its = |then: &Proposal| {
-                then.channels == law.channels && then.law.gain >= MOST_OF_THE_REST
+        let left_then = bench.set_residual(&needed);
+        let (sites_then, laws_then) = bench.find_laws(&needed, &left_then);
+        let stands = |law: &LawProposal| {
+            let is_its = |then: &LawProposal| {
+                then.channels == law.channels && then.law.gain >= MIN_LAW_SHARE
             };
-            law.law.gain < MOST_OF_THE_REST || laws_then.iter().any(is_its)
+            law.law.gain < MIN_LAW_SHARE || laws_then.iter().any(is_its)
         };
         if laws.iter().all(stands) {
-            ladder.push(bench.rung(&picks, &needed, None));
+            ladder.push(bench.selection_step(&picks, &needed, None));
             (picks, left, sites, laws) = (needed, left_then, sites_then, laws_then);
         }
     }
-    let Left {
-        rest,
-        mut again,
+    let SetResidual {
+        residual: rest,
+        repeatable_share: mut again,
         mut unexplained,
     } = left;
     // What a law foretells comes again.
@@ -245,50 +245,50 @@ fn search_all(
         }
     }
     unexplained.sort_unstable();
-    let aliases = bench.aliases(&picks);
-    bench.weigh(&picks);
-    let (budgets, coloured) = bench.budgets(&picks, &rest, &again);
+    let aliases = bench.find_aliases(&picks);
+    bench.weigh_channels(&picks);
+    let (budgets, coloured) = bench.residual_budgets(&picks, &rest, &again);
     disturbances.extend(bench.disturbances(&picks));
     disturbances.extend(coloured);
-    let estimates = bench.estimates(&picks, On::Fit);
+    let estimates = bench.estimate_parameters(&picks, FitScope::Fit);
     let mut effects = Vec::new();
     for (i, (pick, aliases)) in picks.iter().zip(aliases).enumerate() {
         let candidate = bench.candidate(pick);
-        if candidate.nature == Nature::Disturbance {
+        if candidate.nature == CandidateNature::Disturbance {
             continue;
         }
-        let rivals = aliases.iter().filter(|alias| !alias.is_rewriting);
-        let rivals: Vec<f64> = rivals.map(|alias| alias.worse).collect();
+        let rivals = aliases.iter().filter(|alias| !alias.is_equivalent_form);
+        let rivals: Vec<f64> = rivals.map(|alias| alias.criterion_loss).collect();
         let (values, deviations) = estimates[i].iter().copied().unzip();
-        effects.push(FoundEffect {
+        effects.push(IdentifiedEffect {
             effect: candidate.effect.clone(),
             candidate: pick.candidate,
             constants: pick.constants.clone(),
             estimates: values,
-            deviations,
+            standard_deviations: deviations,
             probability: bench.probability(&picks, i, &rivals, &unexplained),
             indistinguishable_from: aliases.into_iter().map(|alias| alias.effect).collect(),
         });
     }
-    friction_in_time(&mut effects, &mut disturbances);
+    merge_drifting_friction(&mut effects, &mut disturbances);
     let verdict = match (unexplained.is_empty(), effects.is_empty()) {
-        (false, _) => Verdict::Unexplained,
-        (true, true) => Verdict::Adequate,
-        (true, false) => Verdict::MissingEffect,
+        (false, _) => DiagnosisVerdict::Unexplained,
+        (true, true) => DiagnosisVerdict::Adequate,
+        (true, false) => DiagnosisVerdict::MissingEffect,
     };
-    let candidates = bench.considered(&picks, &found, &alone);
-    let untold = bench.untold(&picks, &rest);
-    Diagnosis {
+    let candidates = bench.candidate_outcomes(&picks, &found, &alone);
+    let untold = bench.find_undetermined(&picks, &rest);
+    ModelDiagnosis {
         verdict,
         noise_floor: noise_floor(&budgets),
         budgets,
         disturbances,
-        ladder,
+        steps: ladder,
         effects,
         candidates,
-        untold,
-        rest,
-        reproducible: again,
+        undetermined_effects: untold,
+        residual: rest,
+        repeatable_share: again,
         unexplained,
         sites,
         laws,
@@ -296,9 +296,9 @@ fn search_all(
 }
 
 /// Friction that the model lacks and that drifts besides is one effect: friction that changes with time.
-fn friction_in_time(effects: &mut Vec<FoundEffect>, disturbances: &mut Vec<Disturbance>) {
+fn merge_drifting_friction(effects: &mut Vec<IdentifiedEffect>, disturbances: &mut Vec<Disturbance>) {
     disturbances.retain(|drift| {
-        let is_its = |found: &FoundEffect| {
+        let is_its = |found: &IdentifiedEffect| {
             found.effect.at == drift.at && FRICTION.contains(&found.effect.kind.as_str())
         };
         let Some(at) = effects.iter().position(is_its) else {
@@ -317,8 +317,8 @@ fn friction_in_time(effects: &mut Vec<FoundEffect>, disturbances: &mut Vec<Distu
 }
 
 /// Noise of all channels relative to the measured forces.
-fn noise_floor(budgets: &[Budget]) -> f64 {
-    let sum = |of: &dyn Fn(&Budget) -> f64| budgets.iter().map(|b| of(b).powi(2)).sum::<f64>();
+fn noise_floor(budgets: &[ResidualBudget]) -> f64 {
+    let sum = |of: &dyn Fn(&ResidualBudget) -> f64| budgets.iter().map(|b| of(b).powi(2)).sum::<f64>();
     let force = sum(&|budget| budget.force);
     if force > 0.0 {
         (sum(&|budget| budget.noise) / force).sqrt()
@@ -328,86 +328,86 @@ fn noise_floor(budgets: &[Budget]) -> f64 {
 }
 
 /// What a set leaves.
-struct Left {
+struct SetResidual {
     /// `[channel][sample]`
-    rest: Vec<Vec<f64>>,
+    residual: Vec<Vec<f64>>,
     /// Share of each channel's squares that comes again.
-    again: Vec<f64>,
+    repeatable_share: Vec<f64>,
     /// Channels of which that is more than noise.
     unexplained: Vec<usize>,
 }
 
-impl Bench<'_> {
-    fn left(&mut self, picks: &[Pick]) -> Left {
-        self.weigh(picks);
-        let (factors, _) = self.fit(picks, On::All);
-        let rest = self.rest(picks, &factors);
+impl EffectSelector<'_> {
+    fn set_residual(&mut self, picks: &[SelectedEffect]) -> SetResidual {
+        self.weigh_channels(picks);
+        let (factors, _) = self.fit(picks, FitScope::All);
+        let rest = self.residual(picks, &factors);
         let problem = self.problem;
-        let again = reproducible(&problem.layout, &problem.variables, &rest);
+        let again = repeatable_shares(&problem.layout, &problem.variables, &rest);
         let unexplained = (0..rest.len())
             .filter(|d| self.is_unexplained(*d, &rest[*d], again[*d]))
             .collect();
-        Left {
-            rest,
-            again,
+        SetResidual {
+            residual: rest,
+            repeatable_share: again,
             unexplained,
         }
     }
 
     /// Laws for what a set leaves, and where they may act.
-    fn laws(&self, picks: &[Pick], left: &Left) -> (Vec<Site>, Vec<Proposal>) {
+    fn find_laws(&self, picks: &[SelectedEffect], left: &SetResidual) -> (Vec<LawSite>, Vec<LawProposal>) {
         if self.problem.effects_only {
             return (Vec::new(), Vec::new());
         }
-        let left = laws::Left {
-            rest: &left.rest,
-            again: &left.again,
+        let left = laws::ResidualView {
+            residual: &left.residual,
+            repeatable_share: &left.repeatable_share,
             unexplained: &left.unexplained,
         };
-        laws::propose(self, picks, &left, self.supply)
+        laws::propose_laws(self, picks, &left, self.provider)
     }
 
     /// The members of a set that laws do not make needless: an effect that goes where a law for most of the rest comes is part of
     /// that law, if it acts on drives that feel the law.
-    fn beside_laws(&self, picks: &[Pick], laws: &[Proposal]) -> Vec<Pick> {
-        let is_part = |pick: &Pick, proposal: &Proposal| {
-            let channels = self.acted_on(std::slice::from_ref(pick));
+    fn effects_outside_laws(&self, picks: &[SelectedEffect], laws: &[LawProposal]) -> Vec<SelectedEffect> {
+        let is_part = |pick: &SelectedEffect, proposal: &LawProposal| {
+            let channels = self.affected_channels(std::slice::from_ref(pick));
             let effect = &self.candidate(pick).effect;
-            proposal.law.gain >= MOST_OF_THE_REST
-                && proposal.law.instead_of.contains(effect)
+            proposal.law.gain >= MIN_LAW_SHARE
+                && proposal.law.replaced_effects.contains(effect)
                 && channels.iter().all(|d| proposal.channels.contains(d))
         };
-        let is_needed = |pick: &&Pick| !laws.iter().any(|proposal| is_part(pick, proposal));
+        let is_needed = |pick: &&SelectedEffect| !laws.iter().any(|proposal| is_part(pick, proposal));
         picks.iter().filter(is_needed).cloned().collect()
     }
 
     /// A set without members that explain less than what stays unexplained where they act, and what it leaves: part of a law that
     /// nobody knows is as likely there as the effect.
-    fn above_the_unexplained(&mut self, mut picks: Vec<Pick>) -> (Vec<Pick>, Left) {
+    fn drop_below_unexplained(&mut self, mut picks: Vec<SelectedEffect>) -> (Vec<SelectedEffect>, SetResidual) {
         loop {
-            let left = self.left(&picks);
-            let mut least: Option<(f64, Vec<Pick>)> = None;
+            let left = self.set_residual(&picks);
+            let mut least: Option<(f64, Vec<SelectedEffect>)> = None;
             for i in 0..picks.len() {
-                let channels = self.acted_on(&picks[i..=i]);
+                let channels = self.affected_channels(&picks[i..=i]);
                 let squares =
                     |rest: &[Vec<f64>], d: usize| self.weights[d] * dot(&rest[d], &rest[d]);
                 let unexplained = channels.iter().filter(|d| left.unexplained.contains(d));
                 let stays: f64 = unexplained
-                    .map(|d| left.again[*d] * squares(&left.rest, *d))
+                    .map(|d| left.repeatable_share[*d] * squares(&left.residual, *d))
                     .sum();
                 if stays <= 0.0 {
                     continue;
                 }
                 let mut fewer = picks.clone();
                 fewer.remove(i);
-                let fewer = self.refresh(fewer);
-                let (factors, _) = self.fit(&fewer, On::All);
-                let rest = self.rest(&fewer, &factors);
+                let fewer = self.refresh_columns(fewer);
+                let (factors, _) = self.fit(&fewer, FitScope::All);
+                let rest = self.residual(&fewer, &factors);
                 let squares =
                     |rest: &[Vec<f64>], d: usize| self.weights[d] * dot(&rest[d], &rest[d]);
                 let gains = channels
                     .iter()
-                    .map(|d| squares(&rest, *d) - squares(&left.rest, *d));
+                    .map(|d| squares(&rest, *d) - squares(&left.residual, *d));
                 let share = gains.sum::<f64>() / stays;
                 if share < 1.0 && least.as_ref().is_none_or(|(other, _)| share < *other) {
                     least = Some((share, fewer));
@@ -429,27 +429,27 @@ impl Bench<'_> {
     }
 
     /// Share of the squared error of the model as it is that each candidate explains alone.
-    fn explained_alone(&self) -> Vec<f64> {
-        let table = self.table(&[]);
-        let total = self.try_in(&table, Vec::new()).squares;
-        let share = |pick: &Option<Pick>| match pick {
+    fn explained_by_each(&self) -> Vec<f64> {
+        let table = self.projected_gram(&[]);
+        let total = self.fit_from_gram(&table, Vec::new()).squares;
+        let share = |pick: &Option<SelectedEffect>| match pick {
             Some(pick) if total > 0.0 => {
-                1.0 - self.try_in(&table, vec![pick.clone()]).squares / total
+                1.0 - self.fit_from_gram(&table, vec![pick.clone()]).squares / total
             }
             _ => 0.0,
         };
-        self.present.iter().map(share).collect()
+        self.current_choices.iter().map(share).collect()
     }
 
-    fn rung(&self, before: &[Pick], after: &[Pick], evidence: Option<Evidence>) -> Rung {
-        let effects = |set: &[Pick], other: &[Pick]| -> Vec<Effect> {
-            let is_new = |pick: &&Pick| other.iter().all(|p| p.candidate != pick.candidate);
+    fn selection_step(&self, before: &[SelectedEffect], after: &[SelectedEffect], evidence: Option<SelectionEvidence>) -> SelectionStep {
+        let effects = |set: &[SelectedEffect], other: &[SelectedEffect]| -> Vec<LocatedEffect> {
+            let is_new = |pick: &&SelectedEffect| other.iter().all(|p| p.candidate != pick.candidate);
             let new = set.iter().filter(is_new);
             new.map(|pick| self.candidate(pick).effect.clone())
                 .collect()
         };
-        let (fit, check, check_by_channel) = self.errors(after);
-        Rung {
+        let (fit, check, check_by_channel) = self.relative_errors(after);
+        SelectionStep {
             added: effects(after, before),
             dropped: effects(before, after),
             fit,
@@ -460,12 +460,12 @@ impl Bench<'_> {
     }
 
     /// Relative errors on fit and check, and of each channel on the check, fitted to the fit; without a check by cross-validation.
-    fn errors(&self, picks: &[Pick]) -> (f64, f64, Vec<f64>) {
+    fn relative_errors(&self, picks: &[SelectedEffect]) -> (f64, f64, Vec<f64>) {
         let layout = &self.problem.layout;
         let split = layout.fit_samples();
-        let rest = self.whole(picks);
+        let rest = self.full_residual(picks);
         let channels = 0..rest.len();
-        let forces: Vec<Vec<f64>> = channels.clone().map(|d| self.problem.force(d)).collect();
+        let forces: Vec<Vec<f64>> = channels.clone().map(|d| self.problem.measured_force(d)).collect();
         let norm = |part: &[f64]| dot(part, part);
         let squares = |of: &[Vec<f64>], range: std::ops::Range<usize>| -> Vec<f64> {
             of.iter().map(|all| norm(&all[range.clone()])).collect()
@@ -484,7 +484,7 @@ impl Bench<'_> {
         } else {
             // Weights differ by channel, figures do not.
             let held_out =
-                |d: usize| self.held_out(picks, &[d], true).iter().sum::<f64>() / self.weights[d];
+                |d: usize| self.validation_errors(picks, &[d], true).iter().sum::<f64>() / self.weights[d];
             channels.map(held_out).collect()
         };
         let forces = squares(&forces, judged);
@@ -494,10 +494,10 @@ impl Bench<'_> {
     }
 
     /// What a set leaves where it is fitted to the fit. What decides nothing counts, but for what is left out altogether.
-    fn whole(&self, picks: &[Pick]) -> Vec<Vec<f64>> {
-        let (factors, _) = self.fit(picks, On::Fit);
+    fn full_residual(&self, picks: &[SelectedEffect]) -> Vec<Vec<f64>> {
+        let (factors, _) = self.fit(picks, FitScope::Fit);
         let columns = self.columns(picks);
-        let mut rest = (self.pool).whole_rest(self.measured, &columns, factors.as_slice());
+        let mut rest = (self.pool).full_residual(self.measured, &columns, factors.as_slice());
         for (rest, out) in rest.iter_mut().zip(&self.problem.left_out) {
             for (r, _) in rest.iter_mut().zip(out).filter(|(_, out)| **out) {
                 *r = 0.0;
@@ -508,13 +508,13 @@ impl Bench<'_> {
 
     /// Whether a change makes what is left larger where everything counts, in the fit and in the check: then it explains what
     /// decides at the cost of what lies next to reversals, where an effect would be seen, too.
-    fn costs_more(&self, before: &[Pick], after: &[Pick], channels: &[usize]) -> bool {
+    fn is_worse_overall(&self, before: &[SelectedEffect], after: &[SelectedEffect], channels: &[usize]) -> bool {
         if self.problem.jumps.is_empty() {
             return false;
         }
         let layout = &self.problem.layout;
         let split = layout.fit_samples();
-        let [old, new] = [before, after].map(|picks| self.whole(picks));
+        let [old, new] = [before, after].map(|picks| self.full_residual(picks));
         let rises = |range: std::ops::Range<usize>| {
             let of = |rest: &[Vec<f64>], d: usize| {
                 let part = &rest[d][range.clone()];
@@ -527,28 +527,28 @@ impl Bench<'_> {
     }
 
     /// What became of every candidate.
-    fn considered(
+    fn candidate_outcomes(
         &mut self,
-        picks: &[Pick],
-        found: &search::Found,
+        picks: &[SelectedEffect],
+        found: &search::EffectSearchResult,
         alone: &[f64],
-    ) -> Vec<Considered> {
+    ) -> Vec<CandidateOutcome> {
         if self.problem.effects_only {
             return Vec::new();
         }
-        self.look(picks);
+        self.update_choices(picks);
         let has_check = self.problem.layout.has_check();
-        let table = self.table(picks);
-        let now = self.try_in(&table, picks.to_vec()).squares;
-        let mut considered: Vec<Considered> = Vec::new();
+        let table = self.projected_gram(picks);
+        let now = self.fit_from_gram(&table, picks.to_vec()).squares;
+        let mut considered: Vec<CandidateOutcome> = Vec::new();
         for (k, candidate) in self.problem.candidates.iter().enumerate() {
             let picked = picks.iter().position(|p| p.candidate == k);
             let (gain, refused) = if let Some(i) = picked {
                 let mut without = picks.to_vec();
                 let pick = without.remove(i);
-                let channels = self.acted_on(&[pick]);
+                let channels = self.affected_channels(&[pick]);
                 (self.evidence(&without, picks, &channels).gain, None)
-            } else if let Some(refused) = found.refused.iter().find(|r| r.pick.candidate == k) {
+            } else if let Some(refused) = found.rejected.iter().find(|r| r.pick.candidate == k) {
                 let why = if refused.wrong_sign {
                     "sign"
                 } else if refused.cancels {
@@ -556,14 +556,14 @@ impl Bench<'_> {
                 } else {
                     refused
                         .evidence
-                        .lacks(has_check)
+                        .insufficiency_reason(has_check)
                         .unwrap_or("another explains more")
                 };
                 (refused.evidence.gain, Some(why.to_owned()))
-            } else if let Some(pick) = &self.present[k] {
+            } else if let Some(pick) = &self.current_choices[k] {
                 let mut with = picks.to_vec();
                 with.push(pick.clone());
-                let trial = self.try_in(&table, with);
+                let trial = self.fit_from_gram(&table, with);
                 let gain = if now > 0.0 {
                     1.0 - trial.squares / now
                 } else {
@@ -582,15 +582,15 @@ impl Bench<'_> {
             } else {
                 (0.0, Some("the model says it already".to_owned()))
             };
-            considered.push(Considered {
+            considered.push(CandidateOutcome {
                 effect: candidate.effect.clone(),
                 explained: alone[k],
                 gain,
-                refused,
+                rejection_reason: refused,
             });
         }
         considered.sort_by(|a, b| {
-            (b.refused.is_none().cmp(&a.refused.is_none()))
+            (b.rejection_reason.is_none().cmp(&a.rejection_reason.is_none()))
                 .then(b.explained.total_cmp(&a.explained))
         });
         considered

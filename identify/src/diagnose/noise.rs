@@ -33,11 +33,11 @@ pub fn effective_samples(values: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_noise::Noise;
+    use crate::test_noise::TestNoise;
 
     #[test]
     fn noise_is_seen_under_motion_and_jumps() {
-        let mut noise = Noise::new(3);
+        let mut noise = TestNoise::new(3);
         let signal: Vec<f64> = (0..4000)
             .map(|i| {
                 let t = 0.004 * f64::from(i);
@@ -49,7 +49,7 @@ mod tests {
 
     #[test]
     fn a_filtered_series_is_worth_less() {
-        let mut noise = Noise::new(5);
+        let mut noise = TestNoise::new(5);
         let mut last = 0.0;
         let white: Vec<f64> = (0..20_000).map(|_| noise.normal()).collect();
         let red: Vec<f64> = white

@@ -9,14 +9,14 @@ use std::ops::Range;
 use nalgebra::{DMatrix, DVector};
 use pulp::Arch;
 
-use super::column::Column;
-use super::numbered::ByPlace;
-use super::problem::Layout;
+use super::column::ForceColumn;
+use super::numbered::ColumnMap;
+use super::problem::SampleLayout;
 use super::tile;
 
 /// Inner products of a column with earlier ones by part (0 is the fit, 1 the check) and channel on which both act, the parts one
 /// after the other; or by fold and channel.
-type Products = ByPlace<Box<[f64]>>;
+type PairProducts = ColumnMap<Box<[f64]>>;
 /// Inner products of fewer numbers are made as they stand.
 const SHORT: usize = 64;
 /// Sums that an inner product has at once.
@@ -27,16 +27,16 @@ const FOLDS: usize = 10;
 const FEW: usize = 3;
 
 /// Columns with their inner products, each of which is computed when it is asked for first.
-pub(crate) struct Pool<'a> {
-    columns: Vec<Cow<'a, Column>>,
+pub(crate) struct ColumnPool<'a> {
+    columns: Vec<Cow<'a, ForceColumn>>,
     /// Channels on which each column acts, a bit for each.
     acts: Vec<Box<[u64]>>,
     /// How many there are.
     channels: usize,
     fit: Range<usize>,
     check: Range<usize>,
-    products: RefCell<Vec<Products>>,
-    of_folds: RefCell<Vec<Products>>,
+    products: RefCell<Vec<PairProducts>>,
+    of_folds: RefCell<Vec<PairProducts>>,
     /// Folds of all samples.
     folds: Vec<Range<usize>>,
     /// Samples that were not measured, by channel: nothing counts them.
@@ -44,11 +44,11 @@ pub(crate) struct Pool<'a> {
     /// Samples that are left out of every product, by channel and in order; the lost ones are among them.
     left_out: Vec<Vec<usize>>,
     /// What is known of the factors of the first columns beforehand, as further equations: the inverse of their covariance.
-    pub(crate) prior: Option<DMatrix<f64>>,
+    pub(crate) prior_equations: Option<DMatrix<f64>>,
 }
 
-impl<'a> Pool<'a> {
-    pub(crate) fn new(layout: &Layout) -> Self {
+impl<'a> ColumnPool<'a> {
+    pub(crate) fn new(layout: &SampleLayout) -> Self {
         let fit = layout.fit_samples();
         Self {
             columns: Vec::new(),
@@ -60,19 +60,19 @@ impl<'a> Pool<'a> {
             of_folds: RefCell::default(),
             folds: layout.blocks(FOLDS),
             lost: layout.left_out.clone(),
-            left_out: layout.left_out.iter().map(|out| places(out)).collect(),
-            prior: None,
+            left_out: layout.left_out.iter().map(|out| true_indices(out)).collect(),
+            prior_equations: None,
         }
     }
 
     /// Leaves further samples out of all products and of what is left.
-    pub(crate) fn without(mut self, left_out: &[Vec<bool>]) -> Self {
+    pub(crate) fn exclude_samples(mut self, left_out: &[Vec<bool>]) -> Self {
         let all = left_out.iter().enumerate().map(|(d, out)| {
             let lost = self.lost.get(d);
             let either = out.iter().enumerate().map(|(i, out)| {
                 *out || lost.is_some_and(|lost| lost.get(i).copied().unwrap_or(false))
             });
-            places(&either.collect::<Vec<bool>>())
+            true_indices(&either.collect::<Vec<bool>>())
         });
         if !left_out.is_empty() {
             self.left_out = all.collect();
@@ -81,13 +81,13 @@ impl<'a> Pool<'a> {
     }
 
     /// Inner product of two columns' values on a channel over some samples, without those that are left out.
-    pub(crate) fn inner(&self, channel: usize, a: &[f64], b: &[f64], range: Range<usize>) -> f64 {
-        let less = self.not_counted(channel, a, b, &range);
+    pub(crate) fn inner_product(&self, channel: usize, a: &[f64], b: &[f64], range: Range<usize>) -> f64 {
+        let less = self.excluded_product(channel, a, b, &range);
         dot(&a[range.clone()], &b[range]) - less
     }
 
     /// What samples that are left out would add to an inner product.
-    fn not_counted(&self, channel: usize, a: &[f64], b: &[f64], range: &Range<usize>) -> f64 {
+    fn excluded_product(&self, channel: usize, a: &[f64], b: &[f64], range: &Range<usize>) -> f64 {
         let out = self.left_out.get(channel).map_or(&[][..], Vec::as_slice);
         let from = out.partition_point(|i| *i < range.start);
         let to = out.partition_point(|i| *i < range.end);
@@ -95,12 +95,12 @@ impl<'a> Pool<'a> {
     }
 
     /// All samples.
-    pub(crate) fn all(&self) -> Range<usize> {
+    pub(crate) fn all_samples(&self) -> Range<usize> {
         0..self.check.end
     }
 
     /// Makes a series that begins at a sample zero where samples are left out.
-    pub(crate) fn silence(&self, channel: usize, start: usize, values: &mut [f64]) {
+    pub(crate) fn zero_excluded(&self, channel: usize, start: usize, values: &mut [f64]) {
         let out = self.left_out.get(channel).map_or(&[][..], Vec::as_slice);
         let from = out.partition_point(|i| *i < start);
         let to = out.partition_point(|i| *i < start + values.len());
@@ -110,7 +110,7 @@ impl<'a> Pool<'a> {
     }
 
     /// Adds a column; its place.
-    pub(crate) fn add(&mut self, column: impl Into<Cow<'a, Column>>) -> usize {
+    pub(crate) fn add(&mut self, column: impl Into<Cow<'a, ForceColumn>>) -> usize {
         let column = column.into();
         let mut acts = vec![0; column.0.len().div_ceil(64)];
         for d in column.channels() {
@@ -118,8 +118,8 @@ impl<'a> Pool<'a> {
         }
         self.acts.push(acts.into());
         self.columns.push(column);
-        self.products.get_mut().push(Products::default());
-        self.of_folds.get_mut().push(Products::default());
+        self.products.get_mut().push(PairProducts::default());
+        self.of_folds.get_mut().push(PairProducts::default());
         self.columns.len() - 1
     }
 
@@ -128,7 +128,7 @@ impl<'a> Pool<'a> {
     }
 
     /// Takes the columns from a place on out again, with all their products.
-    pub(crate) fn split_off(&mut self, known: usize) -> Vec<Cow<'a, Column>> {
+    pub(crate) fn split_off(&mut self, known: usize) -> Vec<Cow<'a, ForceColumn>> {
         self.acts.truncate(known);
         self.products.get_mut().truncate(known);
         self.of_folds.get_mut().truncate(known);
@@ -136,14 +136,14 @@ impl<'a> Pool<'a> {
     }
 
     /// Lets go of what a column holds; its place is not given to another.
-    pub(crate) fn forget(&mut self, k: usize) {
+    pub(crate) fn release_column(&mut self, k: usize) {
         self.acts[k].fill(0);
-        self.columns[k] = Cow::Owned(Column::default());
-        self.products.get_mut()[k] = Products::default();
-        self.of_folds.get_mut()[k] = Products::default();
+        self.columns[k] = Cow::Owned(ForceColumn::default());
+        self.products.get_mut()[k] = PairProducts::default();
+        self.of_folds.get_mut()[k] = PairProducts::default();
     }
 
-    pub(crate) fn column(&self, k: usize) -> &Column {
+    pub(crate) fn column(&self, k: usize) -> &ForceColumn {
         &self.columns[k]
     }
 
@@ -158,7 +158,7 @@ impl<'a> Pool<'a> {
     }
 
     /// Whether two columns act on a channel both.
-    fn meet(&self, a: usize, b: usize) -> bool {
+    fn has_common_channel(&self, a: usize, b: usize) -> bool {
         let mut words = self.acts[a].iter().zip(&*self.acts[b]);
         words.any(|(a, b)| a & b != 0)
     }
@@ -169,14 +169,14 @@ impl<'a> Pool<'a> {
         let parts = [&self.fit, &self.check].into_iter();
         let of_part = |range: &Range<usize>| {
             let range = range.clone();
-            let common = a.common(b);
-            common.map(move |(d, a, b)| self.inner(d, a, b, range.clone()))
+            let common = a.common_channels(b);
+            common.map(move |(d, a, b)| self.inner_product(d, a, b, range.clone()))
         };
         parts.flat_map(of_part).collect()
     }
 
     /// Computes the inner products of some columns that are not known yet, those of neighbours together.
-    pub(crate) fn fill(&self, which: &[usize]) {
+    pub(crate) fn compute_products(&self, which: &[usize]) {
         let mut which = which.to_vec();
         // Neighbours act on the same channels.
         which.sort_unstable_by_key(|k| (&self.acts[*k], *k));
@@ -190,7 +190,7 @@ impl<'a> Pool<'a> {
                     for (c, b) in columns.iter().enumerate() {
                         let is_twice = rows == columns && c > r;
                         let (later, earlier) = (*a.max(b), a.min(b));
-                        if !is_twice && self.meet(*a, *b) && !products[later].contains_key(earlier)
+                        if !is_twice && self.has_common_channel(*a, *b) && !products[later].contains_key(earlier)
                         {
                             unknown.push((r, c));
                         }
@@ -199,7 +199,7 @@ impl<'a> Pool<'a> {
                 if unknown.len() < FEW {
                     continue; // Single products cost less.
                 }
-                let made = self.tile(rows, columns, &unknown);
+                let made = self.compute_tile(rows, columns, &unknown);
                 for ((r, c), found) in unknown.into_iter().zip(made) {
                     let (a, b) = (rows[r], columns[c]);
                     products[a.max(b)].insert(a.min(b), found);
@@ -209,7 +209,7 @@ impl<'a> Pool<'a> {
     }
 
     /// The same as [`Pool::products_of`] of some pairs of a tile, in their order.
-    fn tile(&self, rows: &[usize], columns: &[usize], pairs: &[(usize, usize)]) -> Vec<Box<[f64]>> {
+    fn compute_tile(&self, rows: &[usize], columns: &[usize], pairs: &[(usize, usize)]) -> Vec<Box<[f64]>> {
         let mut found: Vec<Vec<f64>> = vec![Vec::new(); pairs.len()];
         for part in [&self.fit, &self.check] {
             for d in 0..self.channels {
@@ -227,10 +227,10 @@ impl<'a> Pool<'a> {
                 // Those that do not act here stand in for nothing.
                 let rows = r.map(|one| &one.unwrap_or(any)[part.clone()]);
                 let columns = c.map(|one| &one.unwrap_or(any)[part.clone()]);
-                let sums = tile::products(rows, columns);
+                let sums = tile::tile_products(rows, columns);
                 for (found, (i, j)) in found.iter_mut().zip(pairs) {
                     if let (Some(a), Some(b)) = (r[*i], c[*j]) {
-                        found.push(sums[*i][*j] - self.not_counted(d, a, b, part));
+                        found.push(sums[*i][*j] - self.excluded_product(d, a, b, part));
                     }
                 }
             }
@@ -239,18 +239,18 @@ impl<'a> Pool<'a> {
     }
 
     /// Weighted inner product of two columns on all samples.
-    pub(crate) fn product(&self, a: usize, b: usize, weights: &[f64]) -> f64 {
-        self.weighted(a, b, weights, On::All)
+    pub(crate) fn weighted_product(&self, a: usize, b: usize, weights: &[f64]) -> f64 {
+        self.scoped_product(a, b, weights, FitScope::All)
     }
 
     /// The same of columns that need not be in the pool, computed anew.
-    pub(crate) fn product_of(&self, a: &Column, b: &Column, weights: &[f64]) -> f64 {
-        let on = |(d, a, b)| weights[d] * self.inner(d, a, b, self.all());
-        a.common(b).map(on).sum()
+    pub(crate) fn weighted_product_of(&self, a: &ForceColumn, b: &ForceColumn, weights: &[f64]) -> f64 {
+        let on = |(d, a, b)| weights[d] * self.inner_product(d, a, b, self.all_samples());
+        a.common_channels(b).map(on).sum()
     }
 
-    fn weighted(&self, a: usize, b: usize, weights: &[f64], on: On) -> f64 {
-        if !self.meet(a, b) {
+    fn scoped_product(&self, a: usize, b: usize, weights: &[f64], on: FitScope) -> f64 {
+        if !self.has_common_channel(a, b) {
             return 0.0;
         }
         let (a, b) = (a.max(b), a.min(b));
@@ -263,18 +263,18 @@ impl<'a> Pool<'a> {
         let common = (0..self.channels).filter(|d| self.acts_on(a, *d) && self.acts_on(b, *d));
         let sums = common
             .zip(fit.iter().zip(check))
-            .map(|(d, (fit, check))| weights[d] * if on == On::All { fit + check } else { *fit });
+            .map(|(d, (fit, check))| weights[d] * if on == FitScope::All { fit + check } else { *fit });
         sums.sum()
     }
 
     /// Weighted inner products of some columns on fit, check or both.
-    pub(crate) fn gram(&self, which: &[usize], weights: &[f64], on: On) -> DMatrix<f64> {
+    pub(crate) fn gram(&self, which: &[usize], weights: &[f64], on: FitScope) -> DMatrix<f64> {
         let n = which.len();
         let mut gram = DMatrix::zeros(n, n);
         for i in 0..n {
             for j in 0..=i {
-                let sum = self.weighted(which[i], which[j], weights, on)
-                    + self.known_beforehand(which[i], which[j]);
+                let sum = self.scoped_product(which[i], which[j], weights, on)
+                    + self.prior_term(which[i], which[j]);
                 gram[(i, j)] = sum;
                 gram[(j, i)] = sum;
             }
@@ -283,8 +283,8 @@ impl<'a> Pool<'a> {
     }
 
     /// What is known of two factors before any sample, as part of their inner product.
-    fn known_beforehand(&self, a: usize, b: usize) -> f64 {
-        let entry = self.prior.as_ref().and_then(|prior| prior.get((a, b)));
+    fn prior_term(&self, a: usize, b: usize) -> f64 {
+        let entry = self.prior_equations.as_ref().and_then(|prior| prior.get((a, b)));
         entry.copied().unwrap_or(0.0)
     }
 
@@ -302,21 +302,21 @@ impl<'a> Pool<'a> {
             for j in 0..=i {
                 let (a, b) = (which[i].max(which[j]), which[i].min(which[j]));
                 // Each fold has its share of it.
-                let before = self.known_beforehand(a, b) / self.folds.len() as f64;
+                let before = self.prior_term(a, b) / self.folds.len() as f64;
                 for gram in &mut grams {
                     gram[(i, j)] = before;
                     gram[(j, i)] = before;
                 }
-                if !self.meet(a, b) {
+                if !self.has_common_channel(a, b) {
                     continue;
                 }
-                let both = || self.columns[a].common(&self.columns[b]);
+                let both = || self.columns[a].common_channels(&self.columns[b]);
                 common.clear();
                 common.extend(both().map(|(d, ..)| weights[d]));
                 let known = products[a].entry(b).or_insert_with(|| {
                     let of_fold = |fold: &Range<usize>| {
                         let fold = fold.clone();
-                        both().map(move |(d, a, b)| self.inner(d, a, b, fold.clone()))
+                        both().map(move |(d, a, b)| self.inner_product(d, a, b, fold.clone()))
                     };
                     self.folds.iter().flat_map(of_fold).collect()
                 });
@@ -331,16 +331,16 @@ impl<'a> Pool<'a> {
     }
 
     /// What is left of the column `of` when others are taken off with some factors; zero where samples are left out.
-    pub(crate) fn rest(&self, of: usize, others: &[usize], factors: &[f64]) -> Vec<Vec<f64>> {
-        let mut rest = self.whole_rest(of, others, factors);
+    pub(crate) fn residual(&self, of: usize, others: &[usize], factors: &[f64]) -> Vec<Vec<f64>> {
+        let mut rest = self.full_residual(of, others, factors);
         for (d, rest) in rest.iter_mut().enumerate() {
-            self.silence(d, 0, rest);
+            self.zero_excluded(d, 0, rest);
         }
         rest
     }
 
     /// The same of all samples but those that were not measured.
-    pub(crate) fn whole_rest(&self, of: usize, others: &[usize], factors: &[f64]) -> Vec<Vec<f64>> {
+    pub(crate) fn full_residual(&self, of: usize, others: &[usize], factors: &[f64]) -> Vec<Vec<f64>> {
         let samples = self.check.end;
         let mut rest: Vec<Vec<f64>> = (self.columns[of].0.iter())
             .map(|values| values.clone().unwrap_or_else(|| vec![0.0; samples]))
@@ -355,19 +355,19 @@ impl<'a> Pool<'a> {
             }
         }
         for (rest, out) in rest.iter_mut().zip(&self.lost) {
-            silence(rest, out);
+            zero_where(rest, out);
         }
         rest
     }
 }
 
 /// Where something is said, in order.
-fn places(said: &[bool]) -> Vec<usize> {
+fn true_indices(said: &[bool]) -> Vec<usize> {
     let samples = said.iter().enumerate();
     samples.filter_map(|(i, said)| said.then_some(i)).collect()
 }
 
-fn silence(values: &mut [f64], out: &[bool]) {
+fn zero_where(values: &mut [f64], out: &[bool]) {
     for (value, _) in values.iter_mut().zip(out).filter(|(_, out)| **out) {
         *value = 0.0;
     }
@@ -375,7 +375,7 @@ fn silence(values: &mut [f64], out: &[bool]) {
 
 /// Samples that count.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum On {
+pub(crate) enum FitScope {
     /// Those of the fit.
     Fit,
     /// All.
@@ -387,9 +387,9 @@ pub(crate) enum On {
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     // Of a few numbers the choice would cost more than the sum.
     if a.len() < SHORT {
-        return sums(a, b);
+        return sum_products(a, b);
     }
-    Arch::new().dispatch(|| sums(a, b))
+    Arch::new().dispatch(|| sum_products(a, b))
 }
 
 #[allow(
@@ -397,7 +397,7 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     reason = "what is inlined has the vectors of its caller"
 )]
 #[inline(always)]
-fn sums(a: &[f64], b: &[f64]) -> f64 {
+fn sum_products(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0; LANES];
     let (chunks_a, chunks_b) = (a.chunks_exact(LANES), b.chunks_exact(LANES));
     let tail: f64 = chunks_a
@@ -416,7 +416,7 @@ fn sums(a: &[f64], b: &[f64]) -> f64 {
 
 /// A least squares fit from inner products: factors of the first columns, by which the last is explained best, and the
 /// sum of squares that is left. Columns that depend on those before them get the factor zero.
-pub(crate) fn solve(gram: &DMatrix<f64>) -> (DVector<f64>, f64) {
+pub(crate) fn solve_gram(gram: &DMatrix<f64>) -> (DVector<f64>, f64) {
     let n = gram.nrows() - 1;
     // Cholesky's decomposition with columns scaled to 1; rows of the factor are columns here, which lie in one piece.
     let scale: Vec<f64> = (0..=n).map(|i| gram[(i, i)].sqrt()).collect();
@@ -473,33 +473,33 @@ pub(crate) const DEPENDENT: f64 = 1e-9;
 
 #[cfg(test)]
 mod tests {
-    use super::super::problem::Stretch;
+    use super::super::problem::SampleSegment;
     use super::*;
 
     #[test]
     fn sets_of_columns_are_fitted_as_by_svd() {
-        let layout = Layout {
+        let layout = SampleLayout {
             channels: vec!["a".into(), "b".into()],
-            stretches: vec![Stretch {
+            segments: vec![SampleSegment {
                 name: String::new(),
                 samples: 50,
                 step: 0.1,
-                sampled: 0.1,
+                recorded_step: 0.1,
                 is_check: false,
             }],
             left_out: Vec::new(),
         };
         let wave = |k: f64| -> Vec<f64> { (0..50).map(|i| (k * f64::from(i)).sin()).collect() };
-        let mut pool = Pool::new(&layout);
-        let one = pool.add(Column(vec![Some(wave(0.1)), None]));
-        let two = pool.add(Column(vec![Some(wave(0.3)), Some(wave(0.5))]));
-        let copy = pool.add(Column(vec![Some(wave(0.1)), None]));
-        let mut measured = Column(vec![Some(wave(1.3)), Some(wave(0.9))]);
+        let mut pool = ColumnPool::new(&layout);
+        let one = pool.add(ForceColumn(vec![Some(wave(0.1)), None]));
+        let two = pool.add(ForceColumn(vec![Some(wave(0.3)), Some(wave(0.5))]));
+        let copy = pool.add(ForceColumn(vec![Some(wave(0.1)), None]));
+        let mut measured = ForceColumn(vec![Some(wave(1.3)), Some(wave(0.9))]);
         measured.add(2.0, pool.column(one));
         measured.add(-3.0, pool.column(two));
         let y = pool.add(measured.clone());
         let weights = [1.0, 4.0];
-        let (factors, squares) = solve(&pool.gram(&[one, two, copy, y], &weights, On::All));
+        let (factors, squares) = solve_gram(&pool.gram(&[one, two, copy, y], &weights, FitScope::All));
         let column = |k: usize| -> Vec<f64> {
             let part = |d: usize| pool.column(k).0[d].clone().unwrap_or_else(|| vec![0.0; 50]);
             let weighed = part(1).into_iter().map(|x| 2.0 * x);
@@ -514,7 +514,7 @@ mod tests {
         assert!(factors[2].abs() < f64::MIN_POSITIVE);
         let rest = (matrix * expected - right).norm_squared();
         assert!((squares - rest).abs() < 1e-9 * rest);
-        let residual = pool.rest(y, &[one, two], &[factors[0], factors[1]]);
+        let residual = pool.residual(y, &[one, two], &[factors[0], factors[1]]);
         let weighed = dot(&residual[0], &residual[0]) + 4.0 * dot(&residual[1], &residual[1]);
         assert!((weighed - rest).abs() < 1e-9 * rest);
     }
@@ -522,25 +522,25 @@ mod tests {
     #[test]
     fn forces_that_lack_have_no_say() {
         let wave = |k: f64| -> Vec<f64> { (0..50).map(|i| (k * f64::from(i)).sin()).collect() };
-        let mut layout = Layout {
+        let mut layout = SampleLayout {
             channels: vec!["a".into()],
-            stretches: vec![Stretch {
+            segments: vec![SampleSegment {
                 name: String::new(),
                 samples: 50,
                 step: 0.1,
-                sampled: 0.1,
+                recorded_step: 0.1,
                 is_check: false,
             }],
             left_out: Vec::new(),
         };
-        let found = |layout: &Layout| {
-            let mut pool = Pool::new(layout);
-            let one = pool.add(Column(vec![Some(wave(0.3))]));
+        let found = |layout: &SampleLayout| {
+            let mut pool = ColumnPool::new(layout);
+            let one = pool.add(ForceColumn(vec![Some(wave(0.3))]));
             let mut forces: Vec<f64> = wave(0.3).iter().map(|x| 2.0 * x).collect();
             forces[17] = 100.0;
-            let y = pool.add(Column(vec![Some(forces)]));
-            let (factors, squares) = solve(&pool.gram(&[one, y], &[1.0], On::All));
-            let rest = pool.rest(y, &[one], &[factors[0]]);
+            let y = pool.add(ForceColumn(vec![Some(forces)]));
+            let (factors, squares) = solve_gram(&pool.gram(&[one, y], &[1.0], FitScope::All));
+            let rest = pool.residual(y, &[one], &[factors[0]]);
             (factors[0], squares, rest[0][17])
         };
         assert!((found(&layout).0 - 2.0).abs() > 0.1);

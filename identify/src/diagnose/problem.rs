@@ -2,16 +2,16 @@
 
 use nalgebra::DMatrix;
 
-use super::body::Body;
-use super::column::Column;
-use super::constant::Constant;
+use super::body::AttachedBody;
+use super::column::ForceColumn;
+use super::constant::ConstantCorrection;
 use super::disturbance::Disturbance;
-use super::laws::Site;
-use super::tilt::Tilt;
+use super::laws::LawSite;
+use super::tilt::TiltCandidate;
 
 /// A stretch of samples that follow each other in time.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Stretch {
+pub struct SampleSegment {
     /// The recording it comes from.
     pub name: String,
     /// Number of samples.
@@ -19,18 +19,18 @@ pub struct Stretch {
     /// Mean time between them, s.
     pub step: f64,
     /// Time between samples as recorded, before any were left out, s.
-    pub sampled: f64,
+    pub recorded_step: f64,
     /// Whether it belongs to the check.
     pub is_check: bool,
 }
 
 /// Channels and stretches of time, those of the fit first.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Layout {
+pub struct SampleLayout {
     /// Names of the drives.
     pub channels: Vec<String>,
     /// Stretches in the order in which columns hold them.
-    pub stretches: Vec<Stretch>,
+    pub segments: Vec<SampleSegment>,
     /// Forces that were not measured, `[channel][sample]`: what stands in their place has no say. Empty if all were.
     pub left_out: Vec<Vec<bool>>,
 }
@@ -38,15 +38,15 @@ pub struct Layout {
 /// Blocks that even a short stretch is cut into.
 const FEWEST_BLOCKS: usize = 6;
 
-impl Layout {
+impl SampleLayout {
     /// Samples of each channel.
     pub fn samples(&self) -> usize {
-        self.stretches.iter().map(|s| s.samples).sum()
+        self.segments.iter().map(|s| s.samples).sum()
     }
 
     /// Samples of the fit, which come first.
     pub fn fit_samples(&self) -> usize {
-        let fit = self.stretches.iter().filter(|s| !s.is_check);
+        let fit = self.segments.iter().filter(|s| !s.is_check);
         fit.map(|s| s.samples).sum()
     }
 
@@ -59,7 +59,7 @@ impl Layout {
     pub fn blocks(&self, per_stretch: usize) -> Vec<std::ops::Range<usize>> {
         let mut blocks = Vec::new();
         let mut start = 0;
-        for stretch in &self.stretches {
+        for stretch in &self.segments {
             // Of a short stretch a few short ones: of one block nothing is learned.
             let count = per_stretch
                 .min((stretch.samples / 20).max(FEWEST_BLOCKS))
@@ -77,7 +77,7 @@ impl Layout {
 
 /// A kind of effect at its places, which share the parameters.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
-pub struct Effect {
+pub struct LocatedEffect {
     /// Name of the kind.
     pub kind: String,
     /// Where it acts.
@@ -86,7 +86,7 @@ pub struct Effect {
 
 /// The sign that an estimate must have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Sign {
+pub enum SignConstraint {
     /// Not below zero.
     Positive,
     /// Not above zero.
@@ -103,58 +103,58 @@ pub struct EffectParameter {
     /// SI unit.
     pub unit: String,
     /// The sign that makes physical sense.
-    pub sign: Sign,
+    pub sign: SignConstraint,
 }
 
 /// The columns of an effect for one choice of its constants.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Choice {
+pub struct ColumnChoice {
     /// Constants that are searched for, with their values.
     pub constants: Vec<(String, f64)>,
     /// A column for each parameter.
-    pub columns: Vec<Column>,
+    pub columns: Vec<ForceColumn>,
 }
 
 /// Where the columns of an effect come from.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Source {
+pub enum ColumnSource {
     /// They are known, for each choice of the constants.
-    Columns(Vec<Choice>),
+    Columns(Vec<ColumnChoice>),
     /// The base does not stand level; the parameters are angles, rad.
-    Tilt(Tilt),
+    Tilt(TiltCandidate),
     /// Forces are not read as they act.
-    Reading(Reading),
+    ReadingFault(ForceReadingFault),
     /// A further body on one that the model has.
-    Body(Body),
+    Body(AttachedBody),
     /// A number of the model is off; the parameter is by how much.
-    Constant(Constant),
+    Constant(ConstantCorrection),
     /// They depend on what the drives carry, which the fit says: see [`Supply::carried`].
-    Carried,
+    LoadDependent,
 }
 
 /// A way in which forces are read wrongly.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Fault {
+pub enum ReadingFaultKind {
     /// Later than they act; the parameter is the delay, s.
-    Late,
+    Delayed,
     /// Through a low-pass of first order; the parameter is its time constant, s.
-    Lagging,
+    LowPassed,
     /// Larger than they are; the parameter is the part by which they are.
     Scaled,
 }
 
 /// What reads forces wrongly, and where.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Reading {
+pub struct ForceReadingFault {
     /// How.
-    pub fault: Fault,
+    pub kind: ReadingFaultKind,
     /// The channel; `None` for all of them alike.
     pub channel: Option<usize>,
 }
 
 /// What it means for the model that a candidate is there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Nature {
+pub enum CandidateNature {
     /// The model lacks it.
     Effect,
     /// The recordings have it, and the model lacks nothing by that.
@@ -163,7 +163,7 @@ pub enum Nature {
 
 /// Which candidates that depend on what the drives carry are asked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Carried {
+pub enum LoadDependentQuery {
     /// All, with one value of each constant.
     All,
     /// One, with a value of its constant if it has one.
@@ -171,73 +171,73 @@ pub enum Carried {
 }
 
 /// Columns that are made while the search goes on.
-pub trait Supply {
+pub trait ColumnProvider {
     /// Columns of a candidate for another value of the constant that is searched for, if they can be had.
-    fn finer(&self, candidate: usize, constant: f64) -> Option<Vec<Column>>;
+    fn columns_for_constant(&self, candidate: usize, constant: f64) -> Option<Vec<ForceColumn>>;
 
     /// Columns of candidates that depend on what the drives carry.
-    fn carried(&self, load: &Column, which: Carried) -> Vec<(usize, Choice)>;
+    fn load_dependent_columns(&self, load: &ForceColumn, which: LoadDependentQuery) -> Vec<(usize, ColumnChoice)>;
 
     /// Places on which laws that no library holds may act; asked where something stays unexplained.
-    fn sites(&self) -> Vec<Site> {
+    fn sites(&self) -> Vec<LawSite> {
         Vec::new()
     }
 }
 
 /// For problems in which all columns are known from the start.
-pub struct NoSupply;
+pub struct NoColumnProvider;
 
-impl Supply for NoSupply {
-    fn finer(&self, _: usize, _: f64) -> Option<Vec<Column>> {
+impl ColumnProvider for NoColumnProvider {
+    fn columns_for_constant(&self, _: usize, _: f64) -> Option<Vec<ForceColumn>> {
         None
     }
 
-    fn carried(&self, _: &Column, _: Carried) -> Vec<(usize, Choice)> {
+    fn load_dependent_columns(&self, _: &ForceColumn, _: LoadDependentQuery) -> Vec<(usize, ColumnChoice)> {
         Vec::new()
     }
 }
 
 /// An effect that may be missing.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Candidate {
+pub struct CandidateEffect {
     /// What and where.
-    pub effect: Effect,
+    pub effect: LocatedEffect,
     /// Its parameters, one for each column.
     pub parameters: Vec<EffectParameter>,
     /// Constants that are searched for; they count as parameters.
-    pub searched: usize,
+    pub searched_constants: usize,
     /// Whether what it adds is part of what the drives carry: masses and weight, rather than friction.
     pub is_part_of_load: bool,
     /// A simpler kind that it holds as a special case and that comes before it.
     pub refines: Option<String>,
     /// Whether the model lacks it or the recordings have it.
-    pub nature: Nature,
+    pub nature: CandidateNature,
     /// Whether each recording has parameters of its own, so that one cannot speak for another.
     pub is_per_run: bool,
     /// Its columns.
-    pub source: Source,
+    pub source: ColumnSource,
 }
 
 /// Everything that a diagnosis needs to know.
 #[derive(Clone, Debug, Default)]
-pub struct Problem {
+pub struct DiagnosisProblem {
     /// Channels and stretches.
-    pub layout: Layout,
+    pub layout: SampleLayout,
     /// Measured forces, without those that are known.
-    pub measured: Column,
+    pub measured: ForceColumn,
     /// Forces of the parameters that are held, if any are; already taken off `measured`.
-    pub held: Option<Column>,
+    pub fixed_forces: Option<ForceColumn>,
     /// Columns of the parameters that are free.
-    pub base: Vec<Column>,
+    pub base: Vec<ForceColumn>,
     /// What is known of these parameters beforehand, beside that zero is expected: the inverse of their covariance. Without it
     /// they are free.
     pub prior: Option<DMatrix<f64>>,
     /// Which of them are part of what the drives carry.
     pub base_is_part_of_load: Vec<bool>,
     /// Friction of every drive by itself, beside which the load is estimated.
-    pub friction: Vec<Column>,
+    pub friction: Vec<ForceColumn>,
     /// What may be missing.
-    pub candidates: Vec<Candidate>,
+    pub candidates: Vec<CandidateEffect>,
     /// Variables on which forces may depend, by name: positions, rates, accelerations, loads; one number per sample.
     pub variables: Vec<(String, Vec<f64>)>,
     /// White noise of each channel's force; that of idle channels is found by a diagnosis.
@@ -256,16 +256,16 @@ pub struct Problem {
     pub effects_only: bool,
 }
 
-impl Problem {
+impl DiagnosisProblem {
     /// What was asked, without the columns: they take most of the memory, and nobody needs them once a diagnosis is made.
     #[must_use]
     pub fn without_columns(mut self) -> Self {
         for candidate in &mut self.candidates {
-            candidate.source = Source::Columns(Vec::new());
+            candidate.source = ColumnSource::Columns(Vec::new());
         }
         Self {
-            measured: Column::default(),
-            held: None,
+            measured: ForceColumn::default(),
+            fixed_forces: None,
             base: Vec::new(),
             friction: Vec::new(),
             variables: Vec::new(),
@@ -281,17 +281,17 @@ mod tests {
     /// Of a single block no spread over blocks can be had.
     #[test]
     fn a_short_stretch_has_several_blocks() {
-        let stretch = |samples| Stretch {
+        let stretch = |samples| SampleSegment {
             name: String::new(),
             samples,
             step: 0.01,
-            sampled: 0.01,
+            recorded_step: 0.01,
             is_check: false,
         };
         for (samples, blocks) in [(30, 6), (90, 6), (200, 10), (5000, 12), (3, 3)] {
-            let layout = Layout {
+            let layout = SampleLayout {
                 channels: Vec::new(),
-                stretches: vec![stretch(samples)],
+                segments: vec![stretch(samples)],
                 left_out: Vec::new(),
             };
             let cut = layout.blocks(12);

@@ -1,12 +1,12 @@
 //! Forces that are not read as they act: late, through a low-pass, or on another scale. Their columns follow from the forces
 //! that a fit says.
 
-use super::aliases::APART;
-use super::bench::{Bench, Pick, Trial};
-use super::column::Column;
-use super::pool::On;
+use super::aliases::MIN_DISTINCTION;
+use super::bench::{EffectSelector, SelectedEffect, ScoredEffectSet};
+use super::column::ForceColumn;
+use super::pool::FitScope;
 use super::problem::{
-    Candidate, Effect, EffectParameter, Fault, Nature, Problem, Reading, Sign, Source,
+    CandidateEffect, LocatedEffect, EffectParameter, ReadingFaultKind, CandidateNature, DiagnosisProblem, ForceReadingFault, SignConstraint, ColumnSource,
 };
 
 /// Below this part of a sample a derivative says what a delay does.
@@ -14,39 +14,39 @@ const SLIGHT: f64 = 0.1;
 /// Samples of a recording to one that is kept, from which on the filter between them is felt.
 const ROUNDS_OFF: f64 = 1.5;
 
-impl Fault {
+impl ReadingFaultKind {
     /// The kind of effect, the symbol of its parameter, and the unit and sign of that.
-    fn words(self) -> (&'static str, &'static str, &'static str, Sign) {
+    fn effect_description(self) -> (&'static str, &'static str, &'static str, SignConstraint) {
         match self {
             // What is read before it acts is the motion, late.
-            Self::Late => ("time_delay", "T", "s", Sign::Positive),
-            Self::Lagging => ("force_lag", "tau", "s", Sign::Positive),
-            Self::Scaled => ("drive_gain", "gain", "1", Sign::Any),
+            Self::Delayed => ("time_delay", "T", "s", SignConstraint::Positive),
+            Self::LowPassed => ("force_lag", "tau", "s", SignConstraint::Positive),
+            Self::Scaled => ("drive_gain", "gain", "1", SignConstraint::Any),
         }
     }
 }
 
 /// What may be wrong with the reading of each force by itself, and of all by a low-pass alike. A delay of all forces is an
 /// effect of the library, and another scale of all would be other parameters.
-pub fn readings(problem: &Problem) -> Vec<Candidate> {
+pub fn reading_fault_candidates(problem: &DiagnosisProblem) -> Vec<CandidateEffect> {
     let layout = &problem.layout;
     let read: Vec<usize> = (0..layout.channels.len())
         .filter(|d| !problem.is_idle(*d))
         .collect();
     let has_others = read.len() > 1;
     let each = read.into_iter().flat_map(|d| {
-        let late = has_others.then_some((Fault::Late, Some(d)));
-        let lagging = has_others.then_some((Fault::Lagging, Some(d)));
-        [late, lagging, Some((Fault::Scaled, Some(d)))]
+        let late = has_others.then_some((ReadingFaultKind::Delayed, Some(d)));
+        let lagging = has_others.then_some((ReadingFaultKind::LowPassed, Some(d)));
+        [late, lagging, Some((ReadingFaultKind::Scaled, Some(d)))]
     });
-    let all = [Some((Fault::Lagging, None))];
+    let all = [Some((ReadingFaultKind::LowPassed, None))];
     let readings = all.into_iter().chain(each).flatten();
     readings
         .map(|(fault, channel)| {
-            let (kind, symbol, unit, sign) = fault.words();
+            let (kind, symbol, unit, sign) = fault.effect_description();
             let place = channel.map_or("force", |d: usize| layout.channels[d].as_str());
-            Candidate {
-                effect: Effect {
+            CandidateEffect {
+                effect: LocatedEffect {
                     kind: kind.to_owned(),
                     at: vec![place.to_owned()],
                 },
@@ -55,106 +55,106 @@ pub fn readings(problem: &Problem) -> Vec<Candidate> {
                     unit: unit.to_owned(),
                     sign,
                 }],
-                searched: 0,
+                searched_constants: 0,
                 is_part_of_load: false,
                 refines: None,
-                nature: Nature::Effect,
+                nature: CandidateNature::Effect,
                 is_per_run: false,
-                source: Source::Reading(Reading { fault, channel }),
+                source: ColumnSource::ReadingFault(ForceReadingFault { kind: fault, channel }),
             }
         })
         .collect()
 }
 
-impl Bench<'_> {
+impl EffectSelector<'_> {
     /// What forces change by when they are read wrongly, for each unit of the parameter, between none and its value.
-    pub(crate) fn misread(&self, reading: Reading, force: &Column, value: f64) -> Column {
+    pub(crate) fn reading_fault_column(&self, reading: ForceReadingFault, force: &ForceColumn, value: f64) -> ForceColumn {
         let channels = force.0.iter().enumerate();
         let of = |(d, values): (usize, &Option<Vec<f64>>)| {
             let values = values.as_ref()?;
             if reading.channel.is_some_and(|channel| channel != d) {
                 return None;
             }
-            if reading.fault == Fault::Scaled {
+            if reading.kind == ReadingFaultKind::Scaled {
                 return Some(values.clone());
             }
             let mut changes = Vec::with_capacity(values.len());
             let mut start = 0;
-            for stretch in &self.problem.layout.stretches {
+            for stretch in &self.problem.layout.segments {
                 let part = &values[start..start + stretch.samples];
                 let samples = value / stretch.step;
                 if samples.abs() < SLIGHT {
-                    changes.extend(slopes(part).map(|slope| -slope / stretch.step));
-                } else if reading.fault == Fault::Late {
+                    changes.extend(central_differences(part).map(|slope| -slope / stretch.step));
+                } else if reading.kind == ReadingFaultKind::Delayed {
                     // The parallel filter rounds the jumps of dry friction off.
-                    let has_jumps = stretch.step < ROUNDS_OFF * stretch.sampled;
+                    let has_jumps = stretch.step < ROUNDS_OFF * stretch.recorded_step;
                     let rates = has_jumps.then(|| self.problem.friction.get(3 * d));
                     let rates = rates.flatten().and_then(|column| column.0[d].as_deref());
                     let rates = rates.map(|rates| &rates[start..start + stretch.samples]);
-                    let late = (0..part.len()).map(|i| between(part, rates, i as f64 - samples));
+                    let late = (0..part.len()).map(|i| interpolate_force(part, rates, i as f64 - samples));
                     changes.extend(late.zip(part).map(|(then, now)| (then - now) / value));
                 } else {
-                    let filtered = lagging(part, samples.abs()).into_iter().zip(part);
+                    let filtered = low_pass(part, samples.abs()).into_iter().zip(part);
                     changes.extend(filtered.map(|(late, now)| (late - now) / value.abs()));
                 }
                 start += stretch.samples;
             }
             Some(changes)
         };
-        Column(channels.map(of).collect())
+        ForceColumn(channels.map(of).collect())
     }
 
     /// A set whose columns that depend on the fit have been made anew by it. A delay and a low-pass are the same where both are
     /// slight: the low-pass is taken where it leaves clearly less.
-    pub(crate) fn settled(&mut self, trial: &Trial) -> Trial {
-        let curved = |bench: &Self, pick: &Pick| match bench.candidate(pick).source {
-            Source::Reading(reading) if reading.fault != Fault::Scaled => Some(reading),
+    pub(crate) fn refit_dependent_columns(&mut self, trial: &ScoredEffectSet) -> ScoredEffectSet {
+        let curved = |bench: &Self, pick: &SelectedEffect| match bench.candidate(pick).source {
+            ColumnSource::ReadingFault(reading) if reading.kind != ReadingFaultKind::Scaled => Some(reading),
             _ => None,
         };
-        let is_curved = |(i, pick): (usize, &Pick)| Some((i, curved(self, pick)?));
+        let is_curved = |(i, pick): (usize, &SelectedEffect)| Some((i, curved(self, pick)?));
         let Some((at, reading)) = trial.picks.iter().enumerate().find_map(is_curved) else {
-            let is_body = |pick: &Pick| matches!(self.candidate(pick).source, Source::Body(_));
+            let is_body = |pick: &SelectedEffect| matches!(self.candidate(pick).source, ColumnSource::Body(_));
             if trial.picks.iter().any(is_body) {
-                let refreshed = self.refresh(trial.picks.clone());
-                return Trial {
+                let refreshed = self.refresh_columns(trial.picks.clone());
+                return ScoredEffectSet {
                     score: trial.score,
-                    ..self.trial(refreshed)
+                    ..self.fit_set(refreshed)
                 };
             }
             return trial.clone();
         };
-        let is_other = |pick: &&Pick| {
+        let is_other = |pick: &&SelectedEffect| {
             let other = curved(self, pick);
-            other.is_some_and(|o| o.channel == reading.channel && o.fault != reading.fault)
+            other.is_some_and(|o| o.channel == reading.channel && o.kind != reading.kind)
                 && trial.picks.iter().all(|p| p.candidate != pick.candidate)
         };
         let mut sets = vec![trial.picks.clone()];
-        if let Some(other) = self.present.iter().flatten().find(is_other) {
+        if let Some(other) = self.current_choices.iter().flatten().find(is_other) {
             let mut set = trial.picks.clone();
             set[at] = other.clone();
             sets.push(set);
         }
-        let mut tried: Vec<Trial> = Vec::new();
+        let mut tried: Vec<ScoredEffectSet> = Vec::new();
         for set in sets {
-            let refreshed = self.refresh(set);
-            tried.push(self.trial(refreshed));
+            let refreshed = self.refresh_columns(set);
+            tried.push(self.fit_set(refreshed));
         }
         tried.sort_by_key(|trial| {
             let fault = trial.picks.get(at).and_then(|pick| curved(self, pick));
-            fault.is_some_and(|reading| reading.fault == Fault::Lagging)
+            fault.is_some_and(|reading| reading.kind == ReadingFaultKind::LowPassed)
         });
         let mut best = tried.remove(0);
         if let Some(other) = tried.pop() {
-            let (factors, _) = self.fit(&other.picks, On::All);
-            let rest = self.rest(&other.picks, &factors);
+            let (factors, _) = self.fit(&other.picks, FitScope::All);
+            let rest = self.residual(&other.picks, &factors);
             let channels: Vec<usize> = (0..rest.len()).collect();
-            let better = self.worth(&rest, &channels) * (best.squares / other.squares).ln();
+            let better = self.effective_equations(&rest, &channels) * (best.squares / other.squares).ln();
             let has_signs = other.is_possible();
-            if !best.is_possible() || has_signs && better > APART {
+            if !best.is_possible() || has_signs && better > MIN_DISTINCTION {
                 best = other;
             }
         }
-        Trial {
+        ScoredEffectSet {
             score: trial.score,
             ..best
         }
@@ -162,7 +162,7 @@ impl Bench<'_> {
 }
 
 /// Changes from sample to sample, by central differences.
-fn slopes(values: &[f64]) -> impl Iterator<Item = f64> {
+fn central_differences(values: &[f64]) -> impl Iterator<Item = f64> {
     let last = values.len() - 1;
     (0..values.len()).map(move |i| {
         let (before, after) = (i.saturating_sub(1), (i + 1).min(last));
@@ -172,7 +172,7 @@ fn slopes(values: &[f64]) -> impl Iterator<Item = f64> {
 
 /// A series through a low-pass of first order whose time constant is so many samples, exact for one that is straight between
 /// its samples.
-fn lagging(values: &[f64], constant: f64) -> Vec<f64> {
+fn low_pass(values: &[f64], constant: f64) -> Vec<f64> {
     let keeps = (-constant.recip()).exp();
     let mut state = values[0];
     let mut before = values[0];
@@ -187,7 +187,7 @@ fn lagging(values: &[f64], constant: f64) -> Vec<f64> {
 }
 
 /// The cubic through four samples, between the second and the third of them (J. L. Lagrange).
-fn cubic(values: &[f64], share: f64) -> f64 {
+fn interpolate_cubic(values: &[f64], share: f64) -> f64 {
     let [before, first, second, behind] = [values[0], values[1], values[2], values[3]];
     let (x, y) = (share, 1.0 - share);
     let inner = y * first + x * second;
@@ -197,7 +197,7 @@ fn cubic(values: &[f64], share: f64) -> f64 {
 
 /// A force at a place between its samples. Where the drive turns round between two of them friction jumps: up to there the force
 /// goes on as before, and from there on as after.
-fn between(values: &[f64], rates: Option<&[f64]>, at: f64) -> f64 {
+fn interpolate_force(values: &[f64], rates: Option<&[f64]>, at: f64) -> f64 {
     let last = values.len() - 1;
     let at = at.clamp(0.0, last as f64);
     #[allow(
@@ -213,7 +213,7 @@ fn between(values: &[f64], rates: Option<&[f64]>, at: f64) -> f64 {
         near.into_iter().all(|i| !turns_within(rates, i))
     });
     if is_smooth && k > 0 && k + 2 <= last {
-        return cubic(&values[k - 1..k + 3], share);
+        return interpolate_cubic(&values[k - 1..k + 3], share);
     }
     let turns = rates.filter(|rates| k < last && turns_within(rates, k));
     match turns.map(|rates| rates[k] / (rates[k] - rates[k + 1])) {
@@ -226,7 +226,7 @@ fn between(values: &[f64], rates: Option<&[f64]>, at: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnose::problem::{Layout, NoSupply, Stretch};
+    use crate::diagnose::problem::{SampleLayout, NoColumnProvider, SampleSegment};
 
     /// Where one in nine samples is kept nothing jumps any more, so that a force is smooth where its drive turns round, too.
     #[test]
@@ -234,16 +234,16 @@ mod tests {
         let (step, delay) = (0.036, 0.0041);
         let force = |t: f64| 300.0 * (6.0 * t + 0.4).sin();
         let times: Vec<f64> = (0..300).map(|i| step * f64::from(i)).collect();
-        let forces = Column(vec![Some(times.iter().map(|t| force(*t)).collect())]);
-        let rates = Column(vec![Some(times.iter().map(|t| (5.0 * t).sin()).collect())]);
-        let problem = Problem {
-            layout: Layout {
+        let forces = ForceColumn(vec![Some(times.iter().map(|t| force(*t)).collect())]);
+        let rates = ForceColumn(vec![Some(times.iter().map(|t| (5.0 * t).sin()).collect())]);
+        let problem = DiagnosisProblem {
+            layout: SampleLayout {
                 channels: vec!["a".into()],
-                stretches: vec![Stretch {
+                segments: vec![SampleSegment {
                     name: "run".into(),
                     samples: times.len(),
                     step,
-                    sampled: 0.004,
+                    recorded_step: 0.004,
                     is_check: false,
                 }],
                 left_out: Vec::new(),
@@ -252,14 +252,14 @@ mod tests {
             friction: vec![rates.clone(), rates.clone(), rates],
             noise: vec![1.0],
             removed: vec![0.0],
-            ..Problem::default()
+            ..DiagnosisProblem::default()
         };
-        let bench = Bench::new(&problem, &NoSupply);
-        let late = Reading {
-            fault: Fault::Late,
+        let bench = EffectSelector::new(&problem, &NoColumnProvider);
+        let late = ForceReadingFault {
+            kind: ReadingFaultKind::Delayed,
             channel: None,
         };
-        let changes = bench.misread(late, &forces, delay);
+        let changes = bench.reading_fault_column(late, &forces, delay);
         let changes = changes.0[0].as_ref().unwrap();
         for (i, t) in times.iter().enumerate().skip(2).take(times.len() - 4) {
             let expected = (force(t - delay) - force(*t)) / delay;
@@ -280,7 +280,7 @@ mod tests {
             .map(|of| (0..40).map(|i| of(f64::from(i))).collect());
         for i in 1..390 {
             let t = 0.1 * f64::from(i) + 0.05;
-            let said = between(&values, Some(&rates), t);
+            let said = interpolate_force(&values, Some(&rates), t);
             assert!((said - force(t)).abs() < 1e-9, "{t}: {said}");
         }
     }
@@ -291,7 +291,7 @@ mod tests {
         let values: Vec<f64> = (0..40).map(|i| f64::from(i).sin()).collect();
         for i in 10..380 {
             let t = 0.1 * f64::from(i);
-            let said = between(&values, None, t);
+            let said = interpolate_force(&values, None, t);
             assert!((said - t.sin()).abs() < 0.025, "{t}: {said}");
         }
     }
@@ -301,7 +301,7 @@ mod tests {
     fn a_low_pass_answers_ramps_and_steps_as_its_equation_says() {
         let constant = 2.5;
         let ramp: Vec<f64> = (0..60).map(f64::from).collect();
-        let late = lagging(&ramp, constant);
+        let late = low_pass(&ramp, constant);
         for (i, x) in late.iter().enumerate() {
             let t = i as f64;
             let expected = t - constant + constant * (-t / constant).exp();

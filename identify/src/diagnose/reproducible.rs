@@ -8,7 +8,7 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::problem::Layout;
+use super::problem::SampleLayout;
 
 /// Folds over all recordings.
 const FOLDS: usize = 8;
@@ -20,7 +20,7 @@ const MOST_OF_MANY: usize = 1500;
 const RIDGES: [f64; 5] = [1e-6, 1e-4, 1e-2, 1e-1, 1.0];
 
 /// Quantiles of a position beyond which stops may begin, percent from either end.
-const BEYOND: [usize; 4] = [3, 8, 15, 30];
+const HINGE_QUANTILES: [usize; 4] = [3, 8, 15, 30];
 /// Lengths over which friction may remember, in units of a position's spread.
 const MEMORIES: [f64; 3] = [0.02, 0.08, 0.3];
 
@@ -28,20 +28,20 @@ const MEMORIES: [f64; 3] = [0.02, 0.08, 0.3];
 const STOPS: [f64; 4] = [0.05, 0.15, 0.4, 1.0];
 
 /// How much of each channel's squared residual comes again where it was not fitted, between 0 and 1.
-pub(crate) fn reproducible(
-    layout: &Layout,
+pub(crate) fn repeatable_shares(
+    layout: &SampleLayout,
     variables: &[(String, Vec<f64>)],
     rest: &[Vec<f64>],
 ) -> Vec<f64> {
     let n = layout.samples();
-    let count = features_of(variables.len());
+    let count = feature_count(variables.len());
     let most = if count > MOST_FEATURES {
         MOST_OF_MANY
     } else {
         MOST
     };
     let picked: Vec<usize> = (0..n).step_by(n.div_ceil(most).max(1)).collect();
-    let features = features(variables, &picked);
+    let features = state_features(variables, &picked);
     if features.is_empty() {
         return vec![0.0; rest.len()];
     }
@@ -57,9 +57,9 @@ pub(crate) fn reproducible(
     let columns: Vec<DVector<f64>> = features.into_iter().map(DVector::from).collect();
     let features = DMatrix::from_columns(&columns);
     let held_out = if features.ncols() <= features.nrows() {
-        by_features(&features, &targets, &folds)
+        errors_by_features(&features, &targets, &folds)
     } else {
-        by_samples(features, &targets, &folds)
+        errors_by_samples(features, &targets, &folds)
     };
     let totals = targets.column_iter().map(|target| target.norm_squared());
     let share = |(d, total): (usize, f64)| {
@@ -71,10 +71,10 @@ pub(crate) fn reproducible(
 }
 
 /// Squared errors on folds that were not fitted, of each target, for each strength of the ridge.
-type HeldOut = Vec<Vec<f64>>;
+type FoldErrors = Vec<Vec<f64>>;
 
 /// Errors by normal equations of the features. Inner products fold by fold; their sum less one fold is what the others say.
-fn by_features(features: &DMatrix<f64>, targets: &DMatrix<f64>, folds: &[Range<usize>]) -> HeldOut {
+fn errors_by_features(features: &DMatrix<f64>, targets: &DMatrix<f64>, folds: &[Range<usize>]) -> FoldErrors {
     let m = features.ncols();
     let rows = |of: &DMatrix<f64>, fold: &Range<usize>| of.rows_range(fold.clone()).into_owned();
     let parts: Vec<[DMatrix<f64>; 2]> = (folds.iter())
@@ -112,11 +112,11 @@ fn by_features(features: &DMatrix<f64>, targets: &DMatrix<f64>, folds: &[Range<u
 
 /// The same where there are more features than samples: by inner products of the samples, which say the same of ridges
 /// (C. Saunders, A. Gammerman and V. Vovk, ICML 1998).
-fn by_samples(
+fn errors_by_samples(
     mut features: DMatrix<f64>,
     targets: &DMatrix<f64>,
     folds: &[Range<usize>],
-) -> HeldOut {
+) -> FoldErrors {
     for mut column in features.column_iter_mut() {
         let norm = column.norm();
         if norm > 0.0 {
@@ -150,12 +150,12 @@ fn add_errors(left: &mut [f64], said: DMatrix<f64>, target: &DMatrix<f64>) {
 }
 
 /// How many products of two so many variables have.
-fn features_of(variables: usize) -> usize {
+fn feature_count(variables: usize) -> usize {
     variables * (variables + 1) / 2
 }
 
 /// Functions of the variables at some samples, each of unit size.
-fn features(variables: &[(String, Vec<f64>)], picked: &[usize]) -> Vec<Vec<f64>> {
+fn state_features(variables: &[(String, Vec<f64>)], picked: &[usize]) -> Vec<Vec<f64>> {
     let mut scaled: Vec<Vec<f64>> = Vec::new();
     let (mut signs, mut shapes): (Vec<Vec<f64>>, Vec<Vec<f64>>) = Default::default();
     for (name, values) in variables {
@@ -180,9 +180,9 @@ fn features(variables: &[(String, Vec<f64>)], picked: &[usize]) -> Vec<Vec<f64>>
         // Of positions also what only begins beyond a place, as stops do, and friction that remembers where it reversed.
         if !name.ends_with("_d") && !name.ends_with("_dd") {
             shapes.extend(hinges(&values, spread));
-            let memories = MEMORIES.iter().map(|share| memory(&values, share * spread));
+            let memories = MEMORIES.iter().map(|share| dahl_state(&values, share * spread));
             shapes.extend(memories);
-            let stops = STOPS.iter().map(|share| stop(&values, share * spread));
+            let stops = STOPS.iter().map(|share| stop_operator(&values, share * spread));
             shapes.extend(stops);
         }
         scaled.push(values.iter().map(|x| (x - mean) / (2.0 * spread)).collect());
@@ -222,7 +222,7 @@ fn hinges(values: &[f64], spread: f64) -> Vec<Vec<f64>> {
             .map(|x| (sign * (x - place)).max(0.0) / spread);
         over.collect()
     };
-    let places = BEYOND.iter().flat_map(|share| {
+    let places = HINGE_QUANTILES.iter().flat_map(|share| {
         let at = last * share / 100;
         [beyond(at, -1.0), beyond(last - at, 1.0)]
     });
@@ -231,7 +231,7 @@ fn hinges(values: &[f64], spread: f64) -> Vec<Vec<f64>> {
 
 /// Dahl's state of dry friction along a position: it reaches its bound over a length after each reversal
 /// (P. R. Dahl, AIAA Journal 14, 1976).
-fn memory(values: &[f64], length: f64) -> Vec<f64> {
+fn dahl_state(values: &[f64], length: f64) -> Vec<f64> {
     let mut state = 0.0_f64;
     let mut before = values[0];
     let step = |x: &f64| {
@@ -247,7 +247,7 @@ fn memory(values: &[f64], length: f64) -> Vec<f64> {
 
 /// The stretch of a spring that drags a block along a position, relative to the largest: the operator of which hysteresis that
 /// does not depend on the rate is made (L. Prandtl 1928, A. Ishlinskii 1944).
-fn stop(values: &[f64], width: f64) -> Vec<f64> {
+fn stop_operator(values: &[f64], width: f64) -> Vec<f64> {
     let mut block = values[0];
     let step = |x: &f64| {
         block = block.clamp(x - width, x + width);
@@ -258,20 +258,20 @@ fn stop(values: &[f64], width: f64) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::problem::Stretch;
+    use super::super::problem::SampleSegment;
     use super::*;
-    use crate::test_noise::Noise;
+    use crate::test_noise::TestNoise;
 
     #[test]
     fn laws_come_again_and_noise_does_not() {
         let n = 3000;
-        let layout = Layout {
+        let layout = SampleLayout {
             channels: vec!["a".into(), "b".into()],
-            stretches: vec![Stretch {
+            segments: vec![SampleSegment {
                 name: String::new(),
                 samples: n,
                 step: 0.004,
-                sampled: 0.004,
+                recorded_step: 0.004,
                 is_check: false,
             }],
             left_out: Vec::new(),
@@ -279,13 +279,13 @@ mod tests {
         let time = |i: usize| 0.004 * i as f64;
         let q: Vec<f64> = (0..n).map(|i| (1.7 * time(i)).sin()).collect();
         let p: Vec<f64> = (0..n).map(|i| (2.9 * time(i)).cos()).collect();
-        let mut noise = Noise::new(11);
+        let mut noise = TestNoise::new(11);
         let law: Vec<f64> = (0..n)
             .map(|i| q[i] * p[i] * p[i] + 0.3 * noise.normal())
             .collect();
         let white: Vec<f64> = (0..n).map(|_| noise.normal()).collect();
         let size = law.iter().map(|x| x * x).sum::<f64>() / n as f64;
-        let found = reproducible(
+        let found = repeatable_shares(
             &layout,
             &[("q".into(), q), ("p_d".into(), p)],
             &[law, white],
@@ -298,7 +298,7 @@ mod tests {
     /// Few features and many samples, or the other way round: the errors are the same.
     #[test]
     fn errors_by_features_and_by_samples_agree() {
-        let mut noise = Noise::new(3);
+        let mut noise = TestNoise::new(3);
         let features = DMatrix::from_fn(60, 25, |_, _| noise.normal());
         let targets = DMatrix::from_fn(60, 2, |i, d| features[(i, d)] + noise.normal());
         let folds = [0..20, 20..45, 45..60];
@@ -307,8 +307,8 @@ mod tests {
             column.normalize_mut();
         }
         let [by_features, by_samples] = [
-            by_features(&scaled, &targets, &folds),
-            by_samples(features, &targets, &folds),
+            errors_by_features(&scaled, &targets, &folds),
+            errors_by_samples(features, &targets, &folds),
         ];
         assert_eq!((by_features.len(), by_samples.len()), (5, 5));
         // A ridge counts the squares of what is fitted in the one, of all samples in the other.

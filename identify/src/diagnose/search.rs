@@ -3,10 +3,10 @@
 
 use std::collections::HashSet;
 
-use super::bench::{Bench, Pick, Table, Trial};
-use super::evidence::Evidence;
-use super::pool::On;
-use super::problem::{Problem, Source};
+use super::bench::{EffectSelector, SelectedEffect, ProjectedGram, ScoredEffectSet};
+use super::evidence::SelectionEvidence;
+use super::pool::FitScope;
+use super::problem::{DiagnosisProblem, ColumnSource};
 
 /// Sets that are followed at once.
 const BEAM: usize = 6;
@@ -19,9 +19,9 @@ const CLOSE_ON_A_GRID: f64 = 20.0;
 /// A rival is tried with finer constants if so many times what it explains with those of a grid would be enough.
 const FINER_EXPLAINS: f64 = 2.0;
 /// A simpler kind that brings this share of what one that holds it brings comes first.
-const NEARLY_ALL_OF: f64 = 0.97;
+const SIMPLER_KIND_SHARE: f64 = 0.97;
 /// Another simple kind that brings this share of what a refinement of a member brings comes first.
-const MOST_OF: f64 = 0.7;
+const OTHER_KIND_SHARE: f64 = 0.7;
 /// By how much (in the logarithm of the likelihood, twice) another set must be better than one that only grows.
 const MUCH_BETTER: f64 = 20.0;
 /// Which share of the squared error on its channels it must take off beside that.
@@ -35,54 +35,54 @@ const MOST: usize = 40;
 
 /// A step of the ladder: the set of effects after it, with what spoke for the change.
 #[derive(Clone, Debug)]
-pub(crate) struct Step {
-    pub(crate) picks: Vec<Pick>,
+pub(crate) struct EffectSetChange {
+    pub(crate) picks: Vec<SelectedEffect>,
     /// `None` where the last set is made smaller, for which the lack of evidence speaks.
-    pub(crate) evidence: Option<Evidence>,
+    pub(crate) evidence: Option<SelectionEvidence>,
 }
 
 /// A set that evidence speaks for.
-struct Next {
+struct SupportedEffectSet {
     /// The candidates that were tried; once their columns are settled they may be others.
-    tried: Vec<usize>,
-    trial: Trial,
-    evidence: Evidence,
+    candidates: Vec<usize>,
+    trial: ScoredEffectSet,
+    evidence: SelectionEvidence,
 }
 
 /// Why the best candidates of a step were refused.
 #[derive(Clone, Debug)]
-pub(crate) struct Refused {
-    pub(crate) pick: Pick,
-    pub(crate) evidence: Evidence,
+pub(crate) struct RejectedCandidate {
+    pub(crate) pick: SelectedEffect,
+    pub(crate) evidence: SelectionEvidence,
     pub(crate) wrong_sign: bool,
     pub(crate) cancels: bool,
 }
 
 /// What the search found.
-pub(crate) struct Found {
+pub(crate) struct EffectSearchResult {
     /// Sets, one change after the other; the last is the answer.
-    pub(crate) steps: Vec<Step>,
+    pub(crate) steps: Vec<EffectSetChange>,
     /// What was best of the rest, and why it was refused.
-    pub(crate) refused: Vec<Refused>,
+    pub(crate) rejected: Vec<RejectedCandidate>,
 }
 
-impl Bench<'_> {
+impl EffectSelector<'_> {
     /// Searches forward until nothing more is supported.
-    pub(crate) fn search(&mut self) -> Found {
-        let mut accepted: Vec<Pick> = Vec::new();
+    pub(crate) fn search_sets(&mut self) -> EffectSearchResult {
+        let mut accepted: Vec<SelectedEffect> = Vec::new();
         let mut steps = Vec::new();
-        let mut beam: Vec<Vec<Pick>> = vec![Vec::new()];
+        let mut beam: Vec<Vec<SelectedEffect>> = vec![Vec::new()];
         let mut refused;
         loop {
-            let of_steps = steps.iter().flat_map(|step: &Step| &step.picks);
+            let of_steps = steps.iter().flat_map(|step: &EffectSetChange| &step.picks);
             let kept = of_steps.chain(beam.iter().flatten());
-            self.present.fill(None);
-            self.forget_since(self.known, kept);
-            self.weigh(&accepted);
-            self.look(&accepted);
-            let mut trials = self.grow(&accepted, &beam);
+            self.current_choices.fill(None);
+            self.drop_columns_since(self.permanent_columns, kept);
+            self.weigh_channels(&accepted);
+            self.update_choices(&accepted);
+            let mut trials = self.grow_sets(&accepted, &beam);
             refused = Vec::new();
-            let Some(step) = self.step(&accepted, &mut trials, &mut refused) else {
+            let Some(step) = self.next_step(&accepted, &mut trials, &mut refused) else {
                 break;
             };
             beam = trials
@@ -113,134 +113,134 @@ impl Bench<'_> {
         } else {
             pruned
         };
-        let pruned = self.trial(pruned).picks;
+        let pruned = self.fit_set(pruned).picks;
         if pruned != accepted {
-            steps.push(Step {
+            steps.push(EffectSetChange {
                 picks: pruned,
                 evidence: None,
             });
         }
-        Found { steps, refused }
+        EffectSearchResult { steps, rejected: refused }
     }
 
     /// The next step from what is accepted, with all constants and columns that depend on the fit made anew. What does not keep
     /// then what it promised leaves the trials.
-    fn step(
+    fn next_step(
         &mut self,
-        accepted: &[Pick],
-        trials: &mut Vec<Trial>,
-        refused: &mut Vec<Refused>,
-    ) -> Option<Step> {
+        accepted: &[SelectedEffect],
+        trials: &mut Vec<ScoredEffectSet>,
+        refused: &mut Vec<RejectedCandidate>,
+    ) -> Option<EffectSetChange> {
         loop {
-            let next = self.next(accepted, trials, refused)?;
+            let next = self.next_supported_set(accepted, trials, refused)?;
             let (trial, evidence) = self
-                .simple_first(accepted, &next.trial)
+                .simplest_single_effect(accepted, &next.trial)
                 .unwrap_or((next.trial, next.evidence));
-            let (picks, _) = self.simplest(accepted, trial, evidence, trials);
-            let refined = self.refine(picks);
-            let polished = self.polish(refined);
-            let refreshed = self.refresh(polished);
-            let settled = self.trial(refreshed);
-            let evidence = self.between(accepted, &settled.picks);
-            let channels = self.changed_on(accepted, &settled.picks);
+            let (picks, _) = self.simplest_set(accepted, trial, evidence, trials);
+            let refined = self.refine_constants(picks);
+            let polished = self.exchange_finely(refined);
+            let refreshed = self.refresh_columns(polished);
+            let settled = self.fit_set(refreshed);
+            let evidence = self.evidence_between(accepted, &settled.picks);
+            let channels = self.differing_channels(accepted, &settled.picks);
             if settled.is_possible()
-                && evidence.holds()
-                && !self.costs_more(accepted, &settled.picks, &channels)
+                && evidence.is_sufficient()
+                && !self.is_worse_overall(accepted, &settled.picks, &channels)
             {
-                return Some(Step {
+                return Some(EffectSetChange {
                     picks: settled.picks,
                     evidence: Some(evidence),
                 });
             }
-            trials.retain(|trial| members(&trial.picks) != next.tried);
+            trials.retain(|trial| candidate_indices(&trial.picks) != next.candidates);
         }
     }
 
     /// The first of the trials that evidence speaks for.
-    fn next(
+    fn next_supported_set(
         &mut self,
-        accepted: &[Pick],
-        trials: &[Trial],
-        refused: &mut Vec<Refused>,
-    ) -> Option<Next> {
-        let (grown, exchanged): (Vec<&Trial>, Vec<&Trial>) =
+        accepted: &[SelectedEffect],
+        trials: &[ScoredEffectSet],
+        refused: &mut Vec<RejectedCandidate>,
+    ) -> Option<SupportedEffectSet> {
+        let (grown, exchanged): (Vec<&ScoredEffectSet>, Vec<&ScoredEffectSet>) =
             trials.iter().partition(|t| self.is_addition(accepted, t));
         let mut additions = grown.into_iter();
         refused.clear();
-        let chosen = self.first_that_holds(accepted, &mut additions, refused);
+        let chosen = self.first_supported_set(accepted, &mut additions, refused);
         // Another set altogether must be much better than one that only grows.
         let bound = chosen
             .as_ref()
             .map_or(f64::INFINITY, |next| next.trial.score - MUCH_BETTER);
         let mut others = exchanged.into_iter().filter(|t| t.score < bound);
-        let other = self.first_that_holds(accepted, &mut others, &mut Vec::new());
+        let other = self.first_supported_set(accepted, &mut others, &mut Vec::new());
         let other = other.filter(|other| {
             chosen.as_ref().is_none_or(|grown| {
-                let evidence = self.between(&grown.trial.picks, &other.trial.picks);
-                evidence.holds() && evidence.gain > LARGE_CHANGE
+                let evidence = self.evidence_between(&grown.trial.picks, &other.trial.picks);
+                evidence.is_sufficient() && evidence.gain > LARGE_CHANGE
             })
         });
         other.or(chosen)
     }
 
     /// Evidence for one set beside another, on the channels on which they differ.
-    fn between(&self, before: &[Pick], after: &[Pick]) -> Evidence {
-        self.evidence(before, after, &self.changed_on(before, after))
+    fn evidence_between(&self, before: &[SelectedEffect], after: &[SelectedEffect]) -> SelectionEvidence {
+        self.evidence(before, after, &self.differing_channels(before, after))
     }
 
     /// Channels on which two sets differ.
-    fn changed_on(&self, before: &[Pick], after: &[Pick]) -> Vec<usize> {
-        let mut differ = difference(after, before);
-        differ.extend(difference(before, after));
-        self.acted_on(&differ)
+    fn differing_channels(&self, before: &[SelectedEffect], after: &[SelectedEffect]) -> Vec<usize> {
+        let mut differ = set_difference(after, before);
+        differ.extend(set_difference(before, after));
+        self.affected_channels(&differ)
     }
 
     /// Whether evidence speaks for one set beside another that is to take its place. What was found step by step need not prove
     /// itself again as a whole: a large loss that its parameters are worth is enough.
-    pub(crate) fn is_worse(&mut self, settled: &[Pick], before: &[Pick]) -> bool {
-        self.weigh(before);
+    pub(crate) fn is_worse(&mut self, settled: &[SelectedEffect], before: &[SelectedEffect]) -> bool {
+        self.weigh_channels(before);
         let channels: Vec<usize> = (0..self.weights.len()).collect();
-        self.evidence(settled, before, &channels).would_be_missed()
+        self.evidence(settled, before, &channels).is_worth_keeping()
     }
 
     /// Whether a set is another one and a further effect, which may take the place of what it holds.
-    fn is_addition(&self, accepted: &[Pick], trial: &Trial) -> bool {
-        let is_new = |pick: &&Pick| accepted.iter().all(|p| p.candidate != pick.candidate);
+    fn is_addition(&self, accepted: &[SelectedEffect], trial: &ScoredEffectSet) -> bool {
+        let is_new = |pick: &&SelectedEffect| accepted.iter().all(|p| p.candidate != pick.candidate);
         let mut news = trial.picks.iter().filter(is_new);
         let (Some(new), None) = (news.next(), news.next()) else {
             return false;
         };
-        let replaced = Self::replaced(accepted, &trial.picks);
-        replaced.iter().all(|p| self.is_within(p, new))
+        let replaced = Self::replaced_effects(accepted, &trial.picks);
+        replaced.iter().all(|p| self.is_in_span(p, new))
     }
 
     /// The first of some sets that evidence speaks for; why single effects were refused goes into a list.
-    fn first_that_holds(
+    fn first_supported_set(
         &mut self,
-        accepted: &[Pick],
-        trials: &mut dyn Iterator<Item = &Trial>,
-        refused: &mut Vec<Refused>,
-    ) -> Option<Next> {
+        accepted: &[SelectedEffect],
+        trials: &mut dyn Iterator<Item = &ScoredEffectSet>,
+        refused: &mut Vec<RejectedCandidate>,
+    ) -> Option<SupportedEffectSet> {
         let mut tested = 0;
         for trial in trials {
             if tested == TESTED {
                 break;
             }
-            let tried = members(&trial.picks);
-            let trial = self.settled(trial);
+            let tried = candidate_indices(&trial.picks);
+            let trial = self.refit_dependent_columns(trial);
             // What turns out impossible once its columns have its own size was no test.
             tested += usize::from(trial.is_possible());
-            let news: Vec<Pick> = difference(&trial.picks, accepted);
-            let evidence = self.evidence(accepted, &trial.picks, &self.acted_on(&news));
-            if evidence.holds() && trial.is_possible() {
-                return Some(Next {
-                    tried,
+            let news: Vec<SelectedEffect> = set_difference(&trial.picks, accepted);
+            let evidence = self.evidence(accepted, &trial.picks, &self.affected_channels(&news));
+            if evidence.is_sufficient() && trial.is_possible() {
+                return Some(SupportedEffectSet {
+                    candidates: tried,
                     trial,
                     evidence,
                 });
             }
             if let [pick] = news.as_slice() {
-                refused.push(Refused {
+                refused.push(RejectedCandidate {
                     pick: pick.clone(),
                     evidence,
                     wrong_sign: !trial.wrong_sign.is_empty(),
@@ -252,17 +252,17 @@ impl Bench<'_> {
     }
 
     /// All sets that one more effect makes of those in the beam, the best of them improved by exchanges; best first.
-    fn grow(&mut self, accepted: &[Pick], beam: &[Vec<Pick>]) -> Vec<Trial> {
-        let all: Vec<Pick> = beam.iter().flatten().cloned().collect();
-        let table = self.table(&all);
-        let (factors, _) = self.fit(accepted, On::All);
-        let rest = self.rest(accepted, &factors);
+    fn grow_sets(&mut self, accepted: &[SelectedEffect], beam: &[Vec<SelectedEffect>]) -> Vec<ScoredEffectSet> {
+        let all: Vec<SelectedEffect> = beam.iter().flatten().cloned().collect();
+        let table = self.projected_gram(&all);
+        let (factors, _) = self.fit(accepted, FitScope::All);
+        let rest = self.residual(accepted, &factors);
         let channels: Vec<usize> = (0..rest.len()).collect();
-        let worth = self.worth(&rest, &channels);
-        let mut trials: Vec<Trial> = Vec::new();
+        let worth = self.effective_equations(&rest, &channels);
+        let mut trials: Vec<ScoredEffectSet> = Vec::new();
         let mut known: HashSet<Vec<usize>> = HashSet::new();
         for set in beam {
-            for pick in self.present.iter().flatten() {
+            for pick in self.current_choices.iter().flatten() {
                 if set.iter().any(|p| p.candidate == pick.candidate) {
                     continue;
                 }
@@ -270,59 +270,59 @@ impl Bench<'_> {
                 // What holds more than a member takes its place.
                 let mut pick = pick.clone();
                 if pick.columns.len() > 1 {
-                    let (within, rest): (Vec<Pick>, Vec<Pick>) =
-                        picks.into_iter().partition(|p| self.is_within(p, &pick));
+                    let (within, rest): (Vec<SelectedEffect>, Vec<SelectedEffect>) =
+                        picks.into_iter().partition(|p| self.is_in_span(p, &pick));
                     // Its rank beside the accepted set does not count what it replaces.
                     let more: usize = within.iter().map(|p| p.rank).sum();
                     pick.rank = (pick.rank + more).min(pick.columns.len());
                     picks = rest;
                 }
                 picks.push(pick);
-                if known.insert(members(&picks)) {
-                    trials.push(self.try_in(&table, picks));
+                if known.insert(candidate_indices(&picks)) {
+                    trials.push(self.fit_from_gram(&table, picks));
                 }
             }
         }
-        let pairs = self.pairs(accepted, &table, worth);
+        let pairs = self.best_pairs(accepted, &table, worth);
         trials.extend(
             (pairs.into_iter())
-                .filter(|pair| beam.iter().all(|set| !same(set, &pair.picks)))
-                .collect::<Vec<Trial>>(),
+                .filter(|pair| beam.iter().all(|set| !is_same_set(set, &pair.picks)))
+                .collect::<Vec<ScoredEffectSet>>(),
         );
         // The best set says what is noise: beside what it explains, neighbours resemble each other less.
         let best = trials.iter().filter(|trial| trial.is_possible());
         let worth = best
             .min_by(|a, b| a.squares.total_cmp(&b.squares))
             .map_or(worth, |best| {
-                let (factors, _) = self.fit(&best.picks, On::All);
-                worth.max(self.worth(&self.rest(&best.picks, &factors), &channels))
+                let (factors, _) = self.fit(&best.picks, FitScope::All);
+                worth.max(self.effective_equations(&self.residual(&best.picks, &factors), &channels))
             });
         let problem = self.problem;
-        let score = |trial: &Trial| criterion(problem, trial, worth);
+        let score = |trial: &ScoredEffectSet| criterion(problem, trial, worth);
         trials.sort_by(|a, b| score(a).total_cmp(&score(b)));
-        trials.dedup_by(|a, b| same(&a.picks, &b.picks));
+        trials.dedup_by(|a, b| is_same_set(&a.picks, &b.picks));
         trials.truncate(40);
         // Constants that suited other sets may suit these less.
         for k in 0..trials.len().min(BEAM) {
-            let tuned = self.retune(trials[k].picks.clone());
+            let tuned = self.choose_constants(trials[k].picks.clone());
             if tuned != trials[k].picks {
-                trials[k] = self.trial(tuned);
+                trials[k] = self.fit_set(tuned);
             }
         }
         trials.sort_by(|a, b| score(a).total_cmp(&score(b)));
-        let all: Vec<Pick> = trials.iter().flat_map(|t| t.picks.clone()).collect();
-        let table = self.table(&all);
+        let all: Vec<SelectedEffect> = trials.iter().flat_map(|t| t.picks.clone()).collect();
+        let table = self.projected_gram(&all);
         // Every member of the best sets against every other candidate.
         for k in 0..trials.len().min(BEAM) {
             let mut best = trials[k].clone();
             loop {
-                let mut better: Option<Trial> = None;
+                let mut better: Option<ScoredEffectSet> = None;
                 let mut bound = score(&best) - 1e-9;
                 for i in 0..best.picks.len() {
                     let mut others = best.picks.clone();
                     others.remove(i);
-                    let beyond = self.beyond(&table, &others);
-                    for pick in self.present.iter().flatten() {
+                    let beyond = self.extension_bound(&table, &others);
+                    for pick in self.current_choices.iter().flatten() {
                         if best.picks.iter().any(|p| p.candidate == pick.candidate)
                             || self.least_criterion(&beyond, &[pick], worth) > bound
                         {
@@ -330,11 +330,11 @@ impl Bench<'_> {
                         }
                         let mut picks = best.picks.clone();
                         let mut pick = pick.clone();
-                        if pick.columns.len() > 1 && self.is_within(&picks[i], &pick) {
+                        if pick.columns.len() > 1 && self.is_in_span(&picks[i], &pick) {
                             pick.rank = (pick.rank + picks[i].rank).min(pick.columns.len());
                         }
                         picks[i] = pick;
-                        let trial = self.try_in(&table, picks);
+                        let trial = self.fit_from_gram(&table, picks);
                         let own = score(&trial);
                         if own < bound {
                             bound = own;
@@ -347,7 +347,7 @@ impl Bench<'_> {
                     None => break,
                 }
             }
-            if trials.iter().all(|known| !same(&known.picks, &best.picks)) {
+            if trials.iter().all(|known| !is_same_set(&known.picks, &best.picks)) {
                 trials.push(best);
             }
         }
@@ -361,27 +361,27 @@ impl Bench<'_> {
 
     /// The best of all pairs of further effects beside the accepted ones, and in place of any of these: a pair may explain all
     /// where neither does much alone, and where what is shared by two places comes first.
-    fn pairs(&self, accepted: &[Pick], table: &Table, worth: f64) -> Vec<Trial> {
-        let is_new = |pick: &&Pick| accepted.iter().all(|p| p.candidate != pick.candidate);
-        let alone = |pick: &Pick| {
+    fn best_pairs(&self, accepted: &[SelectedEffect], table: &ProjectedGram, worth: f64) -> Vec<ScoredEffectSet> {
+        let is_new = |pick: &&SelectedEffect| accepted.iter().all(|p| p.candidate != pick.candidate);
+        let alone = |pick: &SelectedEffect| {
             let mut set = accepted.to_vec();
             set.push(pick.clone());
-            self.try_in(table, set).squares
+            self.fit_from_gram(table, set).squares
         };
-        let simple = self.present.iter().flatten().filter(is_new);
+        let simple = self.current_choices.iter().flatten().filter(is_new);
         let simple = simple.filter(|pick| self.freedoms(pick) <= 2);
-        let mut further: Vec<(f64, &Pick)> = simple.map(|pick| (alone(pick), pick)).collect();
+        let mut further: Vec<(f64, &SelectedEffect)> = simple.map(|pick| (alone(pick), pick)).collect();
         further.sort_by(|a, b| a.0.total_cmp(&b.0));
         further.truncate(PAIRED);
-        let mut kept: Vec<Vec<Pick>> = vec![accepted.to_vec()];
+        let mut kept: Vec<Vec<SelectedEffect>> = vec![accepted.to_vec()];
         kept.extend((0..accepted.len()).map(|i| {
             let mut fewer = accepted.to_vec();
             fewer.remove(i);
             fewer
         }));
-        let mut best: Vec<(f64, Trial)> = Vec::new();
+        let mut best: Vec<(f64, ScoredEffectSet)> = Vec::new();
         for set in kept {
-            let beyond = self.beyond(table, &set);
+            let beyond = self.extension_bound(table, &set);
             for (i, (_, one)) in further.iter().enumerate() {
                 for (_, two) in &further[i + 1..] {
                     if best.len() == BEST_PAIRS {
@@ -392,7 +392,7 @@ impl Bench<'_> {
                     }
                     let mut picks = set.clone();
                     picks.extend([(*one).clone(), (*two).clone()]);
-                    let trial = self.try_in(table, picks);
+                    let trial = self.fit_from_gram(table, picks);
                     let own = criterion(self.problem, &trial, worth);
                     if best.len() < BEST_PAIRS || best.last().is_some_and(|(last, _)| own < *last) {
                         let at = best.partition_point(|(other, _)| *other < own);
@@ -407,22 +407,22 @@ impl Bench<'_> {
 
     /// Tries members of a set against candidates that come close, each with constants that are searched finely: on their
     /// grids the wrong one may have been nearer to its best value.
-    fn polish(&mut self, mut picks: Vec<Pick>) -> Vec<Pick> {
-        let is_searched = |bench: &Self, pick: &Pick| bench.candidate(pick).searched > 0;
-        let mut table = self.table(&picks);
+    fn exchange_finely(&mut self, mut picks: Vec<SelectedEffect>) -> Vec<SelectedEffect> {
+        let is_searched = |bench: &Self, pick: &SelectedEffect| bench.candidate(pick).searched_constants > 0;
+        let mut table = self.projected_gram(&picks);
         for i in 0..picks.len() {
             let mut others = picks.clone();
             let own = others.remove(i);
-            let now = self.try_in(&table, picks.clone());
+            let now = self.fit_from_gram(&table, picks.clone());
             // The constants of others may suit this member and no kin of it.
             let others_are_searched = others.iter().any(|other| is_searched(self, other));
-            let is_kin = |bench: &Self, rival: &Pick| {
+            let is_kin = |bench: &Self, rival: &SelectedEffect| {
                 let [one, two] = [rival, &own].map(|pick| &bench.candidate(pick).effect);
                 others_are_searched
                     && (one.kind == two.kind || one.at.iter().any(|place| two.at.contains(place)))
             };
-            let rivals: Vec<Pick> = self
-                .present
+            let rivals: Vec<SelectedEffect> = self
+                .current_choices
                 .iter()
                 .flatten()
                 .filter(|rival| {
@@ -433,21 +433,21 @@ impl Bench<'_> {
                 .filter(|rival| self.freedoms(rival) <= self.freedoms(&own))
                 .cloned()
                 .collect();
-            let without = self.trial(others.clone()).squares;
+            let without = self.fit_set(others.clone()).squares;
             let mut best = now;
             for rival in rivals {
                 let mut set = others.clone();
                 set.insert(i, rival);
                 // On another set's constants a rival is judged by its own.
                 let tuned = if is_searched(self, &set[i]) || is_kin(self, &set[i]) {
-                    self.retune(set)
-                } else if self.try_in(&table, set.clone()).squares > CLOSE * best.squares {
+                    self.choose_constants(set)
+                } else if self.fit_from_gram(&table, set.clone()).squares > CLOSE * best.squares {
                     continue;
                 } else {
                     set
                 };
-                let kind = |pick: &Pick| self.candidate(pick).effect.kind.clone();
-                let squares = self.trial(tuned.clone()).squares;
+                let kind = |pick: &SelectedEffect| self.candidate(pick).effect.kind.clone();
+                let squares = self.fit_set(tuned.clone()).squares;
                 let is_close = if kind(&tuned[i]) == kind(&own) {
                     squares <= CLOSE_ON_A_GRID * best.squares
                 } else {
@@ -457,22 +457,22 @@ impl Bench<'_> {
                 if !is_close {
                     continue;
                 }
-                let tuned = self.refine_around(tuned, i);
-                let trial = self.trial(tuned);
+                let tuned = self.refine_around_member(tuned, i);
+                let trial = self.fit_set(tuned);
                 if trial.is_possible() && trial.squares < best.squares {
                     best = trial;
                 }
             }
             if best.picks != picks {
                 picks = best.picks;
-                table = self.table(&picks);
+                table = self.projected_gram(&picks);
             }
         }
         picks
     }
 
     /// Where several simple effects with no more freedoms than a large one explain more, the first of them.
-    fn simple_first(&self, accepted: &[Pick], best: &Trial) -> Option<(Trial, Evidence)> {
+    fn simplest_single_effect(&self, accepted: &[SelectedEffect], best: &ScoredEffectSet) -> Option<(ScoredEffectSet, SelectionEvidence)> {
         let before: usize = accepted.iter().map(|p| self.freedoms(p)).sum();
         let budget = best.freedoms.checked_sub(before)?;
         if budget < 2 {
@@ -480,16 +480,16 @@ impl Bench<'_> {
         }
         let mut all = accepted.to_vec();
         all.extend(best.picks.iter().cloned());
-        let table = self.table(&all);
-        let simple: Vec<&Pick> = self
-            .present
+        let table = self.projected_gram(&all);
+        let simple: Vec<&SelectedEffect> = self
+            .current_choices
             .iter()
             .flatten()
             .filter(|p| {
                 self.freedoms(p) == 1
                     && !matches!(
                         self.candidate(p).source,
-                        Source::Reading(_) | Source::Constant(_)
+                        ColumnSource::ReadingFault(_) | ColumnSource::Constant(_)
                     )
             })
             .collect();
@@ -502,17 +502,17 @@ impl Bench<'_> {
                 .map(|pick| {
                     let mut picks = set.clone();
                     picks.push((*pick).clone());
-                    self.try_in(&table, picks)
+                    self.fit_from_gram(&table, picks)
                 })
-                .filter(Trial::is_possible);
+                .filter(ScoredEffectSet::is_possible);
             let next = trials.min_by(|a, b| a.squares.total_cmp(&b.squares))?;
             set.clone_from(&next.picks);
             first.get_or_insert_with(|| next.clone());
             if next.squares < best.squares {
                 let first = first?;
-                let news = difference(&first.picks, accepted);
-                let evidence = self.evidence(accepted, &first.picks, &self.acted_on(&news));
-                return evidence.holds().then_some((first, evidence));
+                let news = set_difference(&first.picks, accepted);
+                let evidence = self.evidence(accepted, &first.picks, &self.affected_channels(&news));
+                return evidence.is_sufficient().then_some((first, evidence));
             }
         }
         None
@@ -520,21 +520,21 @@ impl Bench<'_> {
 
     /// Of the sets that are as good as the best as far as the blocks can tell, the one with the fewest freedoms; of several
     /// the first, for kinds come in the order of the library.
-    fn simplest(
+    fn simplest_set(
         &self,
-        accepted: &[Pick],
-        best: Trial,
-        evidence: Evidence,
-        trials: &[Trial],
-    ) -> (Vec<Pick>, Evidence) {
+        accepted: &[SelectedEffect],
+        best: ScoredEffectSet,
+        evidence: SelectionEvidence,
+        trials: &[ScoredEffectSet],
+    ) -> (Vec<SelectedEffect>, SelectionEvidence) {
         let mut chosen = (best, evidence);
         // A kind that holds a simpler one, such as friction that differs by direction, comes after it.
         // So does what refines a member, after other simple kinds.
-        let refines = !Self::replaced(accepted, &chosen.0.picks).is_empty();
-        let beside = self.beside(accepted);
+        let refines = !Self::replaced_effects(accepted, &chosen.0.picks).is_empty();
+        let beside = self.conditioning_set(accepted);
         let nested = trials.iter().filter(|trial| {
-            let news = difference(&trial.picks, accepted);
-            let bests = difference(&chosen.0.picks, accepted);
+            let news = set_difference(&trial.picks, accepted);
+            let bests = set_difference(&chosen.0.picks, accepted);
             let [simple] = news.as_slice() else {
                 return false;
             };
@@ -542,25 +542,25 @@ impl Bench<'_> {
                 return false;
             };
             trial.is_possible()
-                && Self::replaced(accepted, &trial.picks).is_empty()
+                && Self::replaced_effects(accepted, &trial.picks).is_empty()
                 && simple.rank < own.rank
-                && self.candidate(simple).searched <= self.candidate(own).searched
-                && (refines || self.is_within_beside(simple, own, &beside))
+                && self.candidate(simple).searched_constants <= self.candidate(own).searched_constants
+                && (refines || self.is_in_conditional_span(simple, own, &beside))
         });
-        let mut simpler: Vec<(Trial, Evidence)> = Vec::new();
+        let mut simpler: Vec<(ScoredEffectSet, SelectionEvidence)> = Vec::new();
         for trial in nested {
-            let news = difference(&trial.picks, accepted);
-            let own = self.evidence(accepted, &trial.picks, &self.acted_on(&news));
+            let news = set_difference(&trial.picks, accepted);
+            let own = self.evidence(accepted, &trial.picks, &self.affected_channels(&news));
             let kind = &self.candidate(&news[0]).effect.kind;
-            let is_refined = difference(&chosen.0.picks, accepted)
+            let is_refined = set_difference(&chosen.0.picks, accepted)
                 .iter()
                 .any(|best| self.candidate(best).refines.as_ref() == Some(kind));
             let most_of = if refines || is_refined {
-                MOST_OF
+                OTHER_KIND_SHARE
             } else {
-                NEARLY_ALL_OF
+                SIMPLER_KIND_SHARE
             };
-            if own.holds() && own.gain > most_of * chosen.1.gain {
+            if own.is_sufficient() && own.gain > most_of * chosen.1.gain {
                 simpler.push((trial.clone(), own));
             }
         }
@@ -572,14 +572,14 @@ impl Bench<'_> {
             if trial.freedoms >= chosen.0.freedoms || !trial.is_possible() {
                 continue;
             }
-            let news = difference(&trial.picks, accepted);
-            let channels = self.acted_on(&news);
+            let news = set_difference(&trial.picks, accepted);
+            let channels = self.affected_channels(&news);
             let ratio = trial.squares / chosen.0.squares.max(f64::MIN_POSITIVE);
             if chosen.1.effective_samples * ratio.ln() > 2.0 {
                 continue;
             }
             let own = self.evidence(accepted, &trial.picks, &channels);
-            if own.holds() {
+            if own.is_sufficient() {
                 chosen = (trial.clone(), own);
             }
         }
@@ -587,14 +587,14 @@ impl Bench<'_> {
     }
 
     /// Members of a set that are no longer in another.
-    fn replaced(accepted: &[Pick], picks: &[Pick]) -> Vec<Pick> {
-        let gone = |pick: &&Pick| picks.iter().all(|p| p.candidate != pick.candidate);
+    fn replaced_effects(accepted: &[SelectedEffect], picks: &[SelectedEffect]) -> Vec<SelectedEffect> {
+        let gone = |pick: &&SelectedEffect| picks.iter().all(|p| p.candidate != pick.candidate);
         accepted.iter().filter(gone).cloned().collect()
     }
 }
 
 /// The information criterion of a set, with as many samples as the residual is worth; sets with impossible signs come last.
-pub(crate) fn criterion(problem: &Problem, trial: &Trial, worth: f64) -> f64 {
+pub(crate) fn criterion(problem: &DiagnosisProblem, trial: &ScoredEffectSet, worth: f64) -> f64 {
     let wrong = if trial.is_possible() { 0.0 } else { 1e12 };
     worth * trial.squares.max(f64::MIN_POSITIVE).ln()
         + trial.freedoms as f64 * worth.ln().max(1.0)
@@ -607,9 +607,9 @@ const PLACE: f64 = 0.01;
 
 /// A little against sets in which one kind acts twice at a place, which say what others say more plainly; and against many
 /// places.
-fn overlap(problem: &Problem, picks: &[Pick]) -> f64 {
-    let effect = |pick: &Pick| &problem.candidates[pick.candidate].effect;
-    let twice = |(i, one): (usize, &Pick)| {
+fn overlap(problem: &DiagnosisProblem, picks: &[SelectedEffect]) -> f64 {
+    let effect = |pick: &SelectedEffect| &problem.candidates[pick.candidate].effect;
+    let twice = |(i, one): (usize, &SelectedEffect)| {
         let others = picks[i + 1..].iter().filter(|other| {
             effect(one).kind == effect(other).kind
                 && effect(one)
@@ -624,20 +624,20 @@ fn overlap(problem: &Problem, picks: &[Pick]) -> f64 {
 }
 
 /// Picks of a set whose candidate is not in another.
-pub(crate) fn difference(set: &[Pick], other: &[Pick]) -> Vec<Pick> {
-    let is_new = |pick: &&Pick| other.iter().all(|p| p.candidate != pick.candidate);
-    let new: Vec<Pick> = set.iter().filter(is_new).cloned().collect();
+pub(crate) fn set_difference(set: &[SelectedEffect], other: &[SelectedEffect]) -> Vec<SelectedEffect> {
+    let is_new = |pick: &&SelectedEffect| other.iter().all(|p| p.candidate != pick.candidate);
+    let new: Vec<SelectedEffect> = set.iter().filter(is_new).cloned().collect();
     if new.is_empty() { set.to_vec() } else { new }
 }
 
 /// The candidates of a set, in order.
-fn members(picks: &[Pick]) -> Vec<usize> {
+fn candidate_indices(picks: &[SelectedEffect]) -> Vec<usize> {
     let mut members: Vec<usize> = picks.iter().map(|pick| pick.candidate).collect();
     members.sort_unstable();
     members
 }
 
 /// Whether two sets hold the same candidates.
-fn same(a: &[Pick], b: &[Pick]) -> bool {
+fn is_same_set(a: &[SelectedEffect], b: &[SelectedEffect]) -> bool {
     a.len() == b.len() && (a.iter()).all(|p| b.iter().any(|q| q.candidate == p.candidate))
 }

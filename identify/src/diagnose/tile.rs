@@ -10,9 +10,9 @@ use super::pool::{LANES, dot};
 pub(crate) const SIDE: usize = 4;
 
 /// Inner products `[row][column]` of columns of equal length. The sums are those of [`dot`], to the bit.
-pub(crate) fn products(rows: [&[f64]; SIDE], columns: [&[f64]; SIDE]) -> [[f64; SIDE]; SIDE] {
+pub(crate) fn tile_products(rows: [&[f64]; SIDE], columns: [&[f64]; SIDE]) -> [[f64; SIDE]; SIDE] {
     let whole = rows[0].len() / LANES * LANES;
-    let sums = Arch::new().dispatch(Tile {
+    let sums = Arch::new().dispatch(ProductTile {
         rows: rows.map(|row| &row[..whole]),
         columns: columns.map(|column| &column[..whole]),
     });
@@ -26,12 +26,12 @@ pub(crate) fn products(rows: [&[f64]; SIDE], columns: [&[f64]; SIDE]) -> [[f64; 
 }
 
 /// Sums of each row with each column, lane by lane.
-struct Tile<'a> {
+struct ProductTile<'a> {
     rows: [&'a [f64]; SIDE],
     columns: [&'a [f64]; SIDE],
 }
 
-impl WithSimd for Tile<'_> {
+impl WithSimd for ProductTile<'_> {
     type Output = [[[f64; LANES]; SIDE]; SIDE];
 
     #[allow(
@@ -86,7 +86,7 @@ mod tests {
             let all: Vec<Vec<f64>> = (0..2 * SIDE).map(values).collect();
             let rows: [&[f64]; SIDE] = array::from_fn(|r| all[r].as_slice());
             let columns: [&[f64]; SIDE] = array::from_fn(|c| all[SIDE + c].as_slice());
-            let tile = products(rows, columns);
+            let tile = tile_products(rows, columns);
             for r in 0..SIDE {
                 for c in 0..SIDE {
                     let single = dot(rows[r], columns[c]);

@@ -1,31 +1,31 @@
 //! A base that does not stand level: gravity in its frame is turned, and forces are linear in gravity.
 
-use super::column::Column;
+use super::column::ForceColumn;
 
 /// Angles below this are taken for none, rad.
 const STRAIGHT: f64 = 1e-9;
 
 /// A tilt of the base as a candidate; its parameters are angles, rad.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Tilt {
+pub struct TiltCandidate {
     /// Gravity in the frame of a level base, m/s^2.
     pub gravity: [f64; 3],
     /// The axis of each parameter: 0, 1, 2 for x, y, z.
     pub axes: Vec<usize>,
     /// What forces change by with gravity along x, y and z, for each m/s^2.
-    pub components: [Sensitivity; 3],
+    pub components: [ForceSensitivity; 3],
 }
 
 /// What the forces change by with a number of the model.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Sensitivity {
+pub struct ForceSensitivity {
     /// What every column of the base changes by, in their order.
-    pub base: Vec<Column>,
+    pub base: Vec<ForceColumn>,
     /// What the forces of held parameters change by.
-    pub held: Column,
+    pub fixed: ForceColumn,
 }
 
-impl Tilt {
+impl TiltCandidate {
     /// Change of gravity for each radian of each parameter, between a level base and one at these angles: differences that
     /// add up to the whole change, so that it is exact at the angles, or derivatives where these are zero.
     #[must_use]
@@ -38,9 +38,9 @@ impl Tilt {
                 continue;
             };
             if angles[k].abs() < STRAIGHT {
-                directions[k] = slope(now, axis);
+                directions[k] = rotation_derivative(now, axis);
             } else {
-                let turned = turned(now, axis, angles[k]);
+                let turned = rotate_vector(now, axis, angles[k]);
                 directions[k] = std::array::from_fn(|c| (turned[c] - now[c]) / angles[k]);
                 now = turned;
             }
@@ -50,7 +50,7 @@ impl Tilt {
 }
 
 /// A fixed vector seen from a frame that has turned about an axis.
-fn turned(vector: [f64; 3], axis: usize, angle: f64) -> [f64; 3] {
+fn rotate_vector(vector: [f64; 3], axis: usize, angle: f64) -> [f64; 3] {
     let (sin, cos) = angle.sin_cos();
     let (i, j) = ((axis + 1) % 3, (axis + 2) % 3);
     let mut turned = vector;
@@ -60,7 +60,7 @@ fn turned(vector: [f64; 3], axis: usize, angle: f64) -> [f64; 3] {
 }
 
 /// Its derivative where the frame has not turned.
-fn slope(vector: [f64; 3], axis: usize) -> [f64; 3] {
+fn rotation_derivative(vector: [f64; 3], axis: usize) -> [f64; 3] {
     let (i, j) = ((axis + 1) % 3, (axis + 2) % 3);
     let mut slope = [0.0; 3];
     slope[i] = vector[j];
@@ -78,10 +78,10 @@ mod tests {
     #[test]
     fn directions_add_up_to_gravity_that_turned() {
         let gravity = [1.0, -9.0, 3.0];
-        let tilt = |axes: Vec<usize>| Tilt {
+        let tilt = |axes: Vec<usize>| TiltCandidate {
             gravity,
             axes,
-            components: std::array::from_fn(|_| Sensitivity::default()),
+            components: std::array::from_fn(|_| ForceSensitivity::default()),
         };
         let [x, y, z] = [0.3, -0.2, 0.7];
         let base = Rotation3::from_euler_angles(x, y, z);

@@ -1,32 +1,32 @@
 //! Constants of effects that no linear fit finds: the best of a grid beside the rest of a set, and between its values.
 
-use super::bench::{Bench, Pick};
-use super::column::Column;
-use super::problem::{Carried, Source};
+use super::bench::{EffectSelector, SelectedEffect};
+use super::column::ForceColumn;
+use super::problem::{LoadDependentQuery, ColumnSource};
 
 /// Where values of a constant are costly one is looked at, and others up to this factor away.
-const AROUND: f64 = 4.0;
+const COARSE_SEARCH_FACTOR: f64 = 4.0;
 
-impl Bench<'_> {
+impl EffectSelector<'_> {
     /// Chooses the constants of each effect of a set anew, beside those of the others.
-    pub(crate) fn retune(&mut self, mut picks: Vec<Pick>) -> Vec<Pick> {
+    pub(crate) fn choose_constants(&mut self, mut picks: Vec<SelectedEffect>) -> Vec<SelectedEffect> {
         let problem = self.problem;
         for _ in 0..2 {
             let before = picks.clone();
             for i in 0..picks.len() {
                 let candidate = picks[i].candidate;
                 match &problem.candidates[candidate].source {
-                    Source::Columns(choices) if choices.len() > 1 => {}
+                    ColumnSource::Columns(choices) if choices.len() > 1 => {}
                     _ => continue,
                 }
                 let mut others = picks.clone();
                 let old = others.remove(i);
-                let beside = self.beside(&others);
+                let beside = self.conditioning_set(&others);
                 let Some((best, explained)) = self.best_choice(candidate, &beside) else {
                     continue;
                 };
-                if explained > self.explained(&old.columns, &beside) {
-                    picks[i] = self.pick(candidate, best);
+                if explained > self.explained_squares(&old.columns, &beside) {
+                    picks[i] = self.select_choice(candidate, best);
                 }
             }
             if picks == before {
@@ -37,33 +37,33 @@ impl Bench<'_> {
     }
 
     /// Searches for the constants of a set's effects between the values of their grids.
-    pub(crate) fn refine(&mut self, picks: Vec<Pick>) -> Vec<Pick> {
+    pub(crate) fn refine_constants(&mut self, picks: Vec<SelectedEffect>) -> Vec<SelectedEffect> {
         let all = 0..picks.len();
-        self.refine_some(picks, all)
+        self.refine_members(picks, all)
     }
 
     /// The same where one member is new in a set: of those that act on a drive on which it acts. Others feel it through the
     /// base alone.
-    pub(crate) fn refine_around(&mut self, picks: Vec<Pick>, member: usize) -> Vec<Pick> {
-        let channels = self.acted_on(&picks[member..=member]);
-        let acts_there = |pick: &Pick| {
-            let own = self.acted_on(std::slice::from_ref(pick));
+    pub(crate) fn refine_around_member(&mut self, picks: Vec<SelectedEffect>, member: usize) -> Vec<SelectedEffect> {
+        let channels = self.affected_channels(&picks[member..=member]);
+        let acts_there = |pick: &SelectedEffect| {
+            let own = self.affected_channels(std::slice::from_ref(pick));
             own.iter().any(|channel| channels.contains(channel))
         };
         let near: Vec<usize> = (0..picks.len())
             .filter(|i| acts_there(&picks[*i]))
             .collect();
-        self.refine_some(picks, near)
+        self.refine_members(picks, near)
     }
 
     /// The same of some members.
-    pub(crate) fn refine_some(
+    pub(crate) fn refine_members(
         &mut self,
-        mut picks: Vec<Pick>,
+        mut picks: Vec<SelectedEffect>,
         which: impl IntoIterator<Item = usize>,
-    ) -> Vec<Pick> {
+    ) -> Vec<SelectedEffect> {
         let problem = self.problem;
-        let supply = self.supply;
+        let supply = self.provider;
         for i in which {
             let candidate = picks[i].candidate;
             let [(name, value)] = picks[i].constants.as_slice() else {
@@ -71,8 +71,8 @@ impl Bench<'_> {
             };
             let (name, value) = (name.clone(), *value);
             let mut grid: Vec<f64> = match &problem.candidates[candidate].source {
-                Source::Columns(choices) => choices.iter().map(|c| c.constants[0].1).collect(),
-                Source::Carried => vec![value / AROUND, value, value * AROUND],
+                ColumnSource::Columns(choices) => choices.iter().map(|c| c.constants[0].1).collect(),
+                ColumnSource::LoadDependent => vec![value / COARSE_SEARCH_FACTOR, value, value * COARSE_SEARCH_FACTOR],
                 _ => continue,
             };
             grid.sort_by(f64::total_cmp);
@@ -86,9 +86,9 @@ impl Bench<'_> {
             // What is positive throughout is searched by its logarithm.
             let is_positive = grid.first().is_some_and(|first| *first > 0.0);
             if is_positive {
-                let is_costly = problem.candidates[candidate].source == Source::Carried;
+                let is_costly = problem.candidates[candidate].source == ColumnSource::LoadDependent;
                 let [under, over] = if is_costly {
-                    [1.0 / AROUND, AROUND]
+                    [1.0 / COARSE_SEARCH_FACTOR, COARSE_SEARCH_FACTOR]
                 } else {
                     [0.7, 1.4]
                 };
@@ -104,26 +104,26 @@ impl Bench<'_> {
             let unscale = |x: f64| if is_positive { x.exp() } else { x };
             let mut others = picks.clone();
             others.remove(i);
-            let beside = self.beside(&others);
-            let load = (problem.candidates[candidate].source == Source::Carried)
+            let beside = self.conditioning_set(&others);
+            let load = (problem.candidates[candidate].source == ColumnSource::LoadDependent)
                 .then(|| self.load(&picks));
-            let at = |x: f64| -> Option<(f64, Vec<Column>)> {
+            let at = |x: f64| -> Option<(f64, Vec<ForceColumn>)> {
                 let columns = match &load {
                     Some(load) => {
-                        let which = Carried::One(candidate, Some(unscale(x)));
-                        supply.carried(load, which).pop()?.1.columns
+                        let which = LoadDependentQuery::One(candidate, Some(unscale(x)));
+                        supply.load_dependent_columns(load, which).pop()?.1.columns
                     }
-                    None => supply.finer(candidate, unscale(x))?,
+                    None => supply.columns_for_constant(candidate, unscale(x))?,
                 };
-                Some((self.explained_by(&columns, &beside), columns))
+                Some((self.explained_by_columns(&columns, &beside), columns))
             };
-            let Some(best) = largest(scale(low), scale(high), &at) else {
+            let Some(best) = maximise(scale(low), scale(high), &at) else {
                 continue;
             };
-            let now = self.explained(&picks[i].columns, &beside);
+            let now = self.explained_squares(&picks[i].columns, &beside);
             let (x, (explained, columns)) = best;
             if explained > now {
-                picks[i] = Pick {
+                picks[i] = SelectedEffect {
                     candidate,
                     constants: vec![(name, unscale(x))],
                     rank: picks[i].rank,
@@ -138,11 +138,11 @@ impl Bench<'_> {
 /// Half of how near the place of a largest value is found at worst, as a share of the interval.
 const NEAR: f64 = 0.003;
 /// How often a function is asked for its largest value; no more than golden sections alone would need.
-const ASKED: usize = 14;
+const MAX_EVALUATIONS: usize = 14;
 
 /// Where a function is largest between two bounds, and what it is there: by parabolas through the best three values, and by
 /// golden sections where these lead nowhere (R. P. Brent, Algorithms for Minimization without Derivatives, 1973, ch. 5).
-fn largest<T>(
+fn maximise<T>(
     mut low: f64,
     mut high: f64,
     at: &dyn Fn(f64) -> Option<(f64, T)>,
@@ -155,7 +155,7 @@ fn largest<T>(
     let mut second = (best, f64::NEG_INFINITY);
     let mut third = second;
     let (mut step, mut step_before) = (0.0_f64, 0.0_f64);
-    for _ in 1..ASKED {
+    for _ in 1..MAX_EVALUATIONS {
         let middle = 0.5 * (low + high);
         if (best - middle).abs() + 0.5 * (high - low) <= 2.0 * near {
             break;
@@ -222,13 +222,13 @@ mod tests {
                 asked.set(asked.get() + 1);
                 Some((curve(x), ()))
             };
-            let (x, (value, ())) = largest(0.0, 1.0, &at).expect("a value");
+            let (x, (value, ())) = maximise(0.0, 1.0, &at).expect("a value");
             assert!((x - top).abs() <= 2.0 * NEAR, "{name}: {x}");
             assert!((value - curve(x)).abs() < 1e-15, "{name}");
-            assert!(asked.get() <= ASKED, "{name}: {}", asked.get());
+            assert!(asked.get() <= MAX_EVALUATIONS, "{name}: {}", asked.get());
         }
         let asked = Cell::new(0);
-        largest(0.0, 1.0, &|x: f64| {
+        maximise(0.0, 1.0, &|x: f64| {
             asked.set(asked.get() + 1);
             Some((1.0 - (x - 0.3).powi(2), ()))
         });
@@ -237,6 +237,6 @@ mod tests {
 
     #[test]
     fn nothing_is_found_where_nothing_is_said() {
-        assert!(largest::<()>(0.0, 1.0, &|_| None).is_none());
+        assert!(maximise::<()>(0.0, 1.0, &|_| None).is_none());
     }
 }

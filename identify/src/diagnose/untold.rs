@@ -4,23 +4,23 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::bench::{Bench, Pick};
+use super::bench::{EffectSelector, SelectedEffect};
 use super::pool::dot;
-use super::problem::{Effect, Nature, Source};
+use super::problem::{LocatedEffect, CandidateNature, ColumnSource};
 
 /// Samples that are looked at, at most.
 const MOST: usize = 2000;
 /// Shares of squares below this are rounding: the column is a combination of others along any motion.
 const ROUNDING: f64 = 1e-18;
 
-impl Bench<'_> {
+impl EffectSelector<'_> {
     /// Effects that may hide beside a set, which leaves `rest`.
-    pub(crate) fn untold(&self, picks: &[Pick], rest: &[Vec<f64>]) -> Vec<Effect> {
-        let every = self.pool.all().len().div_ceil(MOST).max(1);
+    pub(crate) fn find_undetermined(&self, picks: &[SelectedEffect], rest: &[Vec<f64>]) -> Vec<LocatedEffect> {
+        let every = self.pool.all_samples().len().div_ceil(MOST).max(1);
         let mut basis: Vec<DVector<f64>> = Vec::new();
         for k in self.columns(picks) {
-            let column = self.stacked(k, every);
-            let left = beside(&basis, &column);
+            let column = self.stacked_column(k, every);
+            let left = project_out(&basis, &column);
             let size = left.norm();
             if size * size > ROUNDING * column.norm_squared() {
                 basis.push(left / size);
@@ -28,7 +28,7 @@ impl Bench<'_> {
         }
         let mut untold = Vec::new();
         for (k, candidate) in self.problem.candidates.iter().enumerate() {
-            let Source::Columns(choices) = &candidate.source else {
+            let ColumnSource::Columns(choices) = &candidate.source else {
                 continue;
             };
             let is_found = picks.iter().any(|pick| {
@@ -38,28 +38,28 @@ impl Bench<'_> {
                         && effect.kind == candidate.effect.kind
             });
             let is_single = choices.len() == 1 && candidate.effect.at.len() == 1;
-            if is_found || !is_single || candidate.nature != Nature::Effect {
+            if is_found || !is_single || candidate.nature != CandidateNature::Effect {
                 continue;
             }
-            let pick = self.pick(k, 0);
+            let pick = self.select_choice(k, 0);
             let columns: Vec<DVector<f64>> = pick
                 .columns
                 .iter()
-                .map(|k| self.stacked(*k, every))
+                .map(|k| self.stacked_column(*k, every))
                 .collect();
             let Some(share) = least_share(&basis, &columns) else {
                 continue;
             };
-            let channels = self.acted_on(&[pick]);
+            let channels = self.affected_channels(&[pick]);
             let force: f64 = channels
                 .iter()
                 .map(|d| {
-                    let force = self.problem.force(*d);
+                    let force = self.problem.measured_force(*d);
                     self.weights[*d] * dot(&force, &force) / force.len().max(1) as f64
                 })
                 .sum();
             // The deviation of its own force, in units of what is left, against the force of the drives.
-            if share > ROUNDING && self.worth(rest, &channels) * share * force < 1.0 {
+            if share > ROUNDING && self.effective_equations(rest, &channels) * share * force < 1.0 {
                 untold.push(candidate.effect.clone());
             }
         }
@@ -67,8 +67,8 @@ impl Bench<'_> {
     }
 
     /// A column of the pool along some samples, channels one after the other, each in units of what is left of it.
-    fn stacked(&self, column: usize, every: usize) -> DVector<f64> {
-        let n = self.pool.all().len();
+    fn stacked_column(&self, column: usize, every: usize) -> DVector<f64> {
+        let n = self.pool.all_samples().len();
         let channels = self.pool.column(column).0.iter().zip(&self.weights);
         let values = channels.flat_map(|(values, weight)| {
             let at = move |i: usize| values.as_ref().map_or(0.0, |x| weight.sqrt() * x[i]);
@@ -79,7 +79,7 @@ impl Bench<'_> {
 }
 
 /// What orthonormal directions leave of a column; twice, so that rounding of the first time goes too.
-fn beside(basis: &[DVector<f64>], column: &DVector<f64>) -> DVector<f64> {
+fn project_out(basis: &[DVector<f64>], column: &DVector<f64>) -> DVector<f64> {
     let mut left = column.clone();
     for _ in 0..2 {
         for direction in basis {
@@ -106,7 +106,7 @@ fn least_share(basis: &[DVector<f64>], columns: &[DVector<f64>]) -> Option<f64> 
     let largest = svd.singular_values.max();
     let kept = (0..u.ncols()).filter(|k| svd.singular_values[*k] > 1e-6 * largest);
     let left: Vec<DVector<f64>> = kept
-        .map(|k| beside(basis, &u.column(k).into_owned()))
+        .map(|k| project_out(basis, &u.column(k).into_owned()))
         .collect();
     let left = DMatrix::from_columns(&left);
     let shares = left.singular_values();
@@ -134,7 +134,7 @@ mod tests {
         let base = [wave(1.0, 0.0), wave(1.0, 1.5)];
         let mut basis = Vec::new();
         for column in &base {
-            let left = beside(&basis, column);
+            let left = project_out(&basis, column);
             basis.push(&left / left.norm());
         }
         assert_eq!(least_share(&basis, &[wave(1.0, 0.7)]), None);

@@ -61,19 +61,19 @@ pub fn planar_pseudo_inertia(mass: f64, moment: [f64; 2], inertia: f64) -> DMatr
 }
 
 /// The nominal matrix of a body, by its inverse root.
-pub(crate) struct Reference {
+pub(crate) struct NominalBodyMatrix {
     /// `L^-1` of `P0 = L L'`.
     root_inverse: DMatrix<f64>,
     pub(crate) copies: f64,
 }
 
-impl Reference {
+impl NominalBodyMatrix {
     pub(crate) fn new(body: &BodyMatrix<'_>, nominal: &[f64]) -> Result<Self, PhysicalError> {
         let matrix = (body.matrix)(nominal);
         let n = matrix.nrows();
         let impossible = || PhysicalError::NominalImpossible {
             body: body.name.clone(),
-            why: why_impossible(&matrix),
+            why: impossibility_reason(&matrix),
         };
         let cholesky = matrix.clone().cholesky().ok_or_else(impossible)?;
         let root_inverse = cholesky
@@ -100,7 +100,7 @@ impl Reference {
     }
 }
 
-fn why_impossible(matrix: &DMatrix<f64>) -> String {
+fn impossibility_reason(matrix: &DMatrix<f64>) -> String {
     let n = matrix.nrows();
     if n == 1 {
         return format!("{} is not positive", matrix[(0, 0)]);

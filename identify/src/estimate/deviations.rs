@@ -27,13 +27,13 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::estimate::error::LeastSquaresError;
-use crate::estimate::lags::{LagProducts, Windows, bandwidth, lags_for_bandwidth};
-use crate::estimate::rows::{Visit, check_rows};
-use crate::estimate::solution::Solution;
+use crate::estimate::lags::{LagProducts, BartlettWindows, bandwidth, lags_for_bandwidth};
+use crate::estimate::rows::{RowVisitor, check_rows};
+use crate::estimate::solution::RegressionSolution;
 
 /// Uncertainty of a solution. Lists are in the order of the regressor's columns.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Deviations {
+pub struct ParameterUncertainty {
     /// Standard deviations; infinite for parameters that are not determined, NaN where there are no more rows than
     /// parameters, for then residuals are rounding and say nothing.
     pub std: Vec<f64>,
@@ -74,24 +74,24 @@ pub const FEWEST_ROWS: usize = 20;
 /// assert!(deviations.std[1] < 1e-2);
 /// # Ok::<(), LeastSquaresError>(())
 /// ```
-pub fn autocorrelated_deviations<E: From<LeastSquaresError>>(
-    solution: &Solution,
+pub fn uncertainty_with_autocorrelation<E: From<LeastSquaresError>>(
+    solution: &RegressionSolution,
     channels: usize,
-    mut show: impl FnMut(&mut Visit<'_>) -> Result<(), E>,
-) -> Result<Deviations, E> {
-    let mut scores = Scores::new(solution, channels.max(1));
-    from_influences(solution, channels, |take| scores.run(&mut show, take))
+    mut show: impl FnMut(&mut RowVisitor<'_>) -> Result<(), E>,
+) -> Result<ParameterUncertainty, E> {
+    let mut scores = InfluenceScores::new(solution, channels.max(1));
+    from_influences(solution, channels, |take| scores.show_influences(&mut show, take))
 }
 
 /// Takes each sample's influence on the parameters and its residuals.
-pub(crate) type Take<'a> = dyn FnMut(&[f64], &[f64]) + 'a;
+pub(crate) type InfluenceSink<'a> = dyn FnMut(&[f64], &[f64]) + 'a;
 
 /// Deviations from a showing of each sample's influence, which is made twice.
 pub(crate) fn from_influences<E>(
-    solution: &Solution,
+    solution: &RegressionSolution,
     channels: usize,
-    mut run: impl FnMut(&mut Take<'_>) -> Result<(), E>,
-) -> Result<Deviations, E> {
+    mut run: impl FnMut(&mut InfluenceSink<'_>) -> Result<(), E>,
+) -> Result<ParameterUncertainty, E> {
     let n = solution.values.len();
     let channels = channels.max(1);
     // Lags are counted in time, which goes on where rows are left out; what the rows are worth is not.
@@ -110,7 +110,7 @@ pub(crate) fn from_influences<E>(
         .collect();
     let bandwidth = bandwidth(&memory, &whitening, lags, steps);
 
-    let mut windows = Windows::new(n, bandwidth);
+    let mut windows = BartlettWindows::new(n, bandwidth);
     let mut previous = vec![0.0; n];
     let mut white = vec![0.0; n];
     let mut first = true;
@@ -161,7 +161,7 @@ pub(crate) fn from_influences<E>(
             }
         })
         .collect();
-    Ok(Deviations {
+    Ok(ParameterUncertainty {
         std,
         covariance,
         effective_samples,
@@ -175,7 +175,7 @@ pub(crate) fn from_influences<E>(
 }
 
 /// Raises variances that lie below the classical ones up to them; correlations stay.
-fn raise_to_classical(covariance: &mut DMatrix<f64>, solution: &Solution) {
+fn raise_to_classical(covariance: &mut DMatrix<f64>, solution: &RegressionSolution) {
     for i in 0..solution.values.len() {
         let classical = solution.classical_std[i].powi(2);
         let variance = covariance[(i, i)];
@@ -194,20 +194,20 @@ fn raise_to_classical(covariance: &mut DMatrix<f64>, solution: &Solution) {
 }
 
 /// Shows each sample's influence on the parameters and its residuals.
-struct Scores<'a> {
-    solution: &'a Solution,
+struct InfluenceScores<'a> {
+    solution: &'a RegressionSolution,
     channels: usize,
 }
 
-impl<'a> Scores<'a> {
-    fn new(solution: &'a Solution, channels: usize) -> Self {
+impl<'a> InfluenceScores<'a> {
+    fn new(solution: &'a RegressionSolution, channels: usize) -> Self {
         Self { solution, channels }
     }
 
-    fn run<E: From<LeastSquaresError>>(
+    fn show_influences<E: From<LeastSquaresError>>(
         &mut self,
-        show: &mut impl FnMut(&mut Visit<'_>) -> Result<(), E>,
-        take: &mut Take<'_>,
+        show: &mut impl FnMut(&mut RowVisitor<'_>) -> Result<(), E>,
+        take: &mut InfluenceSink<'_>,
     ) -> Result<(), E> {
         let n = self.solution.values.len();
         let to_parameters = self.solution.unit_covariance();
@@ -251,7 +251,7 @@ impl<'a> Scores<'a> {
         } else {
             Err(LeastSquaresError::PassesDiffer {
                 first: self.solution.shown,
-                now: rows,
+                this_pass: rows,
             }
             .into())
         }
@@ -262,7 +262,7 @@ impl<'a> Scores<'a> {
 mod tests {
     use super::*;
     use crate::LeastSquares;
-    use crate::test_noise::Noise;
+    use crate::test_noise::TestNoise;
 
     /// As many rows as parameters leave residuals of rounding, from which nothing can be said.
     #[test]
@@ -271,8 +271,8 @@ mod tests {
         let mut regression = LeastSquares::new(2);
         regression.add_rows(&w, &y).unwrap();
         let solution = regression.solve().unwrap();
-        let found: Result<Deviations, LeastSquaresError> =
-            autocorrelated_deviations(&solution, 1, |visit| visit(&w, &y));
+        let found: Result<ParameterUncertainty, LeastSquaresError> =
+            uncertainty_with_autocorrelation(&solution, 1, |visit| visit(&w, &y));
         assert!(found.unwrap().std.iter().all(|std| std.is_nan()));
     }
 
@@ -281,7 +281,7 @@ mod tests {
     #[test]
     fn few_samples_cover_as_students_distribution_says() {
         for (samples, expected) in [(4, 0.816), (10, 0.919)] {
-            let mut noise = Noise::new(5);
+            let mut noise = TestNoise::new(5);
             let trials = 4000;
             let mut hits = 0;
             for _ in 0..trials {
@@ -292,8 +292,8 @@ mod tests {
                 let mut regression = LeastSquares::new(2);
                 regression.add_rows(&w, &y).unwrap();
                 let solution = regression.solve().unwrap();
-                let found: Result<Deviations, LeastSquaresError> =
-                    autocorrelated_deviations(&solution, 1, |visit| visit(&w, &y));
+                let found: Result<ParameterUncertainty, LeastSquaresError> =
+                    uncertainty_with_autocorrelation(&solution, 1, |visit| visit(&w, &y));
                 let found = found.unwrap();
                 assert!(found.few_samples);
                 for j in 0..2 {
@@ -311,10 +311,10 @@ mod tests {
 
     #[test]
     fn windows_are_bartletts_sum_over_lags() {
-        let mut noise = Noise::new(3);
+        let mut noise = TestNoise::new(3);
         let u: Vec<[f64; 2]> = (0..50).map(|_| [noise.normal(), noise.normal()]).collect();
         let length = 7;
-        let mut windows = Windows::new(2, length);
+        let mut windows = BartlettWindows::new(2, length);
         for values in &u {
             windows.push(values);
         }
@@ -337,7 +337,7 @@ mod tests {
         let (trials, samples) = (400, 1500);
         let truth = [4.0, -2.0, 1.0];
         let mut hits = ([0.0; 3], [0.0; 3]);
-        let mut noise = Noise::new(11);
+        let mut noise = TestNoise::new(11);
         for _ in 0..trials {
             let (mut w, mut y) = (Vec::new(), Vec::new());
             let mut state = vec![0.0; channels];
@@ -358,7 +358,7 @@ mod tests {
             regression.add_rows(&w, &y).unwrap();
             let solution = regression.solve().unwrap();
             let honest =
-                autocorrelated_deviations(&solution, channels, |visit| visit(&w, &y)).unwrap();
+                uncertainty_with_autocorrelation(&solution, channels, |visit| visit(&w, &y)).unwrap();
             for j in 0..3 {
                 let error = (solution.values[j] - truth[j]).abs();
                 hits.0[j] += f64::from(u8::from(error <= 2.0 * honest.std[j])) / f64::from(trials);
@@ -400,16 +400,16 @@ mod tests {
         let mut regression = LeastSquares::new(3);
         regression.add_rows(&w, &y).unwrap();
         let solution = regression.solve().unwrap();
-        let deviations = autocorrelated_deviations(&solution, 1, |visit| visit(&w, &y)).unwrap();
+        let deviations = uncertainty_with_autocorrelation(&solution, 1, |visit| visit(&w, &y)).unwrap();
         assert!(deviations.std[0].is_finite() && deviations.std[1].is_finite());
         assert!(deviations.std[2].is_infinite());
         let other =
-            autocorrelated_deviations(&solution, 1, |visit| visit(&w[..30], &y[..10])).unwrap_err();
+            uncertainty_with_autocorrelation(&solution, 1, |visit| visit(&w[..30], &y[..10])).unwrap_err();
         assert_eq!(
             other,
             LeastSquaresError::PassesDiffer {
                 first: 100,
-                now: 10
+                this_pass: 10
             }
         );
     }

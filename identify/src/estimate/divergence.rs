@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::estimate::body_matrices::{BodyMatrix, Reference};
+use crate::estimate::body_matrices::{BodyMatrix, NominalBodyMatrix};
 use crate::estimate::error::PhysicalError;
 
 /// The base parameters for given physical parameters with their derivatives (rows: base parameters), in the order of the
@@ -18,18 +18,18 @@ pub(crate) fn step_scales(nominal: &[f64]) -> Vec<f64> {
 }
 
 /// Misfit and divergence as a function of the physical parameters.
-pub(crate) struct Misfit<'a> {
+pub(crate) struct MisfitFunction<'a> {
     /// In units of the noise.
     pub(crate) r: DMatrix<f64>,
     pub(crate) right: DVector<f64>,
     pub(crate) base: &'a BaseMap<'a>,
     pub(crate) bodies: &'a [BodyMatrix<'a>],
-    pub(crate) references: Vec<Reference>,
+    pub(crate) references: Vec<NominalBodyMatrix>,
     pub(crate) scales: Vec<f64>,
 }
 
 /// Value and derivatives at a point.
-pub(crate) struct Point {
+pub(crate) struct MisfitPoint {
     pub(crate) value: f64,
     pub(crate) gradient: DVector<f64>,
     /// Second derivatives by the recording (Gauss and Newton) and by the divergence.
@@ -37,7 +37,7 @@ pub(crate) struct Point {
     pub(crate) prior: DMatrix<f64>,
 }
 
-impl Misfit<'_> {
+impl MisfitFunction<'_> {
     /// The value; none outside.
     pub(crate) fn value(&self, x: &DVector<f64>, weight: f64) -> Option<f64> {
         let (p, _) = (self.base)(x.as_slice());
@@ -58,7 +58,7 @@ impl Misfit<'_> {
         value.is_finite().then_some(value)
     }
 
-    pub(crate) fn at(&self, x: &DVector<f64>, weight: f64) -> Option<Point> {
+    pub(crate) fn evaluate_at(&self, x: &DVector<f64>, weight: f64) -> Option<MisfitPoint> {
         let n = x.len();
         let (p, jacobian) = (self.base)(x.as_slice());
         let residual = &self.r * p - &self.right;
@@ -98,7 +98,7 @@ impl Misfit<'_> {
                 }
             }
         }
-        Some(Point {
+        Some(MisfitPoint {
             value: self.value(x, weight)?,
             gradient,
             data,
@@ -114,7 +114,7 @@ impl Misfit<'_> {
     ) -> Result<usize, PhysicalError> {
         let mut damping = 1e-9;
         for iteration in 0..500 {
-            let point = self.at(x, weight).ok_or(PhysicalError::NoConvergence)?;
+            let point = self.evaluate_at(x, weight).ok_or(PhysicalError::NoConvergence)?;
             let second = &point.data + &point.prior;
             let mut moved = false;
             while !moved && damping < 1e9 {

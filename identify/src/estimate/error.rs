@@ -52,7 +52,7 @@ pub enum LeastSquaresError {
         /// Rows of the first pass.
         first: usize,
         /// Rows of this pass.
-        now: usize,
+        this_pass: usize,
     },
 }
 
@@ -86,7 +86,7 @@ impl fmt::Display for LeastSquaresError {
                  regressor is {correlation:.1e}; are they of the same motion, and in step with the recording? Does the \
                  recording itself determine all parameters? Identify without instruments to see"
             ),
-            Self::PassesDiffer { first, now } => write!(
+            Self::PassesDiffer { first, this_pass: now } => write!(
                 f,
                 "the second pass showed {now} rows where the first showed {first}; show the same rows in all passes"
             ),

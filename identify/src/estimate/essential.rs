@@ -12,10 +12,10 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::estimate::deviations::Deviations;
+use crate::estimate::deviations::ParameterUncertainty;
 use crate::estimate::error::LeastSquaresError;
-use crate::estimate::solution::Solution;
-use crate::estimate::triangle::Triangle;
+use crate::estimate::solution::RegressionSolution;
+use crate::estimate::triangle::RFactor;
 
 /// When a parameter counts as essential.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,7 +37,7 @@ impl Default for EssentialOptions {
 
 /// A parameter that was left out.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Dropped {
+pub struct DroppedParameter {
     /// Its position.
     pub parameter: usize,
     /// Its standard deviation over its value when it was left out; infinite for what is not determined.
@@ -48,11 +48,11 @@ pub struct Dropped {
 
 /// The parameters that a recording supports.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Essential {
+pub struct EssentialParameters {
     /// Positions of those that stay, ascending.
     pub kept: Vec<usize>,
     /// Those that were left out, in that order.
-    pub dropped: Vec<Dropped>,
+    pub dropped: Vec<DroppedParameter>,
     /// Values of all parameters; those left out are what they are held at.
     pub values: Vec<f64>,
     /// Standard deviations that allow for autocorrelation; infinite for those left out.
@@ -64,20 +64,20 @@ pub struct Essential {
     /// The same for columns of norm 1.
     pub scaled_condition_number: f64,
     /// Norm of the residual over that of all parameters, less 1.
-    pub rise: f64,
+    pub residual_rise: f64,
 }
 
 /// Leaves out parameters until all others are needed.
 ///
 /// `solution` and `deviations` are those of `triangle`; `held` is what parameters are that are left out: their nominal
 /// values, 0 where there is none. Fails only where a reduced problem cannot be solved.
-pub fn essential(
-    triangle: &Triangle,
-    solution: &Solution,
-    deviations: &Deviations,
+pub fn select_essential(
+    triangle: &RFactor,
+    solution: &RegressionSolution,
+    deviations: &ParameterUncertainty,
     held: &[f64],
     options: &EssentialOptions,
-) -> Result<Essential, LeastSquaresError> {
+) -> Result<EssentialParameters, LeastSquaresError> {
     let n = triangle.n_parameters();
     let mut dropped = Vec::new();
     // Each undetermined direction starts with a parameter that no other one contains: without it nothing is lost.
@@ -85,7 +85,7 @@ pub fn essential(
     for direction in &solution.undetermined {
         let pivot = direction.changes[0].0;
         kept.retain(|j| *j != pivot);
-        dropped.push(Dropped {
+        dropped.push(DroppedParameter {
             parameter: pivot,
             relative_std: f64::INFINITY,
             probability: 1.0,
@@ -95,7 +95,7 @@ pub fn essential(
     let information = r.transpose() * &r;
     // The covariance of the gradients is a property of the residuals; each choice of columns sees its own part.
     let scores = &information * &deviations.covariance * &information;
-    let full = Choice::fit(triangle, &scores, held, kept)?;
+    let full = ReducedRegression::fit(triangle, &scores, held, kept)?;
     let mut effective: Vec<f64> = deviations
         .effective_samples
         .iter()
@@ -125,20 +125,20 @@ pub fn essential(
             break;
         }
         tested.push(choice.columns[worst]);
-        let probability = full.probability_of_zero(&tested, freedom);
+        let probability = full.wald_probability(&tested, freedom);
         if probability < options.significance {
             break;
         }
-        dropped.push(Dropped {
+        dropped.push(DroppedParameter {
             parameter: choice.columns[worst],
             relative_std: relative[worst],
             probability,
         });
         let mut columns = choice.columns.clone();
         columns.remove(worst);
-        choice = Choice::fit(triangle, &scores, held, columns)?;
+        choice = ReducedRegression::fit(triangle, &scores, held, columns)?;
     }
-    let mut found = Essential {
+    let mut found = EssentialParameters {
         kept: choice.columns.clone(),
         dropped,
         values: held.to_vec(),
@@ -146,37 +146,37 @@ pub fn essential(
         classical_std: vec![f64::INFINITY; n],
         condition_number: choice.solution.condition_number,
         scaled_condition_number: choice.solution.scaled_condition_number,
-        rise: choice.solution.residual_norm / solution.residual_norm - 1.0,
+        residual_rise: choice.solution.residual_norm / solution.residual_norm - 1.0,
     };
     for (i, j) in choice.columns.iter().enumerate() {
         found.values[*j] += choice.solution.values[i];
         found.std[*j] = choice.covariance[(i, i)].sqrt();
         found.classical_std[*j] = choice.solution.classical_std[i];
     }
-    if !found.rise.is_finite() {
-        found.rise = 0.0;
+    if !found.residual_rise.is_finite() {
+        found.residual_rise = 0.0;
     }
     Ok(found)
 }
 
 /// Some of the columns with their own solution: how far they are from what they would be held at.
 #[derive(Debug, Clone)]
-struct Choice {
+struct ReducedRegression {
     columns: Vec<usize>,
-    solution: Solution,
+    solution: RegressionSolution,
     covariance: DMatrix<f64>,
 }
 
-impl Choice {
+impl ReducedRegression {
     fn fit(
-        triangle: &Triangle,
+        triangle: &RFactor,
         scores: &DMatrix<f64>,
         held: &[f64],
         columns: Vec<usize>,
     ) -> Result<Self, LeastSquaresError> {
         let solution = triangle
-            .from(held)
-            .only(&columns)?
+            .relative_to(held)
+            .select_columns(&columns)?
             .solve_near(&vec![0.0; columns.len()])?;
         let inverse = solution.unit_covariance();
         let part = scores.select_rows(&columns).select_columns(&columns);
@@ -199,7 +199,7 @@ impl Choice {
     }
 
     /// Wald's test of several parameters at once.
-    fn probability_of_zero(&self, parameters: &[usize], freedom: f64) -> f64 {
+    fn wald_probability(&self, parameters: &[usize], freedom: f64) -> f64 {
         let at: Vec<usize> = parameters
             .iter()
             .filter_map(|p| self.columns.iter().position(|column| column == p))
@@ -272,8 +272,8 @@ fn log_gamma(x: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::estimate::deviations::autocorrelated_deviations;
-    use crate::test_noise::Noise;
+    use crate::estimate::deviations::uncertainty_with_autocorrelation;
+    use crate::test_noise::TestNoise;
     use crate::{LeastSquares, LeastSquaresError};
 
     /// Tables of the F distribution (5 and 1 %), and its closed form for two degrees of freedom above.
@@ -298,7 +298,7 @@ mod tests {
     #[test]
     fn what_has_no_effect_is_left_out_also_under_autocorrelated_noise() {
         let truth = [4.0, -2.0, 0.0, 1.5, 0.0, 3.0, 0.0];
-        let mut noise = Noise::new(5);
+        let mut noise = TestNoise::new(5);
         let (mut right, trials) = (0, 60);
         for _ in 0..trials {
             let (mut w, mut y, mut e) = (Vec::new(), Vec::new(), 0.0);
@@ -322,9 +322,9 @@ mod tests {
             regression.add_rows(&w, &y).unwrap();
             let solution = regression.solve().unwrap();
             let deviations: Result<_, LeastSquaresError> =
-                autocorrelated_deviations(&solution, 1, |visit| visit(&w, &y));
-            let triangle = Triangle::new(&regression);
-            let found = essential(
+                uncertainty_with_autocorrelation(&solution, 1, |visit| visit(&w, &y));
+            let triangle = RFactor::new(&regression);
+            let found = select_essential(
                 &triangle,
                 &solution,
                 &deviations.unwrap(),
@@ -343,7 +343,7 @@ mod tests {
             for j in [1, 3, 5] {
                 assert!((found.values[j] - truth[j]).abs() < 5.0 * found.std[j]);
             }
-            assert!(found.rise < 0.02);
+            assert!(found.residual_rise < 0.02);
         }
         assert!(right >= trials * 85 / 100, "{right} of {trials}");
     }
@@ -352,7 +352,7 @@ mod tests {
     #[test]
     fn what_is_not_supported_stays_where_it_is_held() {
         let truth = [4.0, 8.0, -3.0];
-        let mut noise = Noise::new(11);
+        let mut noise = TestNoise::new(11);
         let (mut w, mut y) = (Vec::new(), Vec::new());
         for i in 0..4000 {
             let t = 0.01 * f64::from(i);
@@ -365,19 +365,19 @@ mod tests {
         regression.add_rows(&w, &y).unwrap();
         let solution = regression.solve().unwrap();
         let deviations: Result<_, LeastSquaresError> =
-            autocorrelated_deviations(&solution, 1, |visit| visit(&w, &y));
+            uncertainty_with_autocorrelation(&solution, 1, |visit| visit(&w, &y));
         let deviations = deviations.unwrap();
-        let triangle = Triangle::new(&regression);
+        let triangle = RFactor::new(&regression);
         let options = EssentialOptions::default();
         let held = [0.0, 8.0, 0.0];
-        let found = essential(&triangle, &solution, &deviations, &held, &options).unwrap();
+        let found = select_essential(&triangle, &solution, &deviations, &held, &options).unwrap();
         assert_eq!(found.kept, [0, 2]);
         assert_eq!(found.values[1].to_bits(), 8.0_f64.to_bits());
         for j in [0, 2] {
             assert!((found.values[j] - truth[j]).abs() < 5.0 * found.std[j]);
         }
         // What is well told moves away from where it would be held.
-        let found = essential(
+        let found = select_essential(
             &triangle,
             &solution,
             &deviations,

@@ -15,24 +15,24 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::estimate::deviations::{Deviations, from_influences};
+use crate::estimate::deviations::{ParameterUncertainty, from_influences};
 use crate::estimate::error::LeastSquaresError;
 use crate::estimate::least_squares::LeastSquares;
-use crate::estimate::rows::{Visit, check_rows};
-use crate::estimate::solution::Solution;
+use crate::estimate::rows::{RowVisitor, check_rows};
+use crate::estimate::solution::RegressionSolution;
 
 /// Canonical correlations below this say nothing.
-const WEAKEST: f64 = 1e-6;
+const MIN_CORRELATION: f64 = 1e-6;
 
 /// What instruments make of a recording.
 #[derive(Debug, Clone)]
-pub struct Instrumented {
+pub struct InstrumentalEstimate {
     /// The solution.
-    pub solution: Solution,
+    pub solution: RegressionSolution,
     /// Its deviations, which allow for autocorrelation.
-    pub deviations: Deviations,
+    pub uncertainty: ParameterUncertainty,
     /// What least squares finds on the same rows.
-    pub least_squares: Solution,
+    pub least_squares: RegressionSolution,
     /// The smallest canonical correlation between instruments and regressor, 0 to 1: near 1 they say as much as the
     /// regressor itself, below 0.2 little.
     pub strength: f64,
@@ -41,11 +41,11 @@ pub struct Instrumented {
 /// Estimates `n` parameters; `show` presents rows of `2 n` numbers, instruments first, interleaved per sample, in order of
 /// time, the same in each of three showings.
 /// Fails when `show` fails, a number is not finite, or the instruments do not determine the parameters.
-pub fn instrumental<E: From<LeastSquaresError>>(
+pub fn estimate_with_instruments<E: From<LeastSquaresError>>(
     n: usize,
     channels: usize,
-    mut show: impl FnMut(&mut Visit<'_>) -> Result<(), E>,
-) -> Result<Instrumented, E> {
+    mut show: impl FnMut(&mut RowVisitor<'_>) -> Result<(), E>,
+) -> Result<InstrumentalEstimate, E> {
     if n == 0 {
         return Err(LeastSquaresError::NoParameters.into());
     }
@@ -55,7 +55,7 @@ pub fn instrumental<E: From<LeastSquaresError>>(
     if regression.rows() == 0 {
         return Err(LeastSquaresError::NoRows.into());
     }
-    let found = solve(&regression, n)?;
+    let found = solve_instrumental(&regression, n)?;
     let mut gradient = DVector::zeros(n);
     let mut influence = DVector::zeros(n);
     let mut errors = vec![0.0; channels];
@@ -90,28 +90,28 @@ pub fn instrumental<E: From<LeastSquaresError>>(
             Ok(())
         } else {
             let (first, now) = (regression.rows(), rows);
-            Err(LeastSquaresError::PassesDiffer { first, now }.into())
+            Err(LeastSquaresError::PassesDiffer { first, this_pass: now }.into())
         }
     })?;
-    Ok(Instrumented {
+    Ok(InstrumentalEstimate {
         solution: found.solution,
-        deviations,
+        uncertainty: deviations,
         least_squares: found.least_squares,
         strength: found.strength,
     })
 }
 
-struct Solved {
-    solution: Solution,
-    least_squares: Solution,
+struct InstrumentalSolution {
+    solution: RegressionSolution,
+    least_squares: RegressionSolution,
     strength: f64,
     /// `(Z'W)^-1`
     to_parameters: DMatrix<f64>,
 }
 
-fn solve(regression: &LeastSquares, n: usize) -> Result<Solved, LeastSquaresError> {
+fn solve_instrumental(regression: &LeastSquares, n: usize) -> Result<InstrumentalSolution, LeastSquaresError> {
     let width = 2 * n + 1;
-    let triangle = regression.reduced();
+    let triangle = regression.augmented_factor();
     let entry = |i: usize, j: usize| triangle[i * width + j];
     let r_z = DMatrix::from_fn(n, n, &entry);
     let b = DMatrix::from_fn(n, n, |i, j| entry(i, n + j));
@@ -121,8 +121,8 @@ fn solve(regression: &LeastSquares, n: usize) -> Result<Solved, LeastSquaresErro
     for row in triangle.chunks_exact(width) {
         plain.add_rows(&row[n..2 * n], &row[2 * n..])?;
     }
-    let mut least_squares = crate::Triangle::new(&plain);
-    least_squares.count_rows(regression.row_count());
+    let mut least_squares = crate::RFactor::new(&plain);
+    least_squares.set_row_count(regression.row_count());
     let least_squares = least_squares.solve_near(&vec![0.0; n])?;
     let weak = |correlation| LeastSquaresError::WeakInstruments { correlation };
     if least_squares.rank < n {
@@ -136,7 +136,7 @@ fn solve(regression: &LeastSquares, n: usize) -> Result<Solved, LeastSquaresErro
     let b_inverse = b
         .clone()
         .try_inverse()
-        .filter(|_| strength > WEAKEST)
+        .filter(|_| strength > MIN_CORRELATION)
         .ok_or(weak(strength))?;
     let r_inverse = r_z
         .solve_upper_triangular(&DMatrix::identity(n, n))
@@ -144,9 +144,9 @@ fn solve(regression: &LeastSquares, n: usize) -> Result<Solved, LeastSquaresErro
         .ok_or(weak(strength))?;
     let values = b.lu().solve(&right).ok_or(weak(strength))?;
     let mut solution = least_squares.clone();
-    let r_w = crate::Triangle::new(&plain);
-    let misfit = r_w.right() - r_w.r() * &values;
-    solution.residual_norm = misfit.norm().hypot(r_w.corner());
+    let r_w = crate::RFactor::new(&plain);
+    let misfit = r_w.right_side() - r_w.r() * &values;
+    solution.residual_norm = misfit.norm().hypot(r_w.residual_norm());
     solution.values = values.iter().copied().collect();
     let to_parameters = &b_inverse * r_inverse.transpose();
     solution.r_inverse = b_inverse;
@@ -154,7 +154,7 @@ fn solve(regression: &LeastSquares, n: usize) -> Result<Solved, LeastSquaresErro
     solution.classical_std = (0..n)
         .map(|i| sigma * solution.r_inverse.row(i).norm())
         .collect();
-    Ok(Solved {
+    Ok(InstrumentalSolution {
         solution,
         least_squares,
         strength,
@@ -165,14 +165,14 @@ fn solve(regression: &LeastSquares, n: usize) -> Result<Solved, LeastSquaresErro
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_noise::Noise;
+    use crate::test_noise::TestNoise;
 
     type Rows = (Vec<f64>, Vec<f64>);
 
     /// A spring and a constant force on a coordinate whose encoder is noisy; the force follows the noisy coordinate through
     /// a controller, so that both errors are the same. Instruments: the coordinate that was asked for.
     fn rows(seed: u64, samples: i32) -> Rows {
-        let mut noise = Noise::new(seed);
+        let mut noise = TestNoise::new(seed);
         let (mut rows, mut y) = (Vec::new(), Vec::new());
         for i in 0..samples {
             let t = 0.02 * f64::from(i);
@@ -184,8 +184,8 @@ mod tests {
         (rows, y)
     }
 
-    fn found((rows, y): &Rows) -> Instrumented {
-        instrumental(2, 1, |visit| -> Result<(), LeastSquaresError> {
+    fn found((rows, y): &Rows) -> InstrumentalEstimate {
+        estimate_with_instruments(2, 1, |visit| -> Result<(), LeastSquaresError> {
             visit(rows, y)
         })
         .unwrap()
@@ -201,7 +201,7 @@ mod tests {
             assert!(bias < -0.4, "least squares is off by {bias} only");
             worst = worst.max((one.solution.values[0] - 4.0).abs());
             let error = (one.solution.values[0] - 4.0).abs();
-            inside += f64::from(u8::from(error <= 2.0 * one.deviations.std[0]));
+            inside += f64::from(u8::from(error <= 2.0 * one.uncertainty.std[0]));
             assert!(one.strength > 0.9);
         }
         assert!(worst < 0.2, "{worst}");
@@ -252,7 +252,7 @@ mod tests {
             })
             .collect();
         let y: Vec<f64> = (0..1000).map(f64::from).collect();
-        let error = instrumental(1, 1, |visit| visit(&rows, &y)).unwrap_err();
+        let error = estimate_with_instruments(1, 1, |visit| visit(&rows, &y)).unwrap_err();
         assert!(
             matches!(error, LeastSquaresError::WeakInstruments { .. }),
             "{error}"

@@ -5,11 +5,11 @@ use std::collections::VecDeque;
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::signal::count;
+use crate::signal::float_to_count;
 
 /// Newey and West's number of lags that the bandwidth is estimated from (Bartlett's kernel).
 pub(crate) fn lags_for_bandwidth(samples: usize) -> usize {
-    count(4.0 * (samples as f64 / 100.0).powf(2.0 / 9.0)).clamp(1, samples.max(2) - 1)
+    float_to_count(4.0 * (samples as f64 / 100.0).powf(2.0 / 9.0)).clamp(1, samples.max(2) - 1)
 }
 
 /// The automatic bandwidth from the lag products of the influences, prewhitened on paper.
@@ -38,7 +38,7 @@ pub(crate) fn bandwidth(
         power += s0 * s0;
     }
     let alpha = if power > 0.0 { curvature / power } else { 0.0 };
-    let automatic = count(1.1447 * (alpha * samples as f64).cbrt());
+    let automatic = float_to_count(1.1447 * (alpha * samples as f64).cbrt());
     automatic.max(lags + 1).min((samples / 10).max(1))
 }
 
@@ -98,14 +98,14 @@ impl LagProducts {
 }
 
 /// Bartlett's weighted sum of autocovariances, from sums over sliding windows.
-pub(crate) struct Windows {
+pub(crate) struct BartlettWindows {
     length: usize,
     recent: VecDeque<Vec<f64>>,
     sum: DVector<f64>,
     outer: DMatrix<f64>,
 }
 
-impl Windows {
+impl BartlettWindows {
     pub(crate) fn new(width: usize, length: usize) -> Self {
         Self {
             length,

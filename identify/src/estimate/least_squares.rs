@@ -13,9 +13,9 @@
 use nalgebra::DMatrix;
 
 use crate::estimate::error::LeastSquaresError;
-use crate::estimate::reflections::{Block, LANES, fold};
-use crate::estimate::rows::{all_finite, check_rows, is_left_out};
-use crate::estimate::solution::{RowCount, Solution, solve_triangle};
+use crate::estimate::reflections::{HouseholderBlock, LANES, fold_into_factor};
+use crate::estimate::rows::{all_finite, check_rows, is_uninformative};
+use crate::estimate::solution::{RowCount, RegressionSolution, solve_r_factor};
 
 /// Numbers that are reduced together at most, so that they stay in the fastest caches.
 const BLOCK_NUMBERS: usize = 4096;
@@ -43,18 +43,18 @@ pub struct LeastSquares {
     n_parameters: usize,
     rows: usize,
     /// Rows of zeros among them.
-    idle: usize,
+    zero_rows: usize,
     /// `(n + 1) x (n + 1)`, row-major upper triangle `[R, Q'y; 0, +-|residual|]`.
-    triangle: Vec<f64>,
+    augmented_factor: Vec<f64>,
     /// Rows per block.
     block_rows: usize,
     /// For each channel a block of rows.
-    channels: Vec<Pending>,
+    channels: Vec<PendingRows>,
 }
 
 /// Rows that wait to be reduced: `n + 1` columns of `block_rows`, filled up to `rows`.
 #[derive(Debug, Clone)]
-struct Pending {
+struct PendingRows {
     block: Vec<f64>,
     rows: usize,
 }
@@ -70,15 +70,15 @@ impl LeastSquares {
     pub fn with_channels(n_parameters: usize, channels: usize) -> Self {
         let width = n_parameters + 1;
         let block_rows = block_rows(width);
-        let pending = Pending {
+        let pending = PendingRows {
             block: vec![0.0; width * block_rows],
             rows: 0,
         };
         Self {
             n_parameters,
             rows: 0,
-            idle: 0,
-            triangle: vec![0.0; width * width],
+            zero_rows: 0,
+            augmented_factor: vec![0.0; width * width],
             block_rows,
             channels: vec![pending; channels.max(1)],
         }
@@ -97,7 +97,7 @@ impl LeastSquares {
     pub(crate) fn row_count(&self) -> RowCount {
         RowCount {
             shown: self.rows,
-            telling: self.rows - self.idle,
+            informative: self.rows - self.zero_rows,
         }
     }
 
@@ -120,7 +120,7 @@ impl LeastSquares {
             }
             pending.block[n * stride + pending.rows] = *y;
             pending.rows += 1;
-            self.idle += usize::from(is_left_out(row, *y));
+            self.zero_rows += usize::from(is_uninformative(row, *y));
             if pending.rows == stride {
                 self.reduce_block(channel);
             }
@@ -173,7 +173,7 @@ impl LeastSquares {
         }
         // Few measured values are zero, so that this costs next to nothing.
         let silent = measured.iter().enumerate().filter(|(_, y)| **y == 0.0);
-        self.idle += silent
+        self.zero_rows += silent
             .filter(|(i, _)| columns.iter().all(|column| column[*i] == 0.0))
             .count();
         let channel = channel % self.channels.len();
@@ -207,11 +207,11 @@ impl LeastSquares {
             });
         }
         other.reduce();
-        let (rows, idle) = (self.rows + other.rows, self.idle + other.idle);
-        for row in other.triangle.chunks_exact(n + 1) {
+        let (rows, idle) = (self.rows + other.rows, self.zero_rows + other.zero_rows);
+        for row in other.augmented_factor.chunks_exact(n + 1) {
             self.add_rows(&row[..n], &row[n..])?;
         }
-        (self.rows, self.idle) = (rows, idle);
+        (self.rows, self.zero_rows) = (rows, idle);
         Ok(())
     }
 
@@ -222,12 +222,12 @@ impl LeastSquares {
         for column in pending.block.chunks_exact_mut(stride) {
             column[pending.rows..rows].fill(0.0);
         }
-        let block = Block {
+        let block = HouseholderBlock {
             columns: &mut pending.block,
             stride,
             rows,
         };
-        fold(&mut self.triangle, block);
+        fold_into_factor(&mut self.augmented_factor, block);
         pending.rows = 0;
     }
 
@@ -239,16 +239,16 @@ impl LeastSquares {
     }
 
     /// The whole triangle `[R, Q'y; 0, +-|residual|]`, `(n + 1) x (n + 1)` by rows.
-    pub(crate) fn reduced(&self) -> Vec<f64> {
+    pub(crate) fn augmented_factor(&self) -> Vec<f64> {
         let mut complete = self.clone();
         complete.reduce();
-        complete.triangle
+        complete.augmented_factor
     }
 
     /// The triangle `R` of the regressor, `n x n`: same singular values, same column norms and
     /// same dependencies as the stacked regressor.
-    pub fn triangle(&self) -> DMatrix<f64> {
-        let (n, triangle) = (self.n_parameters, self.reduced());
+    pub fn r_factor(&self) -> DMatrix<f64> {
+        let (n, triangle) = (self.n_parameters, self.augmented_factor());
         DMatrix::from_fn(n, n, |i, j| triangle[i * (n + 1) + j])
     }
 
@@ -256,13 +256,13 @@ impl LeastSquares {
     /// undetermined directions keep the value 0 (in columns of equal norm: the shortest
     /// solution), and [`Solution::undetermined`] names them.
     /// Fails when there are no rows or no parameters.
-    pub fn solve(&self) -> Result<Solution, LeastSquaresError> {
+    pub fn solve(&self) -> Result<RegressionSolution, LeastSquaresError> {
         self.solve_near(&vec![0.0; self.n_parameters])
     }
 
     /// [`LeastSquares::solve`], but undetermined directions stay at `nominal`. Determined
     /// parameters do not depend on `nominal`.
-    pub fn solve_near(&self, nominal: &[f64]) -> Result<Solution, LeastSquaresError> {
+    pub fn solve_near(&self, nominal: &[f64]) -> Result<RegressionSolution, LeastSquaresError> {
         let n = self.n_parameters;
         if n == 0 {
             return Err(LeastSquaresError::NoParameters);
@@ -276,7 +276,7 @@ impl LeastSquares {
         if self.rows == 0 {
             return Err(LeastSquaresError::NoRows);
         }
-        solve_triangle(&self.reduced(), self.row_count(), nominal)
+        solve_r_factor(&self.augmented_factor(), self.row_count(), nominal)
     }
 }
 
@@ -285,7 +285,7 @@ mod tests {
     use nalgebra::DVector;
 
     use super::*;
-    use crate::test_noise::Noise;
+    use crate::test_noise::TestNoise;
 
     #[track_caller]
     fn near(actual: f64, expected: f64, relative: f64) {
@@ -298,7 +298,7 @@ mod tests {
     /// 1 to degree 6 in 1000 points, in one go and in odd pieces, against nalgebra's own QR.
     #[test]
     fn streaming_equals_a_dense_solution() {
-        let mut noise = Noise::new(1);
+        let mut noise = TestNoise::new(1);
         let (n, rows) = (7, 1003);
         let w = DMatrix::from_fn(rows, n, |i, j| {
             (i as f64 / 500.0 - 1.0).powi(i32::try_from(j).unwrap())
@@ -351,7 +351,7 @@ mod tests {
     /// Rows of three channels, of which the later ones do not see the first columns: by rows, by channels and by columns.
     #[test]
     fn channels_and_columns_reduce_to_the_same_triangle() {
-        let mut noise = Noise::new(6);
+        let mut noise = TestNoise::new(6);
         let (n, samples) = (11, 777);
         let sees = |channel: usize, j: usize| j >= 4 * channel;
         let w: Vec<f64> = (0..3 * samples * n)

@@ -6,12 +6,12 @@ const BITS: u32 = 17;
 
 /// Counts of magnitudes in bins of equal ratio.
 #[derive(Debug, Clone)]
-pub(crate) struct Magnitudes {
+pub(crate) struct MagnitudeHistogram {
     counts: Vec<u64>,
     total: u64,
 }
 
-impl Magnitudes {
+impl MagnitudeHistogram {
     pub(crate) fn new() -> Self {
         Self {
             counts: vec![0; 1 << BITS],
@@ -21,7 +21,7 @@ impl Magnitudes {
 
     /// Counts a magnitude, which is finite and not negative.
     pub(crate) fn add(&mut self, magnitude: f64) {
-        self.counts[bin(magnitude)] += 1;
+        self.counts[bin_of_magnitude(magnitude)] += 1;
         self.total += 1;
     }
 
@@ -37,7 +37,7 @@ impl Magnitudes {
         {
             let count = *count as f64;
             if before + count >= half {
-                let (low, high) = (edge(at), edge(at + 1));
+                let (low, high) = (bin_edge(at), bin_edge(at + 1));
                 return low + (high - low) * (half - before) / count;
             }
             before += count;
@@ -47,25 +47,25 @@ impl Magnitudes {
 }
 
 #[allow(clippy::cast_possible_truncation, reason = "18 bits at most")]
-fn bin(magnitude: f64) -> usize {
+fn bin_of_magnitude(magnitude: f64) -> usize {
     // The sign bit of a magnitude is zero.
     ((magnitude.to_bits() & (u64::MAX >> 1)) >> (63 - BITS)) as usize
 }
 
-fn edge(bin: usize) -> f64 {
+fn bin_edge(bin: usize) -> f64 {
     f64::from_bits((bin as u64) << (63 - BITS))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_noise::Noise;
+    use crate::test_noise::TestNoise;
 
     #[test]
     fn the_median_agrees_with_the_sorted_one() {
-        let mut noise = Noise::new(2);
+        let mut noise = TestNoise::new(2);
         for scale in [1e-9, 1.0, 3e7] {
-            let mut magnitudes = Magnitudes::new();
+            let mut magnitudes = MagnitudeHistogram::new();
             let mut all: Vec<f64> = (0..4001).map(|_| scale * noise.normal().abs()).collect();
             for x in &all {
                 magnitudes.add(*x);
@@ -73,6 +73,6 @@ mod tests {
             all.sort_by(f64::total_cmp);
             assert!((magnitudes.median() / all[2000] - 1.0).abs() < 5e-3);
         }
-        assert!(Magnitudes::new().median().abs() < f64::MIN_POSITIVE);
+        assert!(MagnitudeHistogram::new().median().abs() < f64::MIN_POSITIVE);
     }
 }

@@ -33,22 +33,22 @@ mod undetermined;
 mod weighted_rows;
 
 pub use body_matrices::{BodyMatrix, MatrixMap, planar_pseudo_inertia, pseudo_inertia};
-pub use deviations::{Deviations, FEWEST_ROWS, autocorrelated_deviations};
+pub use deviations::{ParameterUncertainty, FEWEST_ROWS, uncertainty_with_autocorrelation};
 pub use divergence::BaseMap;
 pub use error::{LeastSquaresError, PhysicalError};
-pub use essential::{Dropped, Essential, EssentialOptions, essential};
-pub use instruments::{Instrumented, instrumental};
+pub use essential::{DroppedParameter, EssentialParameters, EssentialOptions, select_essential};
+pub use instruments::{InstrumentalEstimate, estimate_with_instruments};
 pub use least_squares::LeastSquares;
 pub use numeric_rank::{
-    Dependency, NumericReduction, RegressorRank, condition_number, numeric_rank, reduce_numerically,
+    NumericDependency, NumericReduction, RegressorRank, condition_number, numeric_rank, reduce_numerically,
 };
 pub use physical::{NOMINAL_WEIGHT, PhysicalParameters, physical_parameters};
-pub use prior::{Belief, with_prior};
-pub use reweighted::{Estimate, EstimateOptions, HUBER_BOUND, estimate};
-pub use rows::Visit;
-pub use solution::{RANK_TOLERANCE, Solution};
-pub use triangle::Triangle;
-pub use undetermined::Direction;
-pub use weighted_rows::Weighting;
+pub use prior::{ParameterPrior, solve_with_prior};
+pub use reweighted::{WeightedEstimate, EstimateOptions, HUBER_BOUND, estimate};
+pub use rows::RowVisitor;
+pub use solution::{RANK_TOLERANCE, RegressionSolution};
+pub use triangle::RFactor;
+pub use undetermined::NullDirection;
+pub use weighted_rows::RowWeighting;
 
 pub(crate) use undetermined::null_directions;

@@ -34,14 +34,14 @@ pub struct NumericReduction {
     /// Columns kept, in ascending order; as many as the rank.
     pub kept: Vec<usize>,
     /// The other columns, in ascending order.
-    pub dependencies: Vec<Dependency>,
+    pub dependencies: Vec<NumericDependency>,
     /// Largest residual of a dependency, relative to the norm of its column.
     pub largest_residual: f64,
 }
 
 /// `column = sum of factor * kept column`; no factors for a column that is zero throughout.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Dependency {
+pub struct NumericDependency {
     /// The column that is not kept.
     pub column: usize,
     /// `(kept column, factor)`, without factors that are zero to rounding.
@@ -140,7 +140,7 @@ pub fn reduce_numerically(
                 }
             }
         }
-        dependencies.push(Dependency { column, factors });
+        dependencies.push(NumericDependency { column, factors });
     }
     Ok(NumericReduction {
         kept,
@@ -154,7 +154,7 @@ pub fn reduce_numerically(
 pub(crate) const NOISE_TOLERANCE: f64 = 1e-12;
 
 /// Sets norms that are rounding noise beside the largest one to zero.
-pub(crate) fn without_noise(norms: &mut [f64]) {
+pub(crate) fn zero_noise_columns(norms: &mut [f64]) {
     let largest = norms.iter().copied().fold(0.0, f64::max);
     for norm in norms {
         if *norm < NOISE_TOLERANCE * largest {
@@ -178,7 +178,7 @@ fn scale(w: &DMatrix<f64>) -> Result<(DMatrix<f64>, Vec<f64>), LeastSquaresError
         });
     }
     let mut norms: Vec<f64> = w.column_iter().map(|column| column.norm()).collect();
-    without_noise(&mut norms);
+    zero_noise_columns(&mut norms);
     let mut scaled = w.clone();
     for (mut column, norm) in scaled.column_iter_mut().zip(&norms) {
         if *norm > 0.0 {
@@ -211,11 +211,11 @@ fn singular_values(w: &DMatrix<f64>) -> Result<Vec<f64>, LeastSquaresError> {
 mod tests {
     use super::*;
     use crate::LeastSquares;
-    use crate::test_noise::Noise;
+    use crate::test_noise::TestNoise;
 
     /// Six columns of rank 3 in very different units, one of them zero.
     fn sample() -> DMatrix<f64> {
-        let mut noise = Noise::new(8);
+        let mut noise = TestNoise::new(8);
         let free = DMatrix::from_fn(80, 3, |_, _| noise.normal());
         DMatrix::from_fn(80, 6, |i, j| match j {
             0 => free[(i, 0)],
@@ -267,7 +267,7 @@ mod tests {
         }
         let (direct, streamed) = (
             numeric_rank(&w).unwrap(),
-            numeric_rank(&regression.triangle()).unwrap(),
+            numeric_rank(&regression.r_factor()).unwrap(),
         );
         assert_eq!(direct.rank, streamed.rank);
         for (a, b) in direct.singular_values.iter().zip(&streamed.singular_values) {
@@ -299,7 +299,7 @@ mod tests {
     /// A column of rounding noise was scaled to norm 1 and counted.
     #[test]
     fn rounding_noise_is_no_column() {
-        let mut noise = Noise::new(5);
+        let mut noise = TestNoise::new(5);
         let w = DMatrix::from_fn(80, 3, |_, j| noise.normal() * [1e3, 1e-4, 1e-13][j]);
         let rank = numeric_rank(&w).unwrap();
         assert_eq!(rank.rank, 2);

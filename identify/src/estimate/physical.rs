@@ -21,19 +21,19 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::estimate::body_matrices::{BodyMatrix, Reference};
-use crate::estimate::deviations::Deviations;
-use crate::estimate::divergence::{BaseMap, Misfit, step_scales};
+use crate::estimate::body_matrices::{BodyMatrix, NominalBodyMatrix};
+use crate::estimate::deviations::ParameterUncertainty;
+use crate::estimate::divergence::{BaseMap, MisfitFunction, step_scales};
 use crate::estimate::error::PhysicalError;
-use crate::estimate::prior::inflation;
-use crate::estimate::solution::Solution;
-use crate::estimate::triangle::Triangle;
+use crate::estimate::prior::variance_inflation;
+use crate::estimate::solution::RegressionSolution;
+use crate::estimate::triangle::RFactor;
 
 /// Weight of the nominal values in the end; see the module.
 pub const NOMINAL_WEIGHT: f64 = 0.01;
 
 /// Directions below this share of the largest singular value are told by rounding only.
-const WITHIN_SPAN: f64 = 1e-10;
+const SPAN_TOLERANCE: f64 = 1e-10;
 
 /// Physical parameters that are possible.
 #[derive(Debug, Clone, PartialEq)]
@@ -47,7 +47,7 @@ pub struct PhysicalParameters {
     pub from_recording: Vec<f64>,
     /// Whether the recording tells a parameter by itself. If not, it tells combinations of it with others only, and what
     /// bodies can be and nominal values of the others share them out.
-    pub alone: Vec<bool>,
+    pub individually_determined: Vec<bool>,
     /// The base parameters that follow.
     pub base: Vec<f64>,
     /// Their standard deviations.
@@ -63,14 +63,14 @@ pub struct PhysicalParameters {
 /// Possible physical parameters that fit the rows of `triangle`, whose solution and deviations are given, nearest to
 /// `nominal`, at which every body must be possible.
 pub fn physical_parameters(
-    triangle: &Triangle,
-    solution: &Solution,
-    deviations: &Deviations,
+    triangle: &RFactor,
+    solution: &RegressionSolution,
+    deviations: &ParameterUncertainty,
     nominal: &[f64],
     base: &BaseMap<'_>,
     bodies: &[BodyMatrix<'_>],
 ) -> Result<PhysicalParameters, PhysicalError> {
-    let noise = (solution.residual_variance() * inflation(solution, deviations)).sqrt();
+    let noise = (solution.residual_variance() * variance_inflation(solution, deviations)).sqrt();
     let least = 1e-7 * solution.measured_norm / (solution.rows.max(1) as f64).sqrt();
     let noise = if noise > least {
         noise
@@ -79,11 +79,11 @@ pub fn physical_parameters(
     };
     let references = bodies
         .iter()
-        .map(|body| Reference::new(body, nominal))
+        .map(|body| NominalBodyMatrix::new(body, nominal))
         .collect::<Result<Vec<_>, _>>()?;
-    let problem = Misfit {
+    let problem = MisfitFunction {
         r: triangle.r() / noise,
-        right: triangle.right() / noise,
+        right: triangle.right_side() / noise,
         base,
         bodies,
         references,
@@ -98,12 +98,12 @@ pub fn physical_parameters(
         iterations += problem.minimise(&mut x, weight)?;
     }
     // What is left open if nominal values may be off by their own size.
-    let point = problem.at(&x, 1.0).ok_or(PhysicalError::NoConvergence)?;
-    let inverse = invert(&(&point.data + &point.prior));
-    let before = invert(&point.prior);
+    let point = problem.evaluate_at(&x, 1.0).ok_or(PhysicalError::NoConvergence)?;
+    let inverse = pseudo_inverse(&(&point.data + &point.prior));
+    let before = pseudo_inverse(&point.prior);
     let (p, slopes) = base(x.as_slice());
     let spread = &slopes * &inverse * slopes.transpose();
-    let misfit = triangle.right() - triangle.r() * &p;
+    let misfit = triangle.right_side() - triangle.r() * &p;
     let n = nominal.len();
     Ok(PhysicalParameters {
         std: (0..n).map(|i| inverse[(i, i)].max(0.0).sqrt()).collect(),
@@ -116,8 +116,8 @@ pub fn physical_parameters(
                 }
             })
             .collect(),
-        alone: told_alone(&(&problem.r * &slopes)),
-        residual_norm: misfit.norm().hypot(triangle.corner()),
+        individually_determined: individually_determined(&(&problem.r * &slopes)),
+        residual_norm: misfit.norm().hypot(triangle.residual_norm()),
         base: p.iter().copied().collect(),
         base_std: spread
             .diagonal()
@@ -136,7 +136,7 @@ pub fn physical_parameters(
 }
 
 /// Which unknowns of linear equations have a value of their own: those whose unit vector lies in the span of the rows.
-fn told_alone(rows: &DMatrix<f64>) -> Vec<bool> {
+fn individually_determined(rows: &DMatrix<f64>) -> Vec<bool> {
     let mut scaled = rows.clone();
     for mut column in scaled.column_iter_mut() {
         let norm = column.norm();
@@ -151,7 +151,7 @@ fn told_alone(rows: &DMatrix<f64>) -> Vec<bool> {
     };
     let mut within = vec![0.0; rows.ncols()];
     for (direction, value) in span.row_iter().zip(svd.singular_values.iter()) {
-        if *value > WITHIN_SPAN * largest {
+        if *value > SPAN_TOLERANCE * largest {
             for (sum, component) in within.iter_mut().zip(direction.iter()) {
                 *sum += component * component;
             }
@@ -161,7 +161,7 @@ fn told_alone(rows: &DMatrix<f64>) -> Vec<bool> {
 }
 
 /// Inverse of a symmetric matrix where it has one; nothing is known along the rest, which is left away.
-fn invert(matrix: &DMatrix<f64>) -> DMatrix<f64> {
+fn pseudo_inverse(matrix: &DMatrix<f64>) -> DMatrix<f64> {
     let n = matrix.nrows();
     let scale = matrix
         .diagonal()
@@ -181,13 +181,13 @@ fn invert(matrix: &DMatrix<f64>) -> DMatrix<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::estimate::deviations::autocorrelated_deviations;
+    use crate::estimate::deviations::uncertainty_with_autocorrelation;
     use crate::estimate::{planar_pseudo_inertia, pseudo_inertia};
-    use crate::test_noise::Noise;
+    use crate::test_noise::TestNoise;
     use crate::{LeastSquares, LeastSquaresError};
 
     /// The pseudo-inertia of point masses: always possible, and exactly what a body is.
-    fn random_body(noise: &mut Noise) -> [f64; 10] {
+    fn random_body(noise: &mut TestNoise) -> [f64; 10] {
         let mut body = [0.0; 10];
         for _ in 0..6 {
             let m = noise.uniform();
@@ -234,7 +234,7 @@ mod tests {
     }
 
     fn case(seed: u64, sigma: f64) -> Case {
-        let mut noise = Noise::new(seed);
+        let mut noise = TestNoise::new(seed);
         let truth: Vec<f64> = [random_body(&mut noise), random_body(&mut noise)].concat();
         let nominal: Vec<f64> = [random_body(&mut noise), random_body(&mut noise)].concat();
         let map = DMatrix::from_fn(14, 20, |_, _| noise.normal());
@@ -269,12 +269,12 @@ mod tests {
             .collect()
     }
 
-    fn solved(case: &Case) -> (Triangle, Solution, Deviations) {
+    fn solved(case: &Case) -> (RFactor, RegressionSolution, ParameterUncertainty) {
         let solution = case.regression.solve().unwrap();
-        let deviations: Result<Deviations, LeastSquaresError> =
-            autocorrelated_deviations(&solution, 1, |visit| visit(&case.w, &case.y));
+        let deviations: Result<ParameterUncertainty, LeastSquaresError> =
+            uncertainty_with_autocorrelation(&solution, 1, |visit| visit(&case.w, &case.y));
         (
-            Triangle::new(&case.regression),
+            RFactor::new(&case.regression),
             solution,
             deviations.unwrap(),
         )
@@ -323,14 +323,14 @@ mod tests {
         let case = case(40, 3.0);
         let (triangle, solution, deviations) = solved(&case);
         let found = find(&case);
-        let noise = (solution.residual_variance() * inflation(&solution, &deviations)).sqrt();
-        let references: Vec<Reference> = bodies()
+        let noise = (solution.residual_variance() * variance_inflation(&solution, &deviations)).sqrt();
+        let references: Vec<NominalBodyMatrix> = bodies()
             .iter()
-            .map(|body| Reference::new(body, &case.nominal).unwrap())
+            .map(|body| NominalBodyMatrix::new(body, &case.nominal).unwrap())
             .collect();
         let objective = |x: &[f64]| -> f64 {
             let misfit = (triangle.r() * (&case.map * DVector::from_column_slice(x))
-                - triangle.right())
+                - triangle.right_side())
                 / noise;
             let prior: f64 = (0..2)
                 .map(|k| {
@@ -351,7 +351,7 @@ mod tests {
             0.5 * misfit.norm_squared() + NOMINAL_WEIGHT * prior
         };
         let best = objective(&found.parameters);
-        let mut random = Noise::new(9);
+        let mut random = TestNoise::new(9);
         for size in [1e-1, 1e-2, 1e-3, 1e-4] {
             for _ in 0..2000 {
                 let near: Vec<f64> = found
@@ -388,7 +388,7 @@ mod tests {
         }
         assert!(found.from_recording[..10].iter().all(|share| *share > 0.5));
         // Fourteen combinations of ten numbers tell each of them.
-        assert_eq!(found.alone, [[true; 10], [false; 10]].concat());
+        assert_eq!(found.individually_determined, [[true; 10], [false; 10]].concat());
     }
 
     /// Of `x + y` and `z` only the last has a value of its own, whatever nominal values say beside.
@@ -399,10 +399,10 @@ mod tests {
             4,
             &[1e3, 1e3, 0.0, 0.0, 2e3, 2e3, 1e-3, 0.0, 0.0, 0.0, 1e-3, 0.0],
         );
-        assert_eq!(told_alone(&rows), [false, false, true, false]);
-        assert_eq!(told_alone(&DMatrix::zeros(2, 2)), [false, false]);
+        assert_eq!(individually_determined(&rows), [false, false, true, false]);
+        assert_eq!(individually_determined(&DMatrix::zeros(2, 2)), [false, false]);
         // Fourteen combinations of twenty numbers tell none of them.
-        assert_eq!(find(&case(3, 0.05)).alone, [false; 20]);
+        assert_eq!(find(&case(3, 0.05)).individually_determined, [false; 20]);
     }
 
     #[test]
@@ -422,12 +422,12 @@ mod tests {
             matrix: Box::new(|x: &[f64]| planar_pseudo_inertia(x[0], [x[1], 0.0], x[2])),
             copies: 2.0,
         };
-        let error = Reference::new(&body, &[2.0, 1.0, 0.4]).err().unwrap();
+        let error = NominalBodyMatrix::new(&body, &[2.0, 1.0, 0.4]).err().unwrap();
         assert!(
             error.to_string().contains("link") && error.to_string().contains("inertia"),
             "{error}"
         );
-        let error = Reference::new(&body, &[0.0, 0.0, 0.4]).err().unwrap();
+        let error = NominalBodyMatrix::new(&body, &[0.0, 0.0, 0.4]).err().unwrap();
         assert!(error.to_string().contains("mass"), "{error}");
     }
 }

@@ -9,14 +9,14 @@
 
 use nalgebra::DMatrix;
 
-use crate::estimate::deviations::Deviations;
+use crate::estimate::deviations::ParameterUncertainty;
 use crate::estimate::error::LeastSquaresError;
-use crate::estimate::solution::Solution;
-use crate::estimate::triangle::Triangle;
+use crate::estimate::solution::RegressionSolution;
+use crate::estimate::triangle::RFactor;
 
 /// What is believed of one parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Belief {
+pub struct ParameterPrior {
     /// The parameter, by position.
     pub parameter: usize,
     /// Its value beforehand.
@@ -30,15 +30,15 @@ pub struct Belief {
 /// `solution` and `deviations` are those of `triangle` alone. Parameters without a belief that the rows do not determine
 /// stay at `nominal`. The residual norm and the condition numbers remain those of the measured rows.
 /// Fails when a list has the wrong length or a number is not finite.
-pub fn with_prior(
-    triangle: &Triangle,
-    solution: &Solution,
-    deviations: &Deviations,
+pub fn solve_with_prior(
+    triangle: &RFactor,
+    solution: &RegressionSolution,
+    deviations: &ParameterUncertainty,
     nominal: &[f64],
-    beliefs: &[Belief],
-) -> Result<(Solution, Deviations), LeastSquaresError> {
+    beliefs: &[ParameterPrior],
+) -> Result<(RegressionSolution, ParameterUncertainty), LeastSquaresError> {
     let n = triangle.n_parameters();
-    let noise = (solution.residual_variance() * inflation(solution, deviations)).sqrt();
+    let noise = (solution.residual_variance() * variance_inflation(solution, deviations)).sqrt();
     // Without residuals the recording is believed as far as rounding allows.
     let least = 1e-9 * solution.measured_norm / (solution.rows.max(1) as f64).sqrt();
     let noise = if noise > least {
@@ -76,8 +76,8 @@ pub fn with_prior(
         })
         .collect();
     after.covariance = covariance;
-    let misfit = triangle.right() - &r * nalgebra::DVector::from_column_slice(&found.values);
-    found.residual_norm = misfit.norm().hypot(triangle.corner());
+    let misfit = triangle.right_side() - &r * nalgebra::DVector::from_column_slice(&found.values);
+    found.residual_norm = misfit.norm().hypot(triangle.residual_norm());
     found.measured_norm = solution.measured_norm;
     found.condition_number = solution.condition_number;
     found.scaled_condition_number = solution.scaled_condition_number;
@@ -95,7 +95,7 @@ pub fn with_prior(
 }
 
 /// How much larger the variances are than for independent residuals: the median over the parameters, at least 1.
-pub(crate) fn inflation(solution: &Solution, deviations: &Deviations) -> f64 {
+pub(crate) fn variance_inflation(solution: &RegressionSolution, deviations: &ParameterUncertainty) -> f64 {
     let mut ratios: Vec<f64> = deviations
         .std
         .iter()

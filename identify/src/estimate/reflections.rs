@@ -7,7 +7,7 @@ use pulp::{Arch, Simd, WithSimd};
 pub(crate) const LANES: usize = 8;
 
 /// Columns of rows that are reduced together; `stride` numbers per column, a multiple of [`LANES`].
-pub(crate) struct Block<'a> {
+pub(crate) struct HouseholderBlock<'a> {
     /// Column after column.
     pub(crate) columns: &'a mut [f64],
     /// Numbers per column.
@@ -17,27 +17,27 @@ pub(crate) struct Block<'a> {
 }
 
 /// Folds a block into the row-major upper triangle of as many columns; the block is used up.
-pub(crate) fn fold(triangle: &mut [f64], block: Block<'_>) {
-    Arch::new().dispatch(Fold { triangle, block });
+pub(crate) fn fold_into_factor(triangle: &mut [f64], block: HouseholderBlock<'_>) {
+    Arch::new().dispatch(HouseholderFold { factor: triangle, block });
 }
 
-struct Fold<'a> {
-    triangle: &'a mut [f64],
-    block: Block<'a>,
+struct HouseholderFold<'a> {
+    factor: &'a mut [f64],
+    block: HouseholderBlock<'a>,
 }
 
-impl WithSimd for Fold<'_> {
+impl WithSimd for HouseholderFold<'_> {
     type Output = ();
 
     #[allow(clippy::inline_always, reason = "the trait's manual asks for it")]
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Block {
+        let HouseholderBlock {
             columns,
             stride,
             rows,
         } = self.block;
-        let triangle = self.triangle;
+        let triangle = self.factor;
         let width = columns.len() / stride;
         for k in 0..width {
             let (head, tail) = columns.split_at_mut((k + 1) * stride);

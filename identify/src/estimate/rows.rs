@@ -5,7 +5,7 @@ use crate::estimate::error::LeastSquaresError;
 /// One showing of a block of whole samples: regressor and measured values, as in
 /// [`LeastSquares::add_rows`](crate::LeastSquares::add_rows), rows interleaved per sample
 /// (`row = sample * channels + channel`).
-pub type Visit<'a> = dyn FnMut(&[f64], &[f64]) -> Result<(), LeastSquaresError> + 'a;
+pub type RowVisitor<'a> = dyn FnMut(&[f64], &[f64]) -> Result<(), LeastSquaresError> + 'a;
 
 /// Checks one block of rows; `before` rows came earlier.
 pub(crate) fn check_rows(
@@ -44,7 +44,7 @@ pub(crate) fn check_rows(
 }
 
 /// Whether a row was given the weight 0, or says nothing for another reason: its residual is no sample of any noise.
-pub(crate) fn is_left_out(row: &[f64], measured: f64) -> bool {
+pub(crate) fn is_uninformative(row: &[f64], measured: f64) -> bool {
     measured == 0.0 && row.iter().all(|w| *w == 0.0)
 }
 

@@ -4,8 +4,8 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::estimate::error::LeastSquaresError;
-use crate::estimate::numeric_rank::without_noise;
-use crate::estimate::undetermined::{Direction, null_directions};
+use crate::estimate::numeric_rank::zero_noise_columns;
+use crate::estimate::undetermined::{NullDirection, null_directions};
 
 /// Singular values of the column-scaled regressor below this fraction of the largest one count
 /// as zero. Rounding leaves about 1e-15; what is larger is information, however weak, and the
@@ -18,12 +18,12 @@ pub(crate) struct RowCount {
     /// All of them.
     pub(crate) shown: usize,
     /// Those that are not zero throughout: `0 = 0` is no equation, whatever the parameters.
-    pub(crate) telling: usize,
+    pub(crate) informative: usize,
 }
 
 /// What a regression found. Lists are in the order of the regressor's columns.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Solution {
+pub struct RegressionSolution {
     /// Parameters, in the units of measured value per unit of the column.
     pub values: Vec<f64>,
     /// Standard deviations under the classical assumption of independent residuals of equal
@@ -49,12 +49,12 @@ pub struct Solution {
     pub determined: Vec<bool>,
     /// Directions along which parameters may change without any effect on the rows;
     /// `n - rank` of them.
-    pub undetermined: Vec<Direction>,
+    pub undetermined: Vec<NullDirection>,
     /// Pseudo-inverse of `R`, so that `(W'W)^+ = r_inverse * r_inverse'`.
     pub(crate) r_inverse: DMatrix<f64>,
 }
 
-impl Solution {
+impl RegressionSolution {
     /// `(W'W)^+`, the classical covariance for residuals of variance 1.
     pub fn unit_covariance(&self) -> DMatrix<f64> {
         &self.r_inverse * self.r_inverse.transpose()
@@ -62,7 +62,7 @@ impl Solution {
 
     /// Takes the inverse and the classical deviations of another solution for the same parameters, which says how far
     /// values follow from gradients.
-    pub(crate) fn take_inverse_of(&mut self, other: Self) {
+    pub(crate) fn adopt_inverse(&mut self, other: Self) {
         self.r_inverse = other.r_inverse;
         self.classical_std = other.classical_std;
         for (mine, theirs) in self.determined.iter_mut().zip(other.determined) {
@@ -99,18 +99,18 @@ impl Solution {
 
 /// Solves the upper triangle `[R, Q'y; 0, +-|residual|]`, row-major, that so many rows left; where
 /// it does not determine the parameters they stay at `nominal`, whose length gives their number.
-pub(crate) fn solve_triangle(
+pub(crate) fn solve_r_factor(
     triangle: &[f64],
     rows: RowCount,
     nominal: &[f64],
-) -> Result<Solution, LeastSquaresError> {
+) -> Result<RegressionSolution, LeastSquaresError> {
     let n = nominal.len();
     let width = n + 1;
     let r = DMatrix::from_fn(n, n, |i, j| triangle[i * width + j]);
     let qty = DVector::from_fn(n, |i, _| triangle[i * width + n]);
     let corner = triangle[n * width + n];
     let mut norms: Vec<f64> = r.column_iter().map(|column| column.norm()).collect();
-    without_noise(&mut norms);
+    zero_noise_columns(&mut norms);
     let scaled = DMatrix::from_fn(n, n, |i, j| {
         if norms[j] > 0.0 {
             r[(i, j)] / norms[j]
@@ -171,14 +171,14 @@ pub(crate) fn solve_triangle(
         .clone()
         .try_svd(false, false, f64::EPSILON, 10_000)
         .ok_or(LeastSquaresError::NoConvergence)?;
-    let mut solution = Solution {
+    let mut solution = RegressionSolution {
         values: values.iter().copied().collect(),
         classical_std: Vec::new(),
         condition_number: ratio(&plain.singular_values),
         scaled_condition_number: ratio(s),
         residual_norm,
         measured_norm: qty.norm().hypot(corner),
-        rows: rows.telling,
+        rows: rows.informative,
         shown: rows.shown,
         rank,
         determined,

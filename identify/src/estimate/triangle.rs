@@ -4,24 +4,24 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::estimate::error::LeastSquaresError;
 use crate::estimate::least_squares::LeastSquares;
-use crate::estimate::solution::{RowCount, Solution, solve_triangle};
+use crate::estimate::solution::{RowCount, RegressionSolution, solve_r_factor};
 
 /// The upper triangle `[R, Q'y; 0, +-|residual|]` of some rows: all that they say about the parameters.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Triangle {
+pub struct RFactor {
     n: usize,
     rows: RowCount,
     /// `(n + 1) x (n + 1)` by rows.
     entries: Vec<f64>,
 }
 
-impl Triangle {
+impl RFactor {
     /// What a regression has reduced.
     pub fn new(regression: &LeastSquares) -> Self {
         Self {
             n: regression.n_parameters(),
             rows: regression.row_count(),
-            entries: regression.reduced(),
+            entries: regression.augmented_factor(),
         }
     }
 
@@ -57,7 +57,7 @@ impl Triangle {
             n,
             rows: RowCount {
                 shown: rows,
-                telling: rows,
+                informative: rows,
             },
             entries: whole,
         })
@@ -73,7 +73,7 @@ impl Triangle {
     }
 
     /// The triangle of the rows of both. Fails when the numbers of parameters differ.
-    pub fn merged(&self, other: &Self) -> Result<Self, LeastSquaresError> {
+    pub fn merge_with(&self, other: &Self) -> Result<Self, LeastSquaresError> {
         if self.n != other.n {
             return Err(LeastSquaresError::NominalLength {
                 have: other.n,
@@ -90,7 +90,7 @@ impl Triangle {
         Ok(Self {
             rows: RowCount {
                 shown: self.rows.shown + other.rows.shown,
-                telling: self.rows.telling + other.rows.telling,
+                informative: self.rows.informative + other.rows.informative,
             },
             ..Self::new(&regression)
         })
@@ -103,11 +103,11 @@ impl Triangle {
 
     /// Rows that were reduced, those of zeros left out.
     pub fn rows(&self) -> usize {
-        self.rows.telling
+        self.rows.informative
     }
 
     /// Says from how many rows the reduced ones came.
-    pub(crate) fn count_rows(&mut self, rows: RowCount) {
+    pub(crate) fn set_row_count(&mut self, rows: RowCount) {
         self.rows = rows;
     }
 
@@ -117,22 +117,22 @@ impl Triangle {
     }
 
     /// `Q'y`, `n` long.
-    pub fn right(&self) -> DVector<f64> {
+    pub fn right_side(&self) -> DVector<f64> {
         DVector::from_fn(self.n, |i, _| self.entries[i * (self.n + 1) + self.n])
     }
 
     /// The norm of the residual that no parameters can explain.
-    pub fn corner(&self) -> f64 {
+    pub fn residual_norm(&self) -> f64 {
         self.entries[self.entries.len() - 1].abs()
     }
 
     /// The solution; undetermined directions stay at `nominal`.
-    pub fn solve_near(&self, nominal: &[f64]) -> Result<Solution, LeastSquaresError> {
-        solve_triangle(&self.entries, self.rows, nominal)
+    pub fn solve_near(&self, nominal: &[f64]) -> Result<RegressionSolution, LeastSquaresError> {
+        solve_r_factor(&self.entries, self.rows, nominal)
     }
 
     /// The same rows for the differences of the parameters from some values.
-    pub(crate) fn from(&self, values: &[f64]) -> Self {
+    pub(crate) fn relative_to(&self, values: &[f64]) -> Self {
         let mut shifted = self.clone();
         for row in shifted.entries.chunks_exact_mut(self.n + 1) {
             let explained: f64 = row.iter().zip(values).map(|(w, value)| w * value).sum();
@@ -143,7 +143,7 @@ impl Triangle {
 
     /// The regression of some of the columns alone; the parameters of the others are 0.
     /// Fails when a column is not there.
-    pub fn only(&self, columns: &[usize]) -> Result<Self, LeastSquaresError> {
+    pub fn select_columns(&self, columns: &[usize]) -> Result<Self, LeastSquaresError> {
         let width = self.n + 1;
         let mut regression = LeastSquares::new(columns.len());
         for row in self.entries.chunks_exact(width) {
@@ -175,11 +175,11 @@ impl Triangle {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_noise::Noise;
+    use crate::test_noise::TestNoise;
 
     #[test]
     fn triangles_that_were_kept_add_to_that_of_all_rows() {
-        let mut noise = Noise::new(8);
+        let mut noise = TestNoise::new(8);
         let (n, rows) = (4, 90);
         let w: Vec<f64> = (0..n * rows).map(|_| noise.normal()).collect();
         let y: Vec<f64> = (0..rows).map(|_| noise.normal()).collect();
@@ -188,14 +188,14 @@ mod tests {
             regression
                 .add_rows(&w[from * n..to * n], &y[from..to])
                 .unwrap();
-            let triangle = Triangle::new(&regression);
-            Triangle::from_entries(n, triangle.rows(), &triangle.entries()).unwrap()
+            let triangle = RFactor::new(&regression);
+            RFactor::from_entries(n, triangle.rows(), &triangle.entries()).unwrap()
         };
         let [a, b, c] = [of(0, 20), of(20, 50), of(50, rows)];
         let all = of(0, rows).solve_near(&[0.0; 4]).unwrap();
         for merged in [
-            a.merged(&b).unwrap().merged(&c).unwrap(),
-            c.merged(&a).unwrap().merged(&b).unwrap(),
+            a.merge_with(&b).unwrap().merge_with(&c).unwrap(),
+            c.merge_with(&a).unwrap().merge_with(&b).unwrap(),
         ] {
             assert_eq!(merged.rows(), rows);
             let solved = merged.solve_near(&[0.0; 4]).unwrap();
@@ -204,7 +204,7 @@ mod tests {
                 assert!((solved.classical_std[k] - all.classical_std[k]).abs() < 1e-12);
             }
         }
-        assert!(Triangle::from_entries(3, rows, &a.entries()).is_err());
-        assert!(a.merged(&Triangle::new(&LeastSquares::new(3))).is_err());
+        assert!(RFactor::from_entries(3, rows, &a.entries()).is_err());
+        assert!(a.merge_with(&RFactor::new(&LeastSquares::new(3))).is_err());
     }
 }

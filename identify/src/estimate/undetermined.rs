@@ -6,12 +6,12 @@ use crate::words::with_digits;
 
 /// A change of the parameters that changes no row of the regressor.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Direction {
+pub struct NullDirection {
     /// `(parameter, change)`; the first has change 1, the others are ordered by parameter.
     pub changes: Vec<(usize, f64)>,
 }
 
-impl Direction {
+impl NullDirection {
     /// One sentence with the parameters' names; a parameter beyond the list is called `#index`.
     pub fn describe(&self, names: &[String]) -> String {
         let name = |i: usize| names.get(i).cloned().unwrap_or_else(|| format!("#{i}"));
@@ -39,7 +39,7 @@ impl Direction {
 }
 
 /// Entries of unit null vectors below this are rounding.
-const PARTICIPATES: f64 = 1e-6;
+const PARTICIPATION_TOLERANCE: f64 = 1e-6;
 
 /// Which parameters take part in no null vector, and a sparse basis of the null space.
 ///
@@ -48,10 +48,10 @@ const PARTICIPATES: f64 = 1e-6;
 pub(crate) fn null_directions(
     null_space: &DMatrix<f64>,
     norms: &[f64],
-) -> (Vec<bool>, Vec<Direction>) {
+) -> (Vec<bool>, Vec<NullDirection>) {
     let n = norms.len();
     let determined = (0..n)
-        .map(|j| null_space.column(j).norm() <= PARTICIPATES)
+        .map(|j| null_space.column(j).norm() <= PARTICIPATION_TOLERANCE)
         .collect();
     let mut basis = null_space.clone();
     let mut pivots: Vec<usize> = Vec::new();
@@ -66,7 +66,7 @@ pub(crate) fn null_directions(
             }
         }
         let (size, row, column) = best;
-        if size <= PARTICIPATES {
+        if size <= PARTICIPATION_TOLERANCE {
             break;
         }
         basis.swap_rows(step, row);
@@ -85,9 +85,9 @@ pub(crate) fn null_directions(
         .enumerate()
         .map(|(i, &pivot)| {
             let others = (0..n)
-                .filter(|&j| j != pivot && basis[(i, j)].abs() > PARTICIPATES)
+                .filter(|&j| j != pivot && basis[(i, j)].abs() > PARTICIPATION_TOLERANCE)
                 .map(|j| (j, basis[(i, j)] * norms[pivot] / norms[j]));
-            Direction {
+            NullDirection {
                 changes: std::iter::once((pivot, 1.0)).chain(others).collect(),
             }
         })

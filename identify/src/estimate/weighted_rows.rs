@@ -2,13 +2,13 @@
 
 use crate::estimate::error::LeastSquaresError;
 use crate::estimate::least_squares::LeastSquares;
-use crate::estimate::magnitudes::Magnitudes;
-use crate::estimate::rows::{Visit, is_left_out};
-use crate::estimate::solution::Solution;
+use crate::estimate::magnitudes::MagnitudeHistogram;
+use crate::estimate::rows::{RowVisitor, is_uninformative};
+use crate::estimate::solution::RegressionSolution;
 
 /// What each row was multiplied by in the end.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Weighting {
+pub struct RowWeighting {
     /// For each channel the scale of its residuals, in the units of the measured value (as shown).
     pub scales: Vec<f64>,
     /// Whether rows were divided by it.
@@ -20,7 +20,7 @@ pub struct Weighting {
     /// Solutions that were made.
     pub iterations: usize,
     /// Whether the last two agreed.
-    pub settled: bool,
+    pub converged: bool,
 }
 
 /// Which rows a reweighting makes.
@@ -33,16 +33,16 @@ pub(crate) enum WeightedRows {
 }
 
 /// The scale of each channel's residuals: standard deviation, or median magnitude for robust estimates.
-pub(crate) fn scales<E: From<LeastSquaresError>>(
-    solution: &Solution,
-    weighting: &Weighting,
-    show: &mut impl FnMut(&mut Visit<'_>) -> Result<(), E>,
+pub(crate) fn residual_scales<E: From<LeastSquaresError>>(
+    solution: &RegressionSolution,
+    weighting: &RowWeighting,
+    show: &mut impl FnMut(&mut RowVisitor<'_>) -> Result<(), E>,
 ) -> Result<Vec<f64>, E> {
     let channels = weighting.scales.len();
     let n = solution.values.len();
     let mut squares = vec![0.0; channels];
-    let mut medians: Vec<Magnitudes> = match weighting.huber {
-        Some(_) => vec![Magnitudes::new(); channels],
+    let mut medians: Vec<MagnitudeHistogram> = match weighting.huber {
+        Some(_) => vec![MagnitudeHistogram::new(); channels],
         None => Vec::new(),
     };
     let mut size = vec![0.0; channels];
@@ -52,7 +52,7 @@ pub(crate) fn scales<E: From<LeastSquaresError>>(
         for (row, y) in regressor.chunks_exact(n).zip(measured) {
             let channel = rows % channels;
             rows += 1;
-            if is_left_out(row, *y) {
+            if is_uninformative(row, *y) {
                 continue;
             }
             counts[channel] += 1;
@@ -83,12 +83,12 @@ pub(crate) fn scales<E: From<LeastSquaresError>>(
 }
 
 /// The regression of reweighted rows.
-pub(crate) fn reweighted<E: From<LeastSquaresError>>(
+pub(crate) fn reweight_rows<E: From<LeastSquaresError>>(
     values: &[f64],
     channels: usize,
-    weighting: &Weighting,
+    weighting: &RowWeighting,
     rows: WeightedRows,
-    show: &mut impl FnMut(&mut Visit<'_>) -> Result<(), E>,
+    show: &mut impl FnMut(&mut RowVisitor<'_>) -> Result<(), E>,
 ) -> Result<LeastSquares, E> {
     let mut regression = LeastSquares::with_channels(values.len(), channels);
     show_weighted(values, channels, weighting, rows, show, &mut |w, y| {
@@ -98,11 +98,11 @@ pub(crate) fn reweighted<E: From<LeastSquaresError>>(
 }
 
 /// The share of rows beyond Huber's bound.
-pub(crate) fn outliers<E: From<LeastSquaresError>>(
+pub(crate) fn outlier_share<E: From<LeastSquaresError>>(
     values: &[f64],
     channels: usize,
-    weighting: &Weighting,
-    show: &mut impl FnMut(&mut Visit<'_>) -> Result<(), E>,
+    weighting: &RowWeighting,
+    show: &mut impl FnMut(&mut RowVisitor<'_>) -> Result<(), E>,
 ) -> Result<f64, E> {
     let bound = weighting.huber.unwrap_or(f64::INFINITY);
     let (mut beyond, mut rows, mut counted) = (0_usize, 0_usize, 0_usize);
@@ -110,7 +110,7 @@ pub(crate) fn outliers<E: From<LeastSquaresError>>(
         for (row, y) in w.chunks_exact(values.len()).zip(y) {
             let scale = weighting.scales[rows % channels];
             rows += 1;
-            counted += usize::from(!is_left_out(row, *y));
+            counted += usize::from(!is_uninformative(row, *y));
             beyond += usize::from((y - dot(row, values)).abs() > bound * scale);
         }
         Ok(())
@@ -122,10 +122,10 @@ pub(crate) fn outliers<E: From<LeastSquaresError>>(
 pub(crate) fn show_weighted<E: From<LeastSquaresError>>(
     values: &[f64],
     channels: usize,
-    weighting: &Weighting,
+    weighting: &RowWeighting,
     rows: WeightedRows,
-    show: &mut impl FnMut(&mut Visit<'_>) -> Result<(), E>,
-    visit: &mut Visit<'_>,
+    show: &mut impl FnMut(&mut RowVisitor<'_>) -> Result<(), E>,
+    visit: &mut RowVisitor<'_>,
 ) -> Result<(), E> {
     if !weighting.by_channel && weighting.huber.is_none() {
         return show(visit);

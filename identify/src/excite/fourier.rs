@@ -17,7 +17,7 @@ use std::f64::consts::PI;
 /// assert_eq!(series.at(0.0), [1.0, 4.0, 0.0]);
 /// ```
 #[derive(Clone, Debug, PartialEq)]
-pub struct Series {
+pub struct FourierSeries {
     /// Mean value, rad or m.
     pub offset: f64,
     /// `mu_1, mu_2, ...`, rad/s or m/s.
@@ -28,9 +28,9 @@ pub struct Series {
     pub omega: f64,
 }
 
-impl Series {
+impl FourierSeries {
     /// Coordinate, rate and acceleration at a time in s.
-    pub fn at(&self, t: f64) -> [f64; 3] {
+    pub fn at_time(&self, t: f64) -> [f64; 3] {
         let mut motion = [self.offset, 0.0, 0.0];
         for (k, (mu, nu)) in self.mu.iter().zip(&self.nu).enumerate() {
             let w = (k + 1) as f64 * self.omega;
@@ -67,12 +67,12 @@ impl Series {
             })
             .collect();
         let negative: Vec<[f64; 2]> = terms.iter().map(|[c, s]| [-c, -s]).collect();
-        [mean - greatest(&negative), mean + greatest(&terms)]
+        [mean - upper_bound(&negative), mean + upper_bound(&terms)]
     }
 
     /// The same motion, larger or smaller around its mean value.
     #[must_use]
-    pub fn scaled(&self, factor: f64) -> Self {
+    pub fn scale_amplitude(&self, factor: f64) -> Self {
         let times = |list: &[f64]| list.iter().map(|x| factor * x).collect();
         Self {
             offset: self.offset,
@@ -87,7 +87,7 @@ impl Series {
 ///
 /// On an interval of width h the sum exceeds its greater end by at most `h^2/8` times a bound of its second
 /// derivative; intervals that could still matter are halved.
-fn greatest(terms: &[[f64; 2]]) -> f64 {
+fn upper_bound(terms: &[[f64; 2]]) -> f64 {
     let value = |x: f64| -> f64 {
         let harmonics = terms.iter().enumerate();
         harmonics
@@ -134,10 +134,10 @@ fn greatest(terms: &[[f64; 2]]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_noise::Noise;
+    use crate::test_noise::TestNoise;
 
-    fn random(noise: &mut Noise, n: usize) -> Series {
-        Series {
+    fn random(noise: &mut TestNoise, n: usize) -> FourierSeries {
+        FourierSeries {
             offset: noise.normal(),
             mu: (0..n).map(|_| noise.normal()).collect(),
             nu: (0..n).map(|_| noise.normal()).collect(),
@@ -147,13 +147,13 @@ mod tests {
 
     #[test]
     fn extremes_hold_every_value_and_are_reached() {
-        let mut noise = Noise::new(7);
+        let mut noise = TestNoise::new(7);
         for n in 1..=7 {
             let series = random(&mut noise, n);
             for derivative in 0..3 {
                 let [low, high] = series.extremes(derivative);
                 let values: Vec<f64> = (0..200_000)
-                    .map(|i| series.at(series.period() * f64::from(i) / 200_000.0)[derivative])
+                    .map(|i| series.at_time(series.period() * f64::from(i) / 200_000.0)[derivative])
                     .collect();
                 let least = values.iter().copied().fold(f64::INFINITY, f64::min);
                 let greatest = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -166,11 +166,11 @@ mod tests {
 
     #[test]
     fn rates_are_derivatives() {
-        let series = random(&mut Noise::new(3), 5);
+        let series = random(&mut TestNoise::new(3), 5);
         let step = 1e-5;
         for i in 0..20 {
             let t = 0.1 * f64::from(i);
-            let (before, now, after) = (series.at(t - step), series.at(t), series.at(t + step));
+            let (before, now, after) = (series.at_time(t - step), series.at_time(t), series.at_time(t + step));
             for d in 0..2 {
                 let slope = (after[d] - before[d]) / (2.0 * step);
                 assert!((slope - now[d + 1]).abs() < 1e-6);

@@ -4,20 +4,20 @@ use std::cell::Cell;
 
 use nalgebra::DMatrix;
 
-use super::{CoordinateLimits, Criterion, Motion, Options, Plant, Series, samples};
+use super::{ExcitationLimits, ExcitationCriterion, ExcitationMotion, Options, ExcitationPlant, FourierSeries, samples_per_period};
 
 /// A plant with limits and options, counting evaluations.
-pub(super) struct Measure<'a> {
-    pub(super) plant: &'a dyn Plant,
-    pub(super) limits: &'a [CoordinateLimits],
+pub(super) struct TrajectoryEvaluator<'a> {
+    pub(super) plant: &'a dyn ExcitationPlant,
+    pub(super) limits: &'a [ExcitationLimits],
     pub(super) options: &'a Options,
     evaluations: Cell<usize>,
 }
 
-impl<'a> Measure<'a> {
+impl<'a> TrajectoryEvaluator<'a> {
     pub(super) fn new(
-        plant: &'a dyn Plant,
-        limits: &'a [CoordinateLimits],
+        plant: &'a dyn ExcitationPlant,
+        limits: &'a [ExcitationLimits],
         options: &'a Options,
     ) -> Self {
         Self {
@@ -36,32 +36,32 @@ impl<'a> Measure<'a> {
         2.0 * std::f64::consts::PI / self.options.period
     }
 
-    pub(super) fn motion(&self, series: &[Series]) -> Motion {
-        Motion::sample(series, samples(self.options))
+    pub(super) fn sample_motion(&self, series: &[FourierSeries]) -> ExcitationMotion {
+        ExcitationMotion::sample(series, samples_per_period(self.options))
     }
 
     /// The criterion, the smaller the better; infinite where the mechanism cannot follow, columns are dependent, or effects
     /// are the same.
     /// For the condition number it is its logarithm, which is smoother to search on.
-    pub(super) fn value(&self, motion: &Motion) -> f64 {
+    pub(super) fn criterion_value(&self, motion: &ExcitationMotion) -> f64 {
         self.evaluations.set(self.evaluations.get() + 1);
-        if self.options.criterion == Criterion::Separation {
+        if self.options.criterion == ExcitationCriterion::Separation {
             // Lengths of zero have no logarithm.
-            let apart = self.plant.apart(motion).filter(|apart| *apart > 0.0);
+            let apart = self.plant.separation(motion).filter(|apart| *apart > 0.0);
             return apart.map_or(f64::INFINITY, |apart| -apart.ln());
         }
         let Some(w) = self.plant.regressor(motion) else {
             return f64::INFINITY;
         };
         match self.options.criterion {
-            Criterion::Condition => condition_number(&w).ln(),
-            Criterion::LogDet | Criterion::Separation => log_det(&w),
+            ExcitationCriterion::Condition => condition_number(&w).ln(),
+            ExcitationCriterion::LogDet | ExcitationCriterion::Separation => log_det(&w),
         }
     }
 
     /// Limits of the coordinates as `(coordinate, derivative, range)`.
     pub(super) fn ranges(&self) -> Vec<(usize, usize, [f64; 2])> {
-        let of_one = |(i, limits): (usize, &CoordinateLimits)| {
+        let of_one = |(i, limits): (usize, &ExcitationLimits)| {
             let all = [Some(limits.position), limits.rate, limits.acceleration];
             let given = all.into_iter().enumerate();
             given
@@ -73,30 +73,30 @@ impl<'a> Measure<'a> {
 }
 
 /// Half the width of a range.
-pub(super) fn half([low, high]: [f64; 2]) -> f64 {
+pub(super) fn half_width([low, high]: [f64; 2]) -> f64 {
     0.5 * (high - low)
 }
 
 /// By how much a value exceeds a range, as a share of half of it: -1 in the middle, 0 at the ends.
 pub(super) fn excess(value: f64, range: [f64; 2]) -> f64 {
-    (value - 0.5 * (range[0] + range[1])).abs() / half(range) - 1.0
+    (value - 0.5 * (range[0] + range[1])).abs() / half_width(range) - 1.0
 }
 
 /// Largest over smallest singular value of a matrix as it is, in its units: eq. (13) of the paper with the 2-norm.
 pub fn condition_number(w: &DMatrix<f64>) -> f64 {
-    ratio(&triangle(w).singular_values())
+    singular_value_ratio(&r_factor(w).singular_values())
 }
 
 /// The same with all columns scaled to norm 1, hence free of units.
 pub fn scaled_condition_number(w: &DMatrix<f64>) -> f64 {
-    let mut r = triangle(w);
+    let mut r = r_factor(w);
     for mut column in r.column_iter_mut() {
         let norm = column.norm();
         if norm > 0.0 {
             column.unscale_mut(norm);
         }
     }
-    ratio(&r.singular_values())
+    singular_value_ratio(&r.singular_values())
 }
 
 /// The least singular value of a small matrix, given by its rows; those that are zero throughout do not count.
@@ -123,7 +123,7 @@ pub fn least_singular_value(rows: &[Vec<f64>]) -> f64 {
     least.max(0.0).sqrt()
 }
 
-fn ratio(singular: &nalgebra::DVector<f64>) -> f64 {
+fn singular_value_ratio(singular: &nalgebra::DVector<f64>) -> f64 {
     let (least, greatest) = (singular.min(), singular.max());
     if least > f64::EPSILON * greatest {
         greatest / least
@@ -133,13 +133,13 @@ fn ratio(singular: &nalgebra::DVector<f64>) -> f64 {
 }
 
 fn log_det(w: &DMatrix<f64>) -> f64 {
-    let singular = triangle(w).singular_values();
+    let singular = r_factor(w).singular_values();
     let rows = w.nrows() as f64;
     let logarithms = singular.iter().map(|s| -(s * s / rows).ln());
     logarithms.sum()
 }
 
 /// The triangle of a QR decomposition, which has the singular values of the matrix.
-fn triangle(w: &DMatrix<f64>) -> DMatrix<f64> {
+fn r_factor(w: &DMatrix<f64>) -> DMatrix<f64> {
     w.clone().qr().r()
 }

@@ -21,12 +21,12 @@ use std::fmt;
 
 use nalgebra::DMatrix;
 
-pub use fourier::Series;
+pub use fourier::FourierSeries;
 pub use measure::{condition_number, least_singular_value, scaled_condition_number};
 
 /// Motion of all active coordinates, `[coordinate][sample]`.
 #[derive(Clone, Debug, Default)]
-pub struct Motion {
+pub struct ExcitationMotion {
     /// rad or m
     pub q: Vec<Vec<f64>>,
     /// rad/s or m/s
@@ -35,15 +35,15 @@ pub struct Motion {
     pub qdd: Vec<Vec<f64>>,
 }
 
-impl Motion {
+impl ExcitationMotion {
     /// Series sampled at equal steps over one period, without its end, which is its beginning.
-    pub fn sample(series: &[Series], samples: usize) -> Self {
+    pub fn sample(series: &[FourierSeries], samples: usize) -> Self {
         let mut motion = Self::default();
         for one in series {
             let step = one.period() / samples as f64;
             let mut columns = [0, 1, 2].map(|_| Vec::with_capacity(samples));
             for i in 0..samples {
-                for (column, value) in columns.iter_mut().zip(one.at(i as f64 * step)) {
+                for (column, value) in columns.iter_mut().zip(one.at_time(i as f64 * step)) {
                     column.push(value);
                 }
             }
@@ -57,28 +57,28 @@ impl Motion {
 }
 
 /// The mechanism, as far as excitation must know it.
-pub trait Plant {
+pub trait ExcitationPlant {
     /// The regressor along a motion: rows of samples and drives, columns of base parameters; `None` where the
     /// mechanism cannot follow.
-    fn regressor(&self, motion: &Motion) -> Option<DMatrix<f64>>;
+    fn regressor(&self, motion: &ExcitationMotion) -> Option<DMatrix<f64>>;
 
     /// Names of limits beyond those of coordinates, in the order of [`Plant::excess`].
     fn limits(&self) -> Vec<String>;
 
     /// For each of [`Plant::limits`] and each sample, by how much it is exceeded, as a share of half its range:
     /// negative inside, -1 in the middle; `None` where the mechanism cannot follow.
-    fn excess(&self, motion: &Motion) -> Option<Vec<Vec<f64>>>;
+    fn excess(&self, motion: &ExcitationMotion) -> Option<Vec<Vec<f64>>>;
 
     /// For [`Criterion::Separation`], by how much effects can be told apart along a motion, such as a force in root mean
     /// squares; `None` where the mechanism cannot follow, and for plants that are not asked to tell any apart.
-    fn apart(&self, _motion: &Motion) -> Option<f64> {
+    fn separation(&self, _motion: &ExcitationMotion) -> Option<f64> {
         None
     }
 }
 
 /// Limits of one active coordinate, `[low, high]`.
 #[derive(Clone, Debug, PartialEq)]
-pub struct CoordinateLimits {
+pub struct ExcitationLimits {
     /// What messages call it.
     pub name: String,
     /// rad or m
@@ -91,7 +91,7 @@ pub struct CoordinateLimits {
 
 /// What is made small.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub enum Criterion {
+pub enum ExcitationCriterion {
     /// The condition number of the stacked regressor in its units, eq. (13).
     #[default]
     Condition,
@@ -109,7 +109,7 @@ pub struct Options {
     /// Period, s.
     pub period: f64,
     /// What is made small.
-    pub criterion: Criterion,
+    pub criterion: ExcitationCriterion,
     /// Random feasible trajectories that are tried first.
     pub random: usize,
     /// How many of them the search starts from.
@@ -125,7 +125,7 @@ impl Default for Options {
         Self {
             harmonics: 7,
             period: 7.29,
-            criterion: Criterion::Condition,
+            criterion: ExcitationCriterion::Condition,
             random: 1000,
             starts: 4,
             steps: 150,
@@ -136,30 +136,30 @@ impl Default for Options {
 
 /// A trajectory that was found.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Excitation {
+pub struct ExcitationTrajectory {
     /// One series for each active coordinate.
-    pub series: Vec<Series>,
+    pub series: Vec<FourierSeries>,
     /// Value of the criterion: the logarithm of the condition number, `-log det`, or `-log` of what is apart.
     pub value: f64,
     /// The same for the best of the random trajectories.
-    pub first: f64,
+    pub start_value: f64,
     /// Condition number of the regressor, eq. (13), at [`samples`] steps over the period.
     pub condition_number: f64,
     /// The same for the best of the random trajectories.
-    pub start: f64,
+    pub start_condition_number: f64,
     /// Random trajectories that kept the limits.
-    pub random: usize,
+    pub feasible_starts: usize,
     /// Trajectories for which the regressor was evaluated.
     pub evaluations: usize,
     /// Value of the criterion where each search ended, the best first.
-    pub ends: Vec<f64>,
+    pub end_values: Vec<f64>,
     /// How close the trajectory comes to each limit.
-    pub margins: Vec<Margin>,
+    pub margins: Vec<LimitMargin>,
 }
 
 /// How close a trajectory comes to a limit.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Margin {
+pub struct LimitMargin {
     /// Which limit.
     pub name: String,
     /// The largest excess over a period, as a share of half the range: not above 0 where the limit is kept.
@@ -175,9 +175,9 @@ pub enum ExciteError {
     /// No random trajectory kept the limits.
     NoStart {
         /// How many were tried.
-        tried: usize,
+        attempts: usize,
         /// The limit that was exceeded most often, if it is not that the mechanism could not follow.
-        most: Option<String>,
+        most_exceeded: Option<String>,
     },
     /// There are no base parameters or no coordinates.
     NothingToExcite,
@@ -190,7 +190,7 @@ pub enum ExciteError {
 impl fmt::Display for ExciteError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::NoStart { tried, most } => {
+            Self::NoStart { attempts: tried, most_exceeded: most } => {
                 write!(f, "none of {tried} random trajectories kept the limits: ")?;
                 match most {
                     Some(name) => write!(f, "`{name}` was exceeded most often; widen it"),
@@ -216,37 +216,37 @@ impl std::error::Error for ExciteError {}
 
 /// Samples over a period from which criteria and limits of the plant are computed in the search: 16 for the shortest
 /// wave, but no fewer than 128.
-pub fn samples(options: &Options) -> usize {
+pub fn samples_per_period(options: &Options) -> usize {
     (16 * options.harmonics).max(128)
 }
 
 /// Whether a search goes on.
-pub type Flow = std::ops::ControlFlow<()>;
+pub type SearchFlow = std::ops::ControlFlow<()>;
 
 /// Finds a trajectory; `progress` is told of each step out of [`steps`] and says whether to go on. A search that is stopped ends
 /// soon, with what it has or an error.
 pub fn excite(
-    plant: &dyn Plant,
-    limits: &[CoordinateLimits],
+    plant: &dyn ExcitationPlant,
+    limits: &[ExcitationLimits],
     options: &Options,
-    progress: &dyn Fn(usize) -> Flow,
-) -> Result<Excitation, ExciteError> {
+    progress: &dyn Fn(usize) -> SearchFlow,
+) -> Result<ExcitationTrajectory, ExciteError> {
     if limits.is_empty() {
         return Err(ExciteError::NothingToExcite);
     }
-    let measure = measure::Measure::new(plant, limits, options);
-    let drawn = random::draw(&measure, progress)?;
-    let mut found: Vec<(f64, Vec<Series>)> = Vec::new();
+    let measure = measure::TrajectoryEvaluator::new(plant, limits, options);
+    let drawn = random::draw_starts(&measure, progress)?;
+    let mut found: Vec<(f64, Vec<FourierSeries>)> = Vec::new();
     for start in drawn.best.iter().take(options.starts) {
         let end = search::improve(&measure, &start.1, progress);
-        found.extend(feasible::within(&measure, &end));
+        found.extend(feasible::shrink_to_limits(&measure, &end));
     }
     found.sort_by(|a, b| a.0.total_cmp(&b.0));
     found.truncate(options.starts);
-    let polished = found.len().min(POLISHED);
+    let polished = found.len().min(POLISHED_ENDS);
     for k in 0..polished {
         let end = search::polish(&measure, &found[k].1, progress);
-        found.extend(feasible::within(&measure, &end));
+        found.extend(feasible::shrink_to_limits(&measure, &end));
     }
     // The start itself is an answer, should no search do better.
     let first = drawn.best[0].clone();
@@ -254,20 +254,20 @@ pub fn excite(
     found.sort_by(|a, b| a.0.total_cmp(&b.0));
     let ends = found.iter().map(|(value, _)| *value).collect();
     let (value, series) = found.swap_remove(0);
-    let condition = |series: &[Series]| {
-        let motion = Motion::sample(series, samples(options));
+    let condition = |series: &[FourierSeries]| {
+        let motion = ExcitationMotion::sample(series, samples_per_period(options));
         plant
             .regressor(&motion)
             .map_or(f64::INFINITY, |w| condition_number(&w))
     };
-    Ok(Excitation {
+    Ok(ExcitationTrajectory {
         condition_number: condition(&series),
-        start: condition(&first.1),
+        start_condition_number: condition(&first.1),
         value,
-        first: first.0,
-        random: drawn.feasible,
+        start_value: first.0,
+        feasible_starts: drawn.feasible,
         evaluations: measure.evaluations(),
-        ends,
+        end_values: ends,
         margins: feasible::margins(&measure, &series),
         series,
     })
@@ -275,29 +275,29 @@ pub fn excite(
 
 /// Random motions within the limits, as a search would start from.
 pub fn random_motions(
-    plant: &dyn Plant,
-    limits: &[CoordinateLimits],
+    plant: &dyn ExcitationPlant,
+    limits: &[ExcitationLimits],
     options: &Options,
     wanted: usize,
-) -> Result<Vec<Motion>, ExciteError> {
+) -> Result<Vec<ExcitationMotion>, ExciteError> {
     if limits.is_empty() {
         return Err(ExciteError::NothingToExcite);
     }
-    let measure = measure::Measure::new(plant, limits, options);
+    let measure = measure::TrajectoryEvaluator::new(plant, limits, options);
     let mut motions = Vec::new();
-    let mut draws = random::Draws(options.seed);
-    random::feasible_ones(&measure, &mut draws, wanted, |series| {
-        motions.push(measure.motion(&series));
-        Flow::Continue(())
+    let mut draws = random::TrajectoryRandom(options.seed);
+    random::draw_feasible(&measure, &mut draws, wanted, |series| {
+        motions.push(measure.sample_motion(&series));
+        SearchFlow::Continue(())
     })?;
     Ok(motions)
 }
 
 /// Ends of searches that are polished.
-const POLISHED: usize = 2;
+const POLISHED_ENDS: usize = 2;
 
 /// Steps that `progress` of [`excite`] is told of, at most.
-pub fn steps(options: &Options) -> usize {
-    let rounds = options.starts + POLISHED * search::POLISHES;
+pub fn max_progress_steps(options: &Options) -> usize {
+    let rounds = options.starts + POLISHED_ENDS * search::POLISHES;
     options.random + rounds * options.steps
 }

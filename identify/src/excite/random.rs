@@ -1,13 +1,13 @@
 //! Random trajectories that keep the limits, as large as the limits let them be.
 
-use super::feasible::{reach, worst};
-use super::measure::{Measure, half};
-use super::{Criterion, ExciteError, Flow, Series};
+use super::feasible::{max_scale_factor, worst_plant_limit};
+use super::measure::{TrajectoryEvaluator, half_width};
+use super::{ExcitationCriterion, ExciteError, SearchFlow, FourierSeries};
 
 /// Trajectories that kept the limits.
-pub(super) struct Drawn {
+pub(super) struct FeasibleStarts {
     /// The best of them with their values, the best first.
-    pub(super) best: Vec<(f64, Vec<Series>)>,
+    pub(super) best: Vec<(f64, Vec<FourierSeries>)>,
     /// How many there were.
     pub(super) feasible: usize,
 }
@@ -18,19 +18,19 @@ const PATIENCE: usize = 20;
 const SHRINKS: usize = 12;
 
 /// Draws as many as the options say.
-pub(super) fn draw(
-    measure: &Measure<'_>,
-    progress: &dyn Fn(usize) -> Flow,
-) -> Result<Drawn, ExciteError> {
+pub(super) fn draw_starts(
+    measure: &TrajectoryEvaluator<'_>,
+    progress: &dyn Fn(usize) -> SearchFlow,
+) -> Result<FeasibleStarts, ExciteError> {
     let wanted = measure.options.random.max(1);
-    let mut draws = Draws(measure.options.seed);
-    let mut drawn: Vec<(f64, Vec<Series>)> = Vec::new();
+    let mut draws = TrajectoryRandom(measure.options.seed);
+    let mut drawn: Vec<(f64, Vec<FourierSeries>)> = Vec::new();
     let mut feasible = 0;
     let mut stopped = false;
-    feasible_ones(measure, &mut draws, wanted, |series| {
+    draw_feasible(measure, &mut draws, wanted, |series| {
         feasible += 1;
         let flow = progress(1);
-        let value = measure.value(&measure.motion(&series));
+        let value = measure.criterion_value(&measure.sample_motion(&series));
         if value.is_finite() {
             drawn.push((value, series));
         }
@@ -38,7 +38,7 @@ pub(super) fn draw(
         flow
     })?;
     if drawn.is_empty() {
-        return Err(nothing(measure));
+        return Err(no_start_error(measure));
     }
     drawn.sort_by(|a, b| a.0.total_cmp(&b.0));
     // A search polishes each of them; before that, they must hold between samples too.
@@ -47,44 +47,44 @@ pub(super) fn draw(
     } else {
         4 * measure.options.starts.max(1)
     });
-    let kept: Vec<(f64, Vec<Series>)> = drawn
+    let kept: Vec<(f64, Vec<FourierSeries>)> = drawn
         .into_iter()
-        .filter_map(|(_, series)| super::feasible::within(measure, &series))
+        .filter_map(|(_, series)| super::feasible::shrink_to_limits(measure, &series))
         .collect();
     let mut best = kept;
     best.sort_by(|a, b| a.0.total_cmp(&b.0));
     if best.is_empty() {
-        return Err(nothing(measure));
+        return Err(no_start_error(measure));
     }
-    Ok(Drawn { best, feasible })
+    Ok(FeasibleStarts { best, feasible })
 }
 
 /// Why no trajectory is worth anything.
-fn nothing(measure: &Measure<'_>) -> ExciteError {
+fn no_start_error(measure: &TrajectoryEvaluator<'_>) -> ExciteError {
     match measure.options.criterion {
-        Criterion::Separation => ExciteError::Inseparable,
-        Criterion::Condition | Criterion::LogDet => ExciteError::Deficient,
+        ExcitationCriterion::Separation => ExciteError::Inseparable,
+        ExcitationCriterion::Condition | ExcitationCriterion::LogDet => ExciteError::Deficient,
     }
 }
 
 /// Draws trajectories until as many as are wanted have kept the limits, patience ends, or `take` says that it is enough; an error if none has.
-pub(super) fn feasible_ones(
-    measure: &Measure<'_>,
-    draws: &mut Draws,
+pub(super) fn draw_feasible(
+    measure: &TrajectoryEvaluator<'_>,
+    draws: &mut TrajectoryRandom,
     wanted: usize,
-    mut take: impl FnMut(Vec<Series>) -> Flow,
+    mut take: impl FnMut(Vec<FourierSeries>) -> SearchFlow,
 ) -> Result<(), ExciteError> {
     let names = measure.plant.limits();
     let mut blame = vec![0_usize; names.len()];
     let (mut tried, mut feasible) = (0, 0);
-    let mut flow = Flow::Continue(());
+    let mut flow = SearchFlow::Continue(());
     while flow.is_continue() && feasible < wanted && tried < PATIENCE * wanted {
         tried += 1;
-        let mut series: Vec<Series> = (0..measure.limits.len())
-            .map(|i| one(measure, i, draws))
+        let mut series: Vec<FourierSeries> = (0..measure.limits.len())
+            .map(|i| draw_series(measure, i, draws))
             .collect();
         for _ in 0..SHRINKS {
-            match worst(measure, &series, super::samples(measure.options)) {
+            match worst_plant_limit(measure, &series, super::samples_per_period(measure.options)) {
                 Some((_, excess)) if excess <= 0.0 => {
                     feasible += 1;
                     flow = take(series);
@@ -93,7 +93,7 @@ pub(super) fn feasible_ones(
                 Some((k, _)) if k < blame.len() => blame[k] += 1,
                 _ => {}
             }
-            series = series.iter().map(|s| s.scaled(0.8)).collect();
+            series = series.iter().map(|s| s.scale_amplitude(0.8)).collect();
         }
     }
     if feasible > 0 {
@@ -101,35 +101,35 @@ pub(super) fn feasible_ones(
     }
     let most = (0..names.len()).max_by_key(|k| blame[*k]);
     Err(ExciteError::NoStart {
-        tried,
-        most: most.filter(|k| blame[*k] > 0).map(|k| names[k].clone()),
+        attempts: tried,
+        most_exceeded: most.filter(|k| blame[*k] > 0).map(|k| names[k].clone()),
     })
 }
 
 /// A series of one coordinate that fills the tightest of its limits, around a mean value that leaves it room.
-fn one(measure: &Measure<'_>, i: usize, draws: &mut Draws) -> Series {
+fn draw_series(measure: &TrajectoryEvaluator<'_>, i: usize, draws: &mut TrajectoryRandom) -> FourierSeries {
     let n = measure.options.harmonics;
     let omega = measure.omega();
     let [low, high] = measure.limits[i].position;
-    let shape = Series {
+    let shape = FourierSeries {
         offset: 0.0,
         mu: (0..n).map(|_| draws.normal()).collect(),
         nu: (0..n).map(|_| draws.normal()).collect(),
         omega,
     };
     let [least, greatest] = shape.extremes(0);
-    let by_position = 2.0 * half([low, high]) / (greatest - least);
-    let factor = reach(&measure.limits[i], &shape).min(by_position);
-    let mut series = shape.scaled(factor);
-    let room = (2.0 * half([low, high]) - factor * (greatest - least)).max(0.0);
+    let by_position = 2.0 * half_width([low, high]) / (greatest - least);
+    let factor = max_scale_factor(&measure.limits[i], &shape).min(by_position);
+    let mut series = shape.scale_amplitude(factor);
+    let room = (2.0 * half_width([low, high]) - factor * (greatest - least)).max(0.0);
     series.offset = low - factor * least + room * draws.uniform();
     series
 }
 
 /// Random numbers that are the same on every machine (Steele et al., `SplitMix`, 2014).
-pub(super) struct Draws(pub(super) u64);
+pub(super) struct TrajectoryRandom(pub(super) u64);
 
-impl Draws {
+impl TrajectoryRandom {
     /// Between 0 and 1.
     fn uniform(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);

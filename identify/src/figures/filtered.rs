@@ -7,9 +7,9 @@
 use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 
-use super::{Comparison, Figures};
-use crate::motion::{is_even, mean_rate, on_even_times};
-use crate::signal::{FilterError, LowPass, count};
+use super::{ErrorAccumulator, ErrorFigures};
+use crate::motion::{is_even, mean_rate, resample_evenly};
+use crate::signal::{FilterError, LowPass, float_to_count};
 
 /// Order of the low-pass in one direction.
 const ORDER: usize = 4;
@@ -28,12 +28,12 @@ pub struct FilteredFigures {
     /// Samples that count.
     pub samples: usize,
     /// The figures of each channel.
-    pub channels: IndexMap<String, InBand>,
+    pub channels: IndexMap<String, FilteredChannelFigures>,
 }
 
 /// The figures of one channel after a low-pass.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct InBand {
+pub struct FilteredChannelFigures {
     /// Relative error; absent when nothing but zero was measured.
     pub nrms: Option<f64>,
     /// Root mean square of the error, in the unit of the force.
@@ -42,9 +42,9 @@ pub struct InBand {
 
 impl FilteredFigures {
     /// What figures of filtered forces say.
-    pub fn new(cutoff_hz: f64, figures: &Figures) -> Self {
+    pub fn new(cutoff_hz: f64, figures: &ErrorFigures) -> Self {
         let channels = figures.channels.iter().map(|(name, one)| {
-            let figures = InBand {
+            let figures = FilteredChannelFigures {
                 nrms: one.nrms,
                 rms: one.rms,
             };
@@ -64,8 +64,8 @@ impl FilteredFigures {
 /// times, s, pass Butterworth's filter of order 4 at `cutoff_hz`, both ways, and lose 5 % of their samples at each end.
 /// Uneven samples are taken to even times first, both forces alike.
 /// Fails when there are too few samples, the cut-off is not below half the rate, or a value is not finite.
-pub fn in_band(
-    comparison: &mut Comparison,
+pub fn add_filtered_forces(
+    comparison: &mut ErrorAccumulator,
     time: &[f64],
     measured: &[Vec<f64>],
     model: &[Vec<f64>],
@@ -77,14 +77,14 @@ pub fn in_band(
             if is_even(time) {
                 filter.zero_phase(column)
             } else {
-                filter.zero_phase(&on_even_times(time, column))
+                filter.zero_phase(&resample_evenly(time, column))
             }
         };
         columns.iter().map(even).collect()
     };
     let (measured, model) = (passed(measured)?, passed(model)?);
     let n = time.len();
-    let trim = count(TRIMMED_PART * n as f64);
+    let trim = float_to_count(TRIMMED_PART * n as f64);
     let interleaved = |columns: &[Vec<f64>]| -> Vec<f64> {
         let samples = trim..n - trim;
         samples

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::words::list;
+use crate::words::backquoted_list;
 
 /// Why a fit file cannot be used.
 #[derive(Debug, Clone, PartialEq)]
@@ -53,7 +53,7 @@ pub enum FitFault {
         name: String,
     },
     /// A constant that an expression of the base parameters holds has another value.
-    OtherConstant {
+    ConstantDiffers {
         /// The constant.
         name: String,
         /// Its value in the file.
@@ -62,7 +62,7 @@ pub enum FitFault {
         model: f64,
     },
     /// A parameter has the same name but stands for another expression.
-    OtherExpression {
+    ExpressionDiffers {
         /// The parameter.
         name: String,
         /// The expression in the file.
@@ -110,18 +110,18 @@ impl fmt::Display for FitFileError {
                 write!(
                     f,
                     ", which holds {}; identify this model again",
-                    list(present)
+                    backquoted_list(present)
                 )
             }
             FitFault::UnknownParameters { names } => write!(
                 f,
                 "{file}: the fit holds {}, which the model does not have; identify this model again",
-                list(names)
+                backquoted_list(names)
             ),
             FitFault::DuplicateParameter { name } => {
                 write!(f, "{file}: the fit holds `{name}` twice; remove one")
             }
-            FitFault::OtherConstant {
+            FitFault::ConstantDiffers {
                 name,
                 file: theirs,
                 model,
@@ -130,7 +130,7 @@ impl fmt::Display for FitFileError {
                 "{file}: the fit was made with {name} = {theirs}, but the model has {name} = {model}, and base parameters \
                  depend on it: identify again"
             ),
-            FitFault::OtherExpression {
+            FitFault::ExpressionDiffers {
                 name,
                 file: theirs,
                 model,

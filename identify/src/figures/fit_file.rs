@@ -4,15 +4,15 @@
 use std::path::Path;
 
 use indexmap::IndexMap;
-use modelmill_boundary::files::{Disk, Files};
+use modelmill_boundary::files::{DiskFiles, FileSource};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-use crate::estimate::{Deviations, Solution};
-use crate::figures::Figures;
+use crate::estimate::{ParameterUncertainty, RegressionSolution};
+use crate::figures::ErrorFigures;
 use crate::figures::fit_error::{FitFault, FitFileError};
-use crate::recording::Note;
-use crate::words::nearest;
+use crate::recording::RecordingNote;
+use crate::words::nearest_name;
 
 /// The most bytes that a fit is read of.
 const LONGEST_FIT: u64 = 64 << 20;
@@ -33,7 +33,7 @@ pub struct ParameterInfo {
 /// How a value of a fit came about.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Status {
+pub enum ParameterStatus {
     /// The recordings say it.
     #[default]
     Identified,
@@ -46,7 +46,7 @@ pub enum Status {
     Known,
 }
 
-impl Status {
+impl ParameterStatus {
     #[allow(
         clippy::trivially_copy_pass_by_ref,
         reason = "serde asks with a reference"
@@ -80,7 +80,7 @@ pub struct FitParameter {
     pub nominal: Option<f64>,
     /// Left away for what is identified.
     #[serde(default, skip_serializing_if = "Status::is_identified")]
-    pub status: Status,
+    pub status: ParameterStatus,
 }
 
 /// An identification: the JSON of `identify`.
@@ -108,27 +108,27 @@ pub struct FitFile {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub undetermined: Vec<String>,
     /// Error figures on the recordings of the fit.
-    pub fit: Figures,
+    pub fit: ErrorFigures,
     /// Error figures on the recordings of the check, if any.
-    pub check: Option<Figures>,
+    pub check: Option<ErrorFigures>,
     /// Remarks on the data.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub data: Vec<Note>,
+    pub data: Vec<RecordingNote>,
     /// What the estimator found beside the values, of which only physical parameters are read again.
     #[serde(default, skip_serializing)]
-    pub estimator: Estimator,
+    pub estimator: EstimatorOutput,
 }
 
 /// What the estimator found beside the values of a fit.
 #[derive(Debug, Clone, PartialEq, Default, Deserialize)]
-pub struct Estimator {
+pub struct EstimatorOutput {
     /// Physical parameters that bodies can have, where these were asked for.
     #[serde(default)]
-    physical: Option<Physical>,
+    physical: Option<FitFilePhysical>,
 }
 
 #[derive(Debug, Clone, PartialEq, Deserialize)]
-struct Physical {
+struct FitFilePhysical {
     parameters: Vec<PhysicalValue>,
 }
 
@@ -142,8 +142,8 @@ struct PhysicalValue {
 /// all in the order of the regressor's columns (asserted to be of one length).
 pub fn fit_parameters(
     infos: &[ParameterInfo],
-    solution: &Solution,
-    deviations: &Deviations,
+    solution: &RegressionSolution,
+    deviations: &ParameterUncertainty,
 ) -> Vec<FitParameter> {
     assert_eq!(
         infos.len(),
@@ -169,9 +169,9 @@ pub fn fit_parameters(
             unit: info.unit.clone(),
             nominal: info.nominal,
             status: if solution.determined[i] {
-                Status::Identified
+                ParameterStatus::Identified
             } else {
-                Status::Undetermined
+                ParameterStatus::Undetermined
             },
         })
         .collect()
@@ -179,7 +179,7 @@ pub fn fit_parameters(
 
 impl FitFile {
     /// Physical parameters that bodies can have, by their names; none unless they were asked for.
-    pub fn physical(&self) -> Vec<(String, f64)> {
+    pub fn physical_parameters(&self) -> Vec<(String, f64)> {
         let found = self
             .estimator
             .physical
@@ -217,11 +217,11 @@ impl FitFile {
 
     /// Reads a fit; fails when the file cannot be read or is something else.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, FitFileError> {
-        Self::read_from(&Disk::default(), path.as_ref())
+        Self::read_from(&DiskFiles::default(), path.as_ref())
     }
 
     /// Reads a fit as [`FitFile::read`] does, from `files`.
-    pub fn read_from(files: &dyn Files, path: &Path) -> Result<Self, FitFileError> {
+    pub fn read_from(files: &dyn FileSource, path: &Path) -> Result<Self, FitFileError> {
         let file = path.display().to_string();
         let text = files
             .read_text(path, LONGEST_FIT)
@@ -261,7 +261,7 @@ impl FitFile {
     /// `model` holds `(name, value)`; a fit without constants, as earlier versions wrote it, has none that differ.
     /// Fails when such a constant stands in an expression of the base parameters, which then are others.
     /// `file` is what messages call the fit.
-    pub fn other_constants(
+    pub fn differing_constants(
         &self,
         model: &[(&str, f64)],
         file: &str,
@@ -277,11 +277,11 @@ impl FitFile {
             if self
                 .parameters
                 .iter()
-                .any(|p| mentions(&p.expression, name))
+                .any(|p| contains_name(&p.expression, name))
             {
                 return Err(FitFileError {
                     file: file.to_owned(),
-                    fault: FitFault::OtherConstant {
+                    fault: FitFault::ConstantDiffers {
                         name: (*name).to_owned(),
                         file: *then,
                         model: *now,
@@ -321,12 +321,12 @@ impl FitFile {
                 let present: Vec<String> = self.parameters.iter().map(|p| p.name.clone()).collect();
                 return Err(fail(FitFault::MissingParameter {
                     name: (*name).to_owned(),
-                    nearest: nearest(name, present.iter().map(String::as_str)).map(str::to_owned),
+                    nearest: nearest_name(name, present.iter().map(String::as_str)).map(str::to_owned),
                     present,
                 }));
             };
             if parameter.expression != *expression {
-                return Err(fail(FitFault::OtherExpression {
+                return Err(fail(FitFault::ExpressionDiffers {
                     name: parameter.name.clone(),
                     file: parameter.expression.clone(),
                     model: (*expression).to_owned(),
@@ -350,7 +350,7 @@ impl FitFile {
 }
 
 /// Whether a name stands in an expression.
-fn mentions(expression: &str, name: &str) -> bool {
+fn contains_name(expression: &str, name: &str) -> bool {
     expression
         .split(|c: char| !(c.is_alphanumeric() || c == '_'))
         .any(|word| word == name)
@@ -390,7 +390,7 @@ mod tests {
                 "\"constants\": {\"L\": 0.5, \"g\": 9.81}, \"parameters\"",
             );
         let fit = FitFile::parse(&text, "fit.json").unwrap();
-        let others = |model: &[(&str, f64)]| fit.other_constants(model, "fit.json");
+        let others = |model: &[(&str, f64)]| fit.differing_constants(model, "fit.json");
         assert_eq!(others(&[("L", 0.5), ("g", 9.81), ("new", 1.0)]), Ok(vec![]));
         assert_eq!(
             others(&[("L", 0.5), ("g", 9.80)]),
@@ -403,7 +403,7 @@ mod tests {
         );
         let earlier = FitFile::parse(TEXT, "fit.json").unwrap();
         assert_eq!(
-            earlier.other_constants(&[("m", 1.0)], "fit.json"),
+            earlier.differing_constants(&[("m", 1.0)], "fit.json"),
             Ok(vec![])
         );
     }

@@ -13,7 +13,7 @@ use crate::words::with_digits;
 
 /// A region that holds more of a channel's squared error than its share of the samples.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Region {
+pub struct ErrorRegion {
     /// The channel whose error it is.
     pub channel: String,
     /// The variable that bounds the region.
@@ -72,11 +72,11 @@ pub const TIME_COLUMN: &str = "t";
 /// assert_eq!(regions[0].variable, "left_d");
 /// assert!(regions[0].range[0] > 0.85 && regions[0].share > 0.9);
 /// ```
-pub fn locate(
+pub fn locate_errors(
     errors: &[(&str, &[f64])],
     variables: &[(&str, &[f64])],
     options: &LocateOptions,
-) -> Vec<Region> {
+) -> Vec<ErrorRegion> {
     let mut regions = Vec::new();
     for (channel, error) in errors {
         let squares: Vec<f64> = error
@@ -87,10 +87,10 @@ pub fn locate(
         if total <= 0.0 || !total.is_finite() {
             continue;
         }
-        let mut found: Vec<Region> = variables
+        let mut found: Vec<ErrorRegion> = variables
             .iter()
             .filter(|(_, values)| values.len() == error.len())
-            .filter_map(|(name, values)| densest(channel, &squares, total, name, values, options))
+            .filter_map(|(name, values)| densest_region(channel, &squares, total, name, values, options))
             .collect();
         found.sort_by(|a, b| (b.share - b.samples).total_cmp(&(a.share - a.samples)));
         found.truncate(options.most);
@@ -100,14 +100,14 @@ pub fn locate(
 }
 
 /// The region of one variable with the largest excess, if it counts.
-fn densest(
+fn densest_region(
     channel: &str,
     squares: &[f64],
     total: f64,
     name: &str,
     values: &[f64],
     options: &LocateOptions,
-) -> Option<Region> {
+) -> Option<ErrorRegion> {
     let mut order: Vec<usize> = (0..values.len())
         .filter(|&i| values[i].is_finite())
         .collect();
@@ -145,7 +145,7 @@ fn densest(
         }
     }
     let counts = share - samples >= options.excess && share >= options.density * samples;
-    if !counts || (name != TIME_COLUMN && !recurs(squares, values, range, options.density)) {
+    if !counts || (name != TIME_COLUMN && !is_recurrent(squares, values, range, options.density)) {
         return None;
     }
     let around = if range[0] < 0.0 && range[0].to_bits() == (-range[1]).to_bits() {
@@ -161,7 +161,7 @@ fn densest(
         with_digits(range[1], 3),
         100.0 * samples,
     );
-    Some(Region {
+    Some(ErrorRegion {
         channel: channel.to_owned(),
         variable: name.to_owned(),
         range,
@@ -212,7 +212,7 @@ fn best_interval(order: &[usize], squares: &[f64], total: f64, edges: &[usize]) 
 
 /// Whether the region is denser than the rest in most parts of the recording that visit it, at
 /// least two.
-fn recurs(squares: &[f64], values: &[f64], range: [f64; 2], density: f64) -> bool {
+fn is_recurrent(squares: &[f64], values: &[f64], range: [f64; 2], density: f64) -> bool {
     let length = squares.len().div_ceil(PARTS).max(1);
     let (mut visited, mut dense) = (0, 0);
     for (squares, values) in squares.chunks(length).zip(values.chunks(length)) {
@@ -239,7 +239,7 @@ fn recurs(squares: &[f64], values: &[f64], range: [f64; 2], density: f64) -> boo
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_noise::Noise;
+    use crate::test_noise::TestNoise;
 
     fn motion(samples: u32) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
         let time: Vec<f64> = (0..samples).map(|i| 0.004 * f64::from(i)).collect();
@@ -257,7 +257,7 @@ mod tests {
     #[test]
     fn an_error_at_reversal_is_found_around_zero_rate() {
         let (time, angle, rate) = motion(4000);
-        let mut noise = Noise::new(9);
+        let mut noise = TestNoise::new(9);
         let error: Vec<f64> = rate
             .iter()
             .map(|v| {
@@ -269,7 +269,7 @@ mod tests {
                     }
             })
             .collect();
-        let regions = locate(
+        let regions = locate_errors(
             &[("left", &error)],
             &[(TIME_COLUMN, &time), ("q", &angle), ("q_d", &rate)],
             &LocateOptions::default(),
@@ -290,12 +290,12 @@ mod tests {
     #[test]
     fn a_single_burst_is_found_in_time_only() {
         let (time, angle, rate) = motion(4000);
-        let mut noise = Noise::new(4);
+        let mut noise = TestNoise::new(4);
         let error: Vec<f64> = time
             .iter()
             .map(|t| noise.normal() * if (5.0..5.6).contains(t) { 10.0 } else { 1.0 })
             .collect();
-        let regions = locate(
+        let regions = locate_errors(
             &[("left", &error)],
             &[(TIME_COLUMN, &time), ("q", &angle), ("q_d", &rate)],
             &LocateOptions::default(),
@@ -309,9 +309,9 @@ mod tests {
     fn white_noise_has_no_region_and_odd_input_no_panic() {
         let (time, angle, rate) = motion(4000);
         for seed in 0..20 {
-            let mut noise = Noise::new(seed);
+            let mut noise = TestNoise::new(seed);
             let error: Vec<f64> = time.iter().map(|_| noise.normal()).collect();
-            let regions = locate(
+            let regions = locate_errors(
                 &[("left", &error)],
                 &[(TIME_COLUMN, &time), ("q", &angle), ("q_d", &rate)],
                 &LocateOptions::default(),
@@ -319,17 +319,17 @@ mod tests {
             assert!(regions.is_empty(), "{regions:?}");
         }
         let options = LocateOptions::default();
-        assert!(locate(&[("a", &[])], &[("q", &[])], &options).is_empty());
-        assert!(locate(&[("a", &[0.0; 100])], &[("q", &[1.0; 100])], &options).is_empty());
-        assert!(locate(&[("a", &[1.0; 100])], &[("q", &[1.0; 100])], &options).is_empty());
+        assert!(locate_errors(&[("a", &[])], &[("q", &[])], &options).is_empty());
+        assert!(locate_errors(&[("a", &[0.0; 100])], &[("q", &[1.0; 100])], &options).is_empty());
+        assert!(locate_errors(&[("a", &[1.0; 100])], &[("q", &[1.0; 100])], &options).is_empty());
         assert!(
-            locate(
+            locate_errors(
                 &[("a", &[f64::NAN; 100])],
                 &[("q", &[f64::NAN; 100])],
                 &options
             )
             .is_empty()
         );
-        assert!(locate(&[("a", &[1.0; 100])], &[("q", &[1.0; 99])], &options).is_empty());
+        assert!(locate_errors(&[("a", &[1.0; 100])], &[("q", &[1.0; 99])], &options).is_empty());
     }
 }

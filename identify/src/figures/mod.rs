@@ -18,14 +18,14 @@ use std::fmt;
 use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 
-pub use filtered::{BandError, FilteredFigures, InBand, TRIMMED_PART, in_band};
+pub use filtered::{BandError, FilteredFigures, FilteredChannelFigures, TRIMMED_PART, add_filtered_forces};
 pub use fit_error::{FitFault, FitFileError};
-pub use fit_file::{Estimator, FitFile, FitParameter, ParameterInfo, Status, fit_parameters};
-pub use locate::{LocateOptions, Region, TIME_COLUMN, locate};
+pub use fit_file::{EstimatorOutput, FitFile, FitParameter, ParameterInfo, ParameterStatus, fit_parameters};
+pub use locate::{LocateOptions, ErrorRegion, TIME_COLUMN, locate_errors};
 
 /// Error figures of a comparison.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Figures {
+pub struct ErrorFigures {
     /// Relative error over all channels stacked; absent when nothing but zero was measured, and where channels have different
     /// units, whose squares have no sum.
     pub nrms: Option<f64>,
@@ -128,13 +128,13 @@ impl std::error::Error for FiguresError {}
 /// # Ok::<(), modelmill_identify::FiguresError>(())
 /// ```
 #[derive(Debug, Clone)]
-pub struct Comparison {
-    channels: IndexMap<String, Sums>,
+pub struct ErrorAccumulator {
+    channels: IndexMap<String, ChannelErrorSums>,
     samples: usize,
 }
 
 #[derive(Debug, Clone, Default)]
-struct Sums {
+struct ChannelErrorSums {
     unit: String,
     not_counted: usize,
     error: f64,
@@ -146,13 +146,13 @@ struct Sums {
     zero_measured: usize,
 }
 
-impl Comparison {
+impl ErrorAccumulator {
     /// A comparison of the named channels, without samples yet.
     pub fn new(channels: impl IntoIterator<Item = String>) -> Self {
         Self {
             channels: channels
                 .into_iter()
-                .map(|name| (name, Sums::default()))
+                .map(|name| (name, ChannelErrorSums::default()))
                 .collect(),
             samples: 0,
         }
@@ -223,14 +223,14 @@ impl Comparison {
     }
 
     /// The figures of all samples taken; fails when there were none.
-    pub fn finish(&self) -> Result<Figures, FiguresError> {
+    pub fn finish(&self) -> Result<ErrorFigures, FiguresError> {
         if self.samples == 0 {
             return Err(FiguresError::NoSamples);
         }
         let ratio = |error: f64, measured: f64| (measured > 0.0).then(|| (error / measured).sqrt());
-        let total = |of: fn(&Sums) -> f64| self.channels.values().map(of).sum::<f64>();
+        let total = |of: fn(&ChannelErrorSums) -> f64| self.channels.values().map(of).sum::<f64>();
         let (error, measured) = (total(|sums| sums.error), total(|sums| sums.measured));
-        let counted = |sums: &Sums| self.samples - sums.not_counted;
+        let counted = |sums: &ChannelErrorSums| self.samples - sums.not_counted;
         let all: usize = self.channels.values().map(counted).sum();
         let mut units = self.channels.values().map(|sums| &sums.unit);
         let is_one_unit = units
@@ -251,7 +251,7 @@ impl Comparison {
             };
             (name.clone(), figures)
         });
-        Ok(Figures {
+        Ok(ErrorFigures {
             nrms: is_one_unit.then(|| ratio(error, measured)).flatten(),
             rms: is_one_unit.then(|| (error / all.max(1) as f64).sqrt()),
             samples: self.samples,
@@ -269,11 +269,11 @@ fn is_zero(count: &usize) -> bool {
 
 /// Figures of whole columns, `measured[channel][sample]` and `model[channel][sample]`.
 /// Fails when the shapes differ, a value is not finite or there are no samples.
-pub fn compare(
+pub fn compare_forces(
     channels: &[String],
     measured: &[Vec<f64>],
     model: &[Vec<f64>],
-) -> Result<Figures, FiguresError> {
+) -> Result<ErrorFigures, FiguresError> {
     let samples = measured.first().map_or(0, Vec::len);
     let fits = |columns: &[Vec<f64>]| {
         columns.len() == channels.len() && columns.iter().all(|column| column.len() == samples)
@@ -286,7 +286,7 @@ pub fn compare(
             channels: channels.len(),
         });
     }
-    let mut comparison = Comparison::new(channels.iter().cloned());
+    let mut comparison = ErrorAccumulator::new(channels.iter().cloned());
     let (mut y, mut m) = (Vec::new(), Vec::new());
     for sample in 0..samples {
         y.clear();
@@ -307,7 +307,7 @@ mod tests {
         let names = ["a".to_owned(), "b".to_owned()];
         let measured = [vec![1.0, -2.0, 0.0, 2.0], vec![4.0, 0.0, 0.0, 0.0]];
         let model = [vec![1.5, -2.0, 1.0, 2.0], vec![4.0, 0.0, 0.0, -1.0]];
-        let figures = compare(&names, &measured, &model).unwrap();
+        let figures = compare_forces(&names, &measured, &model).unwrap();
         let a = &figures.channels["a"];
         assert!((a.nrms.unwrap() - (1.25_f64 / 9.0).sqrt()).abs() < 1e-15);
         assert!((a.mean_relative.unwrap() - 0.5 / 3.0).abs() < 1e-15);
@@ -320,14 +320,14 @@ mod tests {
         assert!((figures.rms.unwrap() - (2.25_f64 / 8.0).sqrt()).abs() < 1e-15);
         let json = serde_json::to_value(&figures).unwrap();
         assert!(json["channels"]["b"]["mean_relative"].is_number());
-        assert_eq!(serde_json::from_value::<Figures>(json).unwrap(), figures);
+        assert_eq!(serde_json::from_value::<ErrorFigures>(json).unwrap(), figures);
     }
 
     /// Squares of newtons and of newton metres have no sum.
     #[test]
     fn different_units_have_no_total_and_some_samples_do_not_count() {
         let names = ["a".to_owned(), "b".to_owned()];
-        let mut comparison = Comparison::new(names).with_units(["N".to_owned(), "N m".to_owned()]);
+        let mut comparison = ErrorAccumulator::new(names).with_units(["N".to_owned(), "N m".to_owned()]);
         let (measured, model) = (
             [3.0, 1.0, 9e9, 1.0, 4.0, 1.0],
             [3.0, 1.5, 0.0, 1.0, 5.0, 1.0],
@@ -344,12 +344,12 @@ mod tests {
     #[test]
     fn nothing_measured_gives_no_ratio_and_bad_values_are_refused() {
         let names = ["a".to_owned()];
-        let silent = compare(&names, &[vec![0.0, 0.0]], &[vec![1.0, 0.0]]).unwrap();
+        let silent = compare_forces(&names, &[vec![0.0, 0.0]], &[vec![1.0, 0.0]]).unwrap();
         assert_eq!(
             (silent.nrms, silent.channels["a"].mean_relative),
             (None, None)
         );
-        let error = compare(&names, &[vec![0.0, 1.0]], &[vec![0.0, f64::NAN]]).unwrap_err();
+        let error = compare_forces(&names, &[vec![0.0, 1.0]], &[vec![0.0, f64::NAN]]).unwrap_err();
         assert_eq!(
             error,
             FiguresError::NotFinite {
@@ -358,9 +358,9 @@ mod tests {
             }
         );
         assert_eq!(
-            compare(&names, &[vec![]], &[vec![]]).unwrap_err(),
+            compare_forces(&names, &[vec![]], &[vec![]]).unwrap_err(),
             FiguresError::NoSamples
         );
-        assert!(compare(&names, &[vec![1.0]], &[vec![]]).is_err());
+        assert!(compare_forces(&names, &[vec![1.0]], &[vec![]]).is_err());
     }
 }

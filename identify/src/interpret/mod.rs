@@ -15,13 +15,13 @@ use nalgebra::{DMatrix, DVector};
 use num_rational::BigRational;
 use num_traits::Zero;
 
-use crate::estimate::{Direction, null_directions};
+use crate::estimate::{NullDirection, null_directions};
 
-pub use modelmill_algebra::polynomial::{Polynomial, exact};
+pub use modelmill_algebra::polynomial::{Polynomial, exact_decimal};
 
 /// What is to be solved.
 #[derive(Clone, Debug)]
-pub struct System {
+pub struct InterpretationProblem {
     /// Each base parameter as a polynomial in the unknowns, all in equally many unknowns.
     pub equations: Vec<Polynomial>,
     /// Identified values of the base parameters.
@@ -34,16 +34,16 @@ pub struct System {
 
 /// What base parameters say about the unknowns.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Interpretation {
+pub enum PhysicalInterpretation {
     /// As many independent equations as unknowns: all real solutions, maybe none.
     Exact {
         /// The solutions, the one nearest to the nominal values first.
-        solutions: Vec<Physical>,
+        solutions: Vec<PhysicalSolution>,
     },
     /// More equations than unknowns: what fits best.
     LeastSquares {
         /// Local minima of the weighted error, the best first; the only one where the equations are linear.
-        solutions: Vec<Physical>,
+        solutions: Vec<PhysicalSolution>,
         /// Whether the equations are linear in the unknowns, so that there is no other minimum.
         is_linear: bool,
         /// Points from which minima were looked for.
@@ -52,7 +52,7 @@ pub enum Interpretation {
     /// The base parameters do not determine the unknowns.
     Undetermined {
         /// Changes of the unknowns that change no base parameter, to first order around the nominal values.
-        directions: Vec<Direction>,
+        directions: Vec<NullDirection>,
         /// Which unknowns take part in none of them.
         determined: Vec<bool>,
     },
@@ -60,7 +60,7 @@ pub enum Interpretation {
 
 /// A solution.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Physical {
+pub struct PhysicalSolution {
     /// Values of the unknowns.
     pub values: Vec<f64>,
     /// Their standard deviations; `None` where those of the base parameters are not known, or where the solution is a
@@ -112,7 +112,7 @@ impl std::error::Error for InterpretError {}
 /// let Ok(Interpretation::Exact { solutions }) = interpret(&system) else { panic!() };
 /// assert_eq!(solutions[0].values, [2.0, 0.5]);
 /// ```
-pub fn interpret(system: &System) -> Result<Interpretation, InterpretError> {
+pub fn interpret(system: &InterpretationProblem) -> Result<PhysicalInterpretation, InterpretError> {
     let n = system.nominal.len();
     assert_eq!(
         system.equations.len(),
@@ -124,7 +124,7 @@ pub fn interpret(system: &System) -> Result<Interpretation, InterpretError> {
         "one nominal value per unknown"
     );
     let used: Vec<usize> = (0..system.equations.len())
-        .filter(|k| (0..n).any(|i| system.equations[*k].mentions(i)))
+        .filter(|k| (0..n).any(|i| system.equations[*k].has_unknown(i)))
         .collect();
     let jacobian = |k: &usize| -> Vec<Polynomial> {
         (0..n).map(|i| system.equations[*k].derivative(i)).collect()
@@ -132,57 +132,57 @@ pub fn interpret(system: &System) -> Result<Interpretation, InterpretError> {
     let jacobian: Vec<Vec<Polynomial>> = used.iter().map(jacobian).collect();
     let rank = generic_rank(&jacobian, n);
     if rank < n {
-        return Ok(undetermined(system, &jacobian, n - rank));
+        return Ok(find_undetermined(system, &jacobian, n - rank));
     }
     if used.len() > n {
-        return Ok(nearest::nearest(system, &used));
+        return Ok(nearest::solve_least_squares(system, &used));
     }
     let equations: Vec<Polynomial> = used.iter().map(|k| equation(system, *k)).collect();
     let points = match roots::solve(&equations, n).map_err(|_| InterpretError::TooHard)? {
         roots::RealSolutions::Finite(points) => points,
         // Curves of solutions beside a generic rank that is full: the values are special, and so is what can be said.
-        roots::RealSolutions::Infinite => return Ok(undetermined(system, &jacobian, 0)),
+        roots::RealSolutions::Infinite => return Ok(find_undetermined(system, &jacobian, 0)),
     };
-    let mut solutions: Vec<Physical> = points
+    let mut solutions: Vec<PhysicalSolution> = points
         .into_iter()
-        .map(|values| Physical {
-            std: deviations(system, &used, &values),
+        .map(|values| PhysicalSolution {
+            std: standard_deviations(system, &used, &values),
             residuals: residuals(system, &values),
             chi_squared: system.covariance.is_some().then_some(0.0),
             values,
         })
         .collect();
-    let distance = |one: &Physical| -> f64 {
+    let distance = |one: &PhysicalSolution| -> f64 {
         let pairs = one.values.iter().zip(&system.nominal);
         pairs
             .map(|(x, x0)| ((x - x0) / (x0.abs() + x.abs()).max(f64::MIN_POSITIVE)).powi(2))
             .sum()
     };
     solutions.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
-    Ok(Interpretation::Exact { solutions })
+    Ok(PhysicalInterpretation::Exact { solutions })
 }
 
 /// `base parameter - value` as a polynomial.
-fn equation(system: &System, k: usize) -> Polynomial {
+fn equation(system: &InterpretationProblem, k: usize) -> Polynomial {
     let mut equation = system.equations[k].clone();
-    equation.add_term(&[], &-exact(system.values[k]));
+    equation.add_term(&[], &-exact_decimal(system.values[k]));
     equation
 }
 
-fn residuals(system: &System, at: &[f64]) -> Vec<f64> {
+fn residuals(system: &InterpretationProblem, at: &[f64]) -> Vec<f64> {
     let pairs = system.equations.iter().zip(&system.values);
     pairs.map(|(p, value)| value - p.value(at)).collect()
 }
 
 /// The Jacobian of some equations at a point.
-fn jacobian_at(system: &System, equations: &[usize], at: &[f64]) -> DMatrix<f64> {
+fn jacobian_at(system: &InterpretationProblem, equations: &[usize], at: &[f64]) -> DMatrix<f64> {
     DMatrix::from_fn(equations.len(), at.len(), |r, i| {
         system.equations[equations[r]].derivative(i).value(at)
     })
 }
 
 /// Standard deviations of a solution of as many equations as unknowns: `J x' = p'` gives `cov x = J^-1 cov p J^-T`.
-fn deviations(system: &System, used: &[usize], at: &[f64]) -> Option<Vec<f64>> {
+fn standard_deviations(system: &InterpretationProblem, used: &[usize], at: &[f64]) -> Option<Vec<f64>> {
     let covariance = system.covariance.as_ref()?;
     let mut jacobian = jacobian_at(system, used, at);
     // Units must not decide what counts as singular.
@@ -265,7 +265,7 @@ fn exact_rank(mut rows: Vec<Vec<BigRational>>) -> usize {
 }
 
 /// What is not determined, at the nominal values; these are moved a little where they hide something.
-fn undetermined(system: &System, jacobian: &[Vec<Polynomial>], at_least: usize) -> Interpretation {
+fn find_undetermined(system: &InterpretationProblem, jacobian: &[Vec<Polynomial>], at_least: usize) -> PhysicalInterpretation {
     let n = system.nominal.len();
     // A product of two unknowns, one of them nominally zero, says nothing there.
     let point: Vec<f64> = system
@@ -297,14 +297,14 @@ fn undetermined(system: &System, jacobian: &[Vec<Polynomial>], at_least: usize) 
     let null_space = DMatrix::from_fn(n_null, n, |r, i| v_t[(order[r], i)]);
     let norms: Vec<f64> = scales.iter().map(|s| 1.0 / s.abs()).collect();
     let (determined, directions) = null_directions(&null_space, &norms);
-    Interpretation::Undetermined {
+    PhysicalInterpretation::Undetermined {
         directions,
         determined,
     }
 }
 
 /// Rows and right-hand side divided by deviations: `L^-1` of the covariance's Cholesky factor.
-fn whitened(
+fn whiten_rows(
     covariance: Option<&DMatrix<f64>>,
     used: &[usize],
     values: &[f64],

@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::roots::{RealSolutions, solve};
 use super::{
-    Interpretation, Physical, System, equation, jacobian_at, residuals, roots_of_diagonal, whitened,
+    PhysicalInterpretation, PhysicalSolution, InterpretationProblem, equation, jacobian_at, residuals, roots_of_diagonal, whiten_rows,
 };
 use modelmill_algebra::polynomial::Polynomial;
 
@@ -16,9 +16,9 @@ const MOST_SUBSETS: usize = 40;
 const MOST_STEPS: usize = 500;
 
 /// Solutions of least squares; `used` are the equations in which unknowns stand.
-pub(crate) fn nearest(system: &System, used: &[usize]) -> Interpretation {
+pub(crate) fn solve_least_squares(system: &InterpretationProblem, used: &[usize]) -> PhysicalInterpretation {
     let n = system.nominal.len();
-    let (weights, is_weighted) = whitened(system.covariance.as_ref(), used, &system.values);
+    let (weights, is_weighted) = whiten_rows(system.covariance.as_ref(), used, &system.values);
     let is_linear = used.iter().all(|k| system.equations[*k].degree() <= 1);
     let mut starts = vec![system.nominal.clone()];
     if !is_linear {
@@ -30,7 +30,7 @@ pub(crate) fn nearest(system: &System, used: &[usize]) -> Interpretation {
             }
         }
     }
-    let mut solutions: Vec<Physical> = Vec::new();
+    let mut solutions: Vec<PhysicalSolution> = Vec::new();
     for start in &starts {
         let Some((values, error, covariance)) = descend(system, used, &weights, start) else {
             continue;
@@ -42,7 +42,7 @@ pub(crate) fn nearest(system: &System, used: &[usize]) -> Interpretation {
                 .all(|((a, b), x0)| (a - b).abs() <= 1e-6 * (a.abs() + b.abs() + 1e-3 * x0.abs()))
         });
         if !is_known {
-            solutions.push(Physical {
+            solutions.push(PhysicalSolution {
                 std: is_weighted.then(|| roots_of_diagonal(&covariance)),
                 residuals: residuals(system, &values),
                 chi_squared: is_weighted.then_some(error),
@@ -50,12 +50,12 @@ pub(crate) fn nearest(system: &System, used: &[usize]) -> Interpretation {
             });
         }
     }
-    let error = |one: &Physical| -> f64 {
+    let error = |one: &PhysicalSolution| -> f64 {
         let e = DVector::from_iterator(used.len(), used.iter().map(|k| one.residuals[*k]));
         (&weights * e).norm_squared()
     };
     solutions.sort_by(|a, b| error(a).total_cmp(&error(b)));
-    Interpretation::LeastSquares {
+    PhysicalInterpretation::LeastSquares {
         solutions,
         is_linear,
         starts: starts.len(),
@@ -64,7 +64,7 @@ pub(crate) fn nearest(system: &System, used: &[usize]) -> Interpretation {
 
 /// A local minimum with its error and covariance; `None` where none is reached.
 fn descend(
-    system: &System,
+    system: &InterpretationProblem,
     used: &[usize],
     weights: &DMatrix<f64>,
     start: &[f64],

@@ -10,11 +10,11 @@ use num_rational::BigRational;
 use num_traits::{One, Signed, Zero};
 
 use modelmill_algebra::groebner::{
-    TooHard, Work, groebner, is_contradiction, remainder, standard_terms,
+    GroebnerLimitExceeded, GroebnerWork, groebner_basis, has_no_solution, remainder, standard_terms,
 };
-use modelmill_algebra::polynomial::{Polynomial, Powers, float, unknown};
+use modelmill_algebra::polynomial::{Polynomial, TermExponents, nearest_f64, unknown_polynomial};
 use modelmill_algebra::real_roots::{
-    Interval, Univariate, halve, is_squarefree, isolate, squarefree,
+    RationalInterval, UnivariatePolynomial, halve_interval, is_squarefree, isolate_roots, squarefree_part,
 };
 
 /// Most complex solutions of a system.
@@ -34,57 +34,57 @@ pub(crate) enum RealSolutions {
 }
 
 /// Solves equations `polynomial = 0` in `n` unknowns.
-pub(crate) fn solve(equations: &[Polynomial], n: usize) -> Result<RealSolutions, TooHard> {
-    let mut work = Work::default();
-    let mut basis = groebner(equations, &mut work)?;
+pub(crate) fn solve(equations: &[Polynomial], n: usize) -> Result<RealSolutions, GroebnerLimitExceeded> {
+    let mut work = GroebnerWork::default();
+    let mut basis = groebner_basis(equations, &mut work)?;
     let mut is_radical = false;
     loop {
-        if is_contradiction(&basis) {
+        if has_no_solution(&basis) {
             return Ok(RealSolutions::Finite(Vec::new()));
         }
         let Some(terms) = standard_terms(&basis, n, MOST_SOLUTIONS)? else {
             return Ok(RealSolutions::Infinite);
         };
-        let ring = Quotient {
+        let ring = QuotientRing {
             basis: &basis,
             terms: &terms,
         };
         for k in 1..=FORMS {
-            if let Some(shape) = ring.shape(k, &mut work)? {
+            if let Some(shape) = ring.solve_shape_lemma(k, &mut work)? {
                 return Ok(RealSolutions::Finite(shape.points()));
             }
         }
         if is_radical {
-            return Err(TooHard);
+            return Err(GroebnerLimitExceeded);
         }
         let mut more = basis.clone();
         for i in 0..n {
-            let minimal = ring.minimal(&unknown(n, i), &mut work)?;
+            let minimal = ring.minimal_polynomial(&unknown_polynomial(n, i), &mut work)?;
             let mut equation = Polynomial::new(n);
-            for (exponent, factor) in squarefree(&minimal).iter().enumerate() {
+            for (exponent, factor) in squarefree_part(&minimal).iter().enumerate() {
                 let exponent = u32::try_from(exponent).expect("a small exponent");
                 equation.add_term(&[(i, exponent)], factor);
             }
             more.push(equation);
         }
-        basis = groebner(&more, &mut work)?;
+        basis = groebner_basis(&more, &mut work)?;
         is_radical = true;
     }
 }
 
 /// Polynomials modulo the equations.
-struct Quotient<'a> {
+struct QuotientRing<'a> {
     basis: &'a [Polynomial],
-    terms: &'a [Powers],
+    terms: &'a [TermExponents],
 }
 
 /// The solutions as values of polynomials at the roots of one.
-struct Shape {
-    minimal: Univariate,
-    coordinates: Vec<Univariate>,
+struct ShapeLemmaSolution {
+    minimal: UnivariatePolynomial,
+    coordinates: Vec<UnivariatePolynomial>,
 }
 
-impl Quotient<'_> {
+impl QuotientRing<'_> {
     fn vector(&self, polynomial: &Polynomial) -> Vec<BigRational> {
         let factor = |term| polynomial.terms.get(term).cloned();
         let terms = self.terms.iter();
@@ -94,10 +94,10 @@ impl Quotient<'_> {
     }
 
     /// 1, form, form^2, ... up to one power more than there are dimensions.
-    fn powers(&self, form: &Polynomial, work: &mut Work) -> Result<Vec<Vec<BigRational>>, TooHard> {
+    fn powers(&self, form: &Polynomial, work: &mut GroebnerWork) -> Result<Vec<Vec<BigRational>>, GroebnerLimitExceeded> {
         let n = form.n;
         let mut one = Polynomial::new(n);
-        one.add(Powers::one(n), &BigRational::one());
+        one.add(TermExponents::unit_term(n), &BigRational::one());
         let mut power = remainder(&one, self.basis, work)?;
         let mut vectors = vec![self.vector(&power)];
         for _ in 0..self.terms.len() {
@@ -112,11 +112,11 @@ impl Quotient<'_> {
     }
 
     /// The least polynomial that vanishes for the form, modulo the equations.
-    fn minimal(&self, form: &Polynomial, work: &mut Work) -> Result<Univariate, TooHard> {
+    fn minimal_polynomial(&self, form: &Polynomial, work: &mut GroebnerWork) -> Result<UnivariatePolynomial, GroebnerLimitExceeded> {
         let powers = self.powers(form, work)?;
         for k in 1..powers.len() {
-            if let Some(mut factors) = combination(&powers[..k], &[&powers[k]]) {
-                let mut minimal: Univariate = factors.remove(0).into_iter().map(|f| -f).collect();
+            if let Some(mut factors) = solve_combinations(&powers[..k], &[&powers[k]]) {
+                let mut minimal: UnivariatePolynomial = factors.remove(0).into_iter().map(|f| -f).collect();
                 minimal.push(BigRational::one());
                 return Ok(minimal);
             }
@@ -125,13 +125,13 @@ impl Quotient<'_> {
     }
 
     /// The shape of the solutions for a linear form, if the form tells all of them apart.
-    fn shape(&self, k: i64, work: &mut Work) -> Result<Option<Shape>, TooHard> {
+    fn solve_shape_lemma(&self, k: i64, work: &mut GroebnerWork) -> Result<Option<ShapeLemmaSolution>, GroebnerLimitExceeded> {
         let n = self.basis[0].n;
         let mut form = Polynomial::new(n);
         let mut weight = 1_i64;
         for i in 0..n {
             form.add(
-                Powers::unknown(n, i),
+                TermExponents::unknown(n, i),
                 &BigRational::from_integer(weight.into()),
             );
             weight = (weight * (k + 1) + k) % 1009;
@@ -140,32 +140,32 @@ impl Quotient<'_> {
         let last = powers.pop().expect("at least one power");
         let mut targets = vec![last];
         for i in 0..n {
-            let coordinate = remainder(&unknown(n, i), self.basis, work)?;
+            let coordinate = remainder(&unknown_polynomial(n, i), self.basis, work)?;
             targets.push(self.vector(&coordinate));
         }
         let targets: Vec<&Vec<BigRational>> = targets.iter().collect();
-        let Some(mut factors) = combination(&powers, &targets) else {
+        let Some(mut factors) = solve_combinations(&powers, &targets) else {
             return Ok(None);
         };
-        let mut minimal: Univariate = factors.remove(0).into_iter().map(|f| -f).collect();
+        let mut minimal: UnivariatePolynomial = factors.remove(0).into_iter().map(|f| -f).collect();
         minimal.push(BigRational::one());
-        Ok(is_squarefree(&minimal).then_some(Shape {
+        Ok(is_squarefree(&minimal).then_some(ShapeLemmaSolution {
             minimal,
             coordinates: factors,
         }))
     }
 }
 
-impl Shape {
+impl ShapeLemmaSolution {
     fn points(&self) -> Vec<Vec<f64>> {
-        isolate(&self.minimal)
+        isolate_roots(&self.minimal)
             .into_iter()
-            .map(|root| self.point(root))
+            .map(|root| self.refine_point(root))
             .collect()
     }
 
     /// A solution: the root's interval is halved until every coordinate is known to the last bit.
-    fn point(&self, mut root: Interval) -> Vec<f64> {
+    fn refine_point(&self, mut root: RationalInterval) -> Vec<f64> {
         let fine = BigRational::new(1.into(), num_bigint::BigInt::from(1) << 60);
         let tiny = BigRational::new(1.into(), num_bigint::BigInt::from(1) << 1000);
         for _ in 0..MOST_HALVINGS {
@@ -179,16 +179,16 @@ impl Shape {
             }
             // Some bits more between two looks: looking costs more than halving.
             for _ in 0..16 {
-                halve(&self.minimal, &mut root);
+                halve_interval(&self.minimal, &mut root);
             }
         }
         let images = self.coordinates.iter().map(|p| root.image(p).middle());
-        images.map(|value| float(&value)).collect()
+        images.map(|value| nearest_f64(&value)).collect()
     }
 }
 
 /// Each target as a combination of vectors; `None` unless the vectors are independent and span all targets.
-fn combination(
+fn solve_combinations(
     vectors: &[Vec<BigRational>],
     targets: &[&Vec<BigRational>],
 ) -> Option<Vec<Vec<BigRational>>> {
@@ -234,7 +234,7 @@ fn combination(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::interpret::exact;
+    use crate::interpret::exact_decimal;
 
     type Terms<'a> = &'a [(f64, &'a [(usize, u32)])];
 
@@ -242,7 +242,7 @@ mod tests {
         let one = |terms: &Terms<'_>| {
             let mut p = Polynomial::new(n);
             for (factor, powers) in *terms {
-                p.add_term(powers, &exact(*factor));
+                p.add_term(powers, &exact_decimal(*factor));
             }
             p
         };

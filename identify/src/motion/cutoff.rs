@@ -7,7 +7,7 @@
 
 use std::f64::consts::{LN_10, PI, TAU};
 
-use crate::signal::{count, hann_power, median};
+use crate::signal::{float_to_count, hann_power, median};
 
 /// A band of the spectrum holds motion where its power is above so many times the noise.
 /// Within the narrowest bands chance reaches that about once in a thousand.
@@ -23,11 +23,11 @@ const STEPS: u32 = 128;
 
 /// A signal that is differentiated to accelerations.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Signal<'a> {
+pub(crate) struct DifferentiatedSignal<'a> {
     /// Its samples, evenly spaced.
     pub(crate) values: &'a [f64],
     /// How often: twice for positions, once for rates.
-    pub(crate) times: u8,
+    pub(crate) derivative_order: u8,
 }
 
 /// The cut-off, Hz, that promises nearly the smallest error of the accelerations of all signals together, each relative
@@ -43,17 +43,17 @@ pub(crate) struct Signal<'a> {
 /// A low cut-off loses more samples at the ends, so the highest one is returned whose expected error is within a quarter
 /// of the smallest, or below 0.03 % of the acceleration; never above a fifth of the sampling rate, where central
 /// differences take more than the filter leaves.
-pub(crate) fn choose_cutoff(signals: &[Signal<'_>], rate_hz: f64, order: usize) -> Option<f64> {
+pub(crate) fn choose_cutoff(signals: &[DifferentiatedSignal<'_>], rate_hz: f64, order: usize) -> Option<f64> {
     let samples = signals.first()?.values.len();
     if samples < 32 || !(rate_hz > 0.0 && rate_hz.is_finite()) {
         return None;
     }
-    let spectra: Vec<Spectrum> = signals
+    let spectra: Vec<AccelerationSpectrum> = signals
         .iter()
-        .filter_map(|signal| Spectrum::new(*signal, rate_hz))
+        .filter_map(|signal| AccelerationSpectrum::new(*signal, rate_hz))
         .collect();
     let bins = spectra.first().map_or(0, |one| one.bins);
-    let gains = Gains::new(bins, order);
+    let gains = FilterGains::new(bins, order);
     if spectra.is_empty() {
         return None;
     }
@@ -62,11 +62,11 @@ pub(crate) fn choose_cutoff(signals: &[Signal<'_>], rate_hz: f64, order: usize) 
     let costs: Vec<(f64, f64)> = (0..=STEPS)
         .map(|i| lowest * (highest / lowest).powf(f64::from(i) / f64::from(STEPS)))
         .map(|cutoff| {
-            let transient = transients(cutoff / rate_hz, samples);
-            let passed = gains.passed(cutoff, rate_hz);
-            let noise = [1, 2].map(|times| gains.noise(&passed, times, rate_hz));
+            let transient = transient_error(cutoff / rate_hz, samples);
+            let passed = gains.passed_power(cutoff, rate_hz);
+            let noise = [1, 2].map(|times| gains.noise_power(&passed, times, rate_hz));
             let errors = spectra.iter().map(|spectrum| {
-                let noise = noise[usize::from(spectrum.times == 2)];
+                let noise = noise[usize::from(spectrum.derivative_order == 2)];
                 spectrum.relative_error(&passed, noise, &gains, transient)
             });
             (cutoff, errors.sum())
@@ -87,15 +87,15 @@ pub(crate) fn choose_cutoff(signals: &[Signal<'_>], rate_hz: f64, order: usize) 
 /// What transients at both ends leave in the samples that are kept, relative to the square of the acceleration, for a
 /// cut-off in parts of the sampling rate: three periods of it are dropped, or what a short recording can spare, and the
 /// transient falls tenfold in each.
-fn transients(cutoff: f64, samples: usize) -> f64 {
+fn transient_error(cutoff: f64, samples: usize) -> f64 {
     let periods = cutoff * samples as f64;
     let dropped = (periods / LONGEST_TRIM).min(TRIMMED_PERIODS);
     10.0_f64.powf(-2.0 * dropped) / (LN_10 * (periods - 2.0 * dropped))
 }
 
 /// Power of an acceleration over frequency, split into motion and noise.
-struct Spectrum {
-    times: u8,
+struct AccelerationSpectrum {
+    derivative_order: u8,
     /// Frequencies that there are.
     bins: usize,
     /// Power of the true acceleration at the frequencies at which the noise does not hide it.
@@ -104,11 +104,11 @@ struct Spectrum {
     noise: f64,
 }
 
-impl Spectrum {
+impl AccelerationSpectrum {
     /// `None` where no motion stands above the noise.
-    fn new(signal: Signal<'_>, rate_hz: f64) -> Option<Self> {
+    fn new(signal: DifferentiatedSignal<'_>, rate_hz: f64) -> Option<Self> {
         let mut differences = signal.values.to_vec();
-        for _ in 0..signal.times {
+        for _ in 0..signal.derivative_order {
             differences = differences
                 .windows(2)
                 .map(|w| (w[1] - w[0]) * rate_hz)
@@ -118,7 +118,7 @@ impl Spectrum {
         let bins = power.len();
         let angle = |k: usize| PI * k as f64 / (bins - 1) as f64;
         let shape =
-            |k: usize| (2.0 * rate_hz * (0.5 * angle(k)).sin()).powi(2 * i32::from(signal.times));
+            |k: usize| (2.0 * rate_hz * (0.5 * angle(k)).sin()).powi(2 * i32::from(signal.derivative_order));
         let upper: Vec<f64> = (bins * 3 / 4..bins - 1)
             .map(|k| power[k] / shape(k))
             .collect();
@@ -135,14 +135,14 @@ impl Spectrum {
         let narrowest = (8 * bins).div_ceil(differences.len());
         let mut start = 1;
         while start < bins {
-            let width = count(BAND * start as f64).max(narrowest);
+            let width = float_to_count(BAND * start as f64).max(narrowest);
             let end = (start + width).min(bins);
             let band: f64 = (start..end).map(|k| power[k] / shape(k)).sum();
             if band > ABOVE_NOISE * noise * (end - start) as f64 {
                 for k in start..end {
                     // What differences of neighbours take of a motion at this frequency.
                     let half = 0.5 * angle(k);
-                    let taken = (half.sin() / half).powi(2 * i32::from(signal.times));
+                    let taken = (half.sin() / half).powi(2 * i32::from(signal.derivative_order));
                     let above = power[k] - noise * shape(k);
                     if above > 0.0 {
                         motion.push((k, above / taken));
@@ -152,7 +152,7 @@ impl Spectrum {
             start = end;
         }
         (!motion.is_empty()).then_some(Self {
-            times: signal.times,
+            derivative_order: signal.derivative_order,
             bins,
             motion,
             noise,
@@ -161,8 +161,8 @@ impl Spectrum {
 
     /// Expected square error of the filtered acceleration, relative to the square of its size plus that error, where the
     /// filter passes `passed` of each frequency and noise of power 1 becomes one of power `noise`.
-    fn relative_error(&self, passed: &[f64], noise: f64, gains: &Gains, transient: f64) -> f64 {
-        let times = i32::from(self.times);
+    fn relative_error(&self, passed: &[f64], noise: f64, gains: &FilterGains, transient: f64) -> f64 {
+        let times = i32::from(self.derivative_order);
         let mut error = self.noise * noise;
         let mut size = 0.0;
         for (k, motion) in &self.motion {
@@ -177,7 +177,7 @@ impl Spectrum {
 }
 
 /// What filter and differences do at each frequency, but for the cut-off: the same for all signals and cut-offs.
-struct Gains {
+struct FilterGains {
     power: i32,
     /// The power of the filter, of the frequency as the bilinear transformation warps it.
     warped: Vec<f64>,
@@ -186,7 +186,7 @@ struct Gains {
     difference: Vec<f64>,
 }
 
-impl Gains {
+impl FilterGains {
     fn new(bins: usize, order: usize) -> Self {
         let power = 2 * i32::try_from(order).unwrap_or(i32::MAX / 2);
         let angles = (0..bins).map(|k| 0.5 * TAU * k as f64 / (bins - 1) as f64);
@@ -202,14 +202,14 @@ impl Gains {
     }
 
     /// What the filter of a cut-off passes of each frequency.
-    fn passed(&self, cutoff_hz: f64, rate_hz: f64) -> Vec<f64> {
+    fn passed_power(&self, cutoff_hz: f64, rate_hz: f64) -> Vec<f64> {
         let warped = (PI * cutoff_hz / rate_hz).tan().powi(self.power);
         let passed = |frequency: &f64| 1.0 / (1.0 + frequency / warped);
         self.warped.iter().map(passed).collect()
     }
 
     /// The power of accelerations from noise of power 1 of what is differentiated so many times.
-    fn noise(&self, passed: &[f64], times: i32, rate_hz: f64) -> f64 {
+    fn noise_power(&self, passed: &[f64], times: i32, rate_hz: f64) -> f64 {
         let pairs = passed.iter().zip(&self.sine).skip(1);
         pairs
             .map(|(passed, sine)| {
@@ -224,10 +224,10 @@ impl Gains {
 mod tests {
     use super::*;
     use crate::motion::derivatives::filter_and_differentiate;
-    use crate::test_noise::Noise;
+    use crate::test_noise::TestNoise;
 
-    fn twice(values: &[f64]) -> Signal<'_> {
-        Signal { values, times: 2 }
+    fn twice(values: &[f64]) -> DifferentiatedSignal<'_> {
+        DifferentiatedSignal { values, derivative_order: 2 }
     }
 
     /// The chosen cut-off gives nearly the smallest error that any cut-off could give.
@@ -245,7 +245,7 @@ mod tests {
             })
             .collect();
         for sigma in [1e-3, 4e-6, 1e-8] {
-            let mut noise = Noise::new(5);
+            let mut noise = TestNoise::new(5);
             let truth = |t: f64| -> f64 {
                 harmonics
                     .iter()
@@ -291,7 +291,7 @@ mod tests {
     #[test]
     fn a_coordinate_at_rest_has_no_cutoff() {
         assert_eq!(choose_cutoff(&[twice(&[1.0; 500])], 250.0, 4), None);
-        let mut noise = Noise::new(2);
+        let mut noise = TestNoise::new(2);
         let still: Vec<f64> = (0..500).map(|_| 1.0 + 1e-6 * noise.normal()).collect();
         // Chance peaks may pass for motion; nothing below may panic on them.
         let _ = choose_cutoff(&[twice(&still)], 250.0, 4);

@@ -8,12 +8,12 @@ const LANES: usize = 16;
 const FEW: usize = 4;
 
 /// The parallel filter passes this part of the sampling rate that is left.
-pub const PASSED_BY_DECIMATION: f64 = 0.4;
+pub const DECIMATION_PASSBAND: f64 = 0.4;
 
 /// The low-pass that [`decimate`] uses: Chebyshev 1, order 8, 0.05 dB, up to 0.8 of the new
 /// half rate.
 fn anti_alias(factor: usize) -> Result<LowPass, FilterError> {
-    LowPass::chebyshev1(8, 0.05, PASSED_BY_DECIMATION / factor as f64, 1.0)
+    LowPass::chebyshev1(8, 0.05, DECIMATION_PASSBAND / factor as f64, 1.0)
 }
 
 /// Every `factor`-th sample, starting with the first, of the zero-phase low-passed signal

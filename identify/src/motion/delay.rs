@@ -4,14 +4,14 @@
 //! by the cubic through the four nearest (Lagrange). A sample whose states would lie before the first or behind the last
 //! one has no partner and is dropped.
 
-use crate::motion::run::Run;
+use crate::motion::run::PreparedRun;
 
-impl Run {
+impl PreparedRun {
     /// Pairs every force with the states `delay` seconds before it was read, and gives how many samples at the start and at
     /// the end are dropped for lack of states. A negative delay pairs it with later ones.
     ///
     /// `None` leaves the run as it is: fewer than four samples would be left.
-    pub fn pair_with_earlier_states(&mut self, delay: f64) -> Option<(usize, usize)> {
+    pub fn shift_states_by_delay(&mut self, delay: f64) -> Option<(usize, usize)> {
         let n = self.time.len();
         let (Some(&first), Some(&last)) = (self.time.first(), self.time.last()) else {
             return None;
@@ -25,7 +25,7 @@ impl Run {
         }
         let stencils: Vec<(usize, [f64; 4])> = self.time[start..end]
             .iter()
-            .map(|t| stencil(&self.time, t - delay))
+            .map(|t| cubic_stencil(&self.time, t - delay))
             .collect();
         let states = (self.q.iter_mut()).chain(&mut self.qd).chain(&mut self.qdd);
         for column in states {
@@ -51,7 +51,7 @@ impl Run {
 }
 
 /// The first of the four samples around a time, and their weights in the cubic through them.
-fn stencil(time: &[f64], at: f64) -> (usize, [f64; 4]) {
+fn cubic_stencil(time: &[f64], at: f64) -> (usize, [f64; 4]) {
     let above = time.partition_point(|t| *t < at);
     let first = above.saturating_sub(2).min(time.len() - 4);
     let nodes = &time[first..first + 4];
@@ -67,15 +67,15 @@ fn stencil(time: &[f64], at: f64) -> (usize, [f64; 4]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::motion::prepared_as::PreparedAs;
+    use crate::motion::prepared_as::PreparationRecord;
 
     /// Uneven samples of cubics, with the time itself as the force.
-    fn run(n: u32) -> Run {
+    fn run(n: u32) -> PreparedRun {
         let time: Vec<f64> = (0..n)
             .map(|i| 0.01 * f64::from(i) + 0.003 * f64::from(i % 3))
             .collect();
         let column = |of: fn(f64) -> f64| vec![time.iter().map(|t| of(*t)).collect()];
-        Run {
+        PreparedRun {
             file: "run.csv".to_owned(),
             q: column(|t| t * t * t - t),
             qd: column(|t| 3.0 * t * t - 1.0),
@@ -84,8 +84,8 @@ mod tests {
             missing_force: Vec::new(),
             left_out: Vec::new(),
             lines: (2..u64::from(n) + 2).collect(),
-            repeats: None,
-            prepared: PreparedAs::default(),
+            repeatability: None,
+            prepared: PreparationRecord::default(),
             notes: Vec::new(),
             time,
         }
@@ -96,7 +96,7 @@ mod tests {
         for delay in [0.0, 0.0042, -0.0042, 0.013, 0.25] {
             let mut moved = run(60);
             let lost = moved
-                .pair_with_earlier_states(delay)
+                .shift_states_by_delay(delay)
                 .expect("samples are left");
             let n = moved.time.len();
             assert_eq!(n + lost.0 + lost.1, 60);
@@ -119,8 +119,8 @@ mod tests {
     #[test]
     fn a_delay_beyond_the_recording_leaves_it() {
         let mut short = run(10);
-        assert_eq!(short.pair_with_earlier_states(5.0), None);
+        assert_eq!(short.shift_states_by_delay(5.0), None);
         assert_eq!(short.time.len(), 10);
-        assert_eq!(run(3).pair_with_earlier_states(0.0), None);
+        assert_eq!(run(3).shift_states_by_delay(0.0), None);
     }
 }

@@ -40,7 +40,7 @@ pub fn differentiate(time: &[f64], values: &[f64]) -> Vec<f64> {
 
 /// One coordinate with its derivatives, as [`filter_and_differentiate`] returns it; all of the same length.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Smoothed {
+pub struct SmoothedCoordinate {
     /// Filtered positions.
     pub q: Vec<f64>,
     /// Rates, central differences of `q`.
@@ -57,11 +57,11 @@ pub fn filter_and_differentiate(
     positions: &[f64],
     cutoff_hz: f64,
     order: usize,
-) -> Result<Smoothed, FilterError> {
+) -> Result<SmoothedCoordinate, FilterError> {
     let q = LowPass::butterworth(order, cutoff_hz, mean_rate(time))?.zero_phase(positions)?;
     let qd = differentiate(time, &q);
     let qdd = differentiate(time, &qd);
-    Ok(Smoothed { q, qd, qdd })
+    Ok(SmoothedCoordinate { q, qd, qdd })
 }
 
 /// Samples per second on average; 0 for fewer than two samples.

@@ -12,7 +12,7 @@ const MOST_DECIMALS: i32 = 9;
 
 /// How samples stand in time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Steps {
+pub(crate) enum SampleSpacing {
     /// At even times.
     Even,
     /// At even times, whose stamps are rounded to as many decimals as they have.
@@ -22,30 +22,30 @@ pub(crate) enum Steps {
 }
 
 /// How samples stand in time, as far as their stamps can tell.
-pub(crate) fn steps(time: &[f64]) -> Steps {
+pub(crate) fn sample_spacing(time: &[f64]) -> SampleSpacing {
     let n = time.len();
     if n < 3 {
-        return Steps::Even;
+        return SampleSpacing::Even;
     }
     let grid = even_times(time);
     let step = (grid[n - 1] - grid[0]) / (n - 1) as f64;
     let off = (time.iter().zip(&grid)).fold(0.0_f64, |most, (t, even)| most.max((t - even).abs()));
     if off <= OFF_GRID * step {
-        Steps::Even
-    } else if off <= unit_of(time) {
-        Steps::Rounded
+        SampleSpacing::Even
+    } else if off <= timestamp_resolution(time) {
+        SampleSpacing::Rounded
     } else {
-        Steps::Uneven
+        SampleSpacing::Uneven
     }
 }
 
 /// Whether the steps are even but for rounding.
 pub(crate) fn is_even(time: &[f64]) -> bool {
-    steps(time) != Steps::Uneven
+    sample_spacing(time) != SampleSpacing::Uneven
 }
 
 /// Half of the last decimal that any of the stamps has; 0 where they have more than are written.
-fn unit_of(time: &[f64]) -> f64 {
+fn timestamp_resolution(time: &[f64]) -> f64 {
     let has = |decimals: i32| {
         let scale = 10.0_f64.powi(decimals);
         let is_whole =
@@ -83,19 +83,19 @@ pub(crate) fn spread_times(time: &[f64]) -> Vec<f64> {
 }
 
 /// The values at [`spread_times`].
-pub(crate) fn on_even_times(time: &[f64], values: &[f64]) -> Vec<f64> {
-    Spline::new(time, values).at_all(&spread_times(time))
+pub(crate) fn resample_evenly(time: &[f64], values: &[f64]) -> Vec<f64> {
+    CubicSpline::new(time, values).evaluate_at(&spread_times(time))
 }
 
 /// The cubic spline through some samples.
-pub(crate) struct Spline<'a> {
+pub(crate) struct CubicSpline<'a> {
     time: &'a [f64],
     values: &'a [f64],
     /// Second derivatives at the samples.
-    bends: Vec<f64>,
+    second_derivatives: Vec<f64>,
 }
 
-impl<'a> Spline<'a> {
+impl<'a> CubicSpline<'a> {
     /// Times must increase; there must be as many values (asserted).
     pub(crate) fn new(time: &'a [f64], values: &'a [f64]) -> Self {
         assert_eq!(time.len(), values.len(), "one value per time");
@@ -119,12 +119,12 @@ impl<'a> Spline<'a> {
         Self {
             time,
             values,
-            bends,
+            second_derivatives: bends,
         }
     }
 
     /// The values at some times, which must not decrease; beyond the ends the end pieces go on.
-    pub(crate) fn at_all(&self, times: &[f64]) -> Vec<f64> {
+    pub(crate) fn evaluate_at(&self, times: &[f64]) -> Vec<f64> {
         let n = self.time.len();
         if n < 2 {
             return vec![self.values.first().copied().unwrap_or(0.0); times.len()];
@@ -136,7 +136,7 @@ impl<'a> Spline<'a> {
             }
             let step = self.time[i + 1] - self.time[i];
             let [a, b] = [(self.time[i + 1] - t) / step, (t - self.time[i]) / step];
-            let bend = (a.powi(3) - a) * self.bends[i] + (b.powi(3) - b) * self.bends[i + 1];
+            let bend = (a.powi(3) - a) * self.second_derivatives[i] + (b.powi(3) - b) * self.second_derivatives[i + 1];
             a * self.values[i] + b * self.values[i + 1] + bend * step * step / 6.0
         };
         times.iter().map(at).collect()
@@ -174,7 +174,7 @@ mod tests {
                 .collect();
             let values: Vec<f64> = time.iter().map(|t| t.sin()).collect();
             let asked: Vec<f64> = (0..500).map(|k| 1.5 + 0.006 * f64::from(k)).collect();
-            let found = Spline::new(&time, &values).at_all(&asked);
+            let found = CubicSpline::new(&time, &values).evaluate_at(&asked);
             let off = asked.iter().zip(found).map(|(t, v)| (v - t.sin()).abs());
             off.fold(0.0, f64::max)
         };

@@ -6,8 +6,8 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use crate::motion::derivatives::Smoothed;
-use crate::signal::count;
+use crate::motion::derivatives::SmoothedCoordinate;
+use crate::signal::float_to_count;
 
 /// Degree of the polynomials: the lowest whose second derivative is smooth to second order.
 pub(crate) const DEGREE: usize = 4;
@@ -17,17 +17,17 @@ const TERMS: usize = DEGREE + 1;
 /// Schafer's eq. (12), never less than a fit needs.
 pub(crate) fn half_width(cutoff_hz: f64, rate_hz: f64) -> usize {
     let width = (TERMS as f64 * 0.5 * rate_hz / cutoff_hz + 4.6) / 3.2;
-    count(width.round()).max(DEGREE)
+    float_to_count(width.round()).max(DEGREE)
 }
 
 /// Smoothed positions with both derivatives from windows of `2 half_width + 1` samples; `None` if there are fewer.
-pub(crate) fn smooth(time: &[f64], positions: &[f64], half_width: usize) -> Option<Smoothed> {
+pub(crate) fn smooth_by_polynomials(time: &[f64], positions: &[f64], half_width: usize) -> Option<SmoothedCoordinate> {
     let n = time.len();
     let width = 2 * half_width + 1;
     if n < width || width <= TERMS {
         return None;
     }
-    let mut prepared = Smoothed {
+    let mut prepared = SmoothedCoordinate {
         q: Vec::with_capacity(n),
         qd: Vec::with_capacity(n),
         qdd: Vec::with_capacity(n),
@@ -58,7 +58,7 @@ pub(crate) fn smooth(time: &[f64], positions: &[f64], half_width: usize) -> Opti
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_noise::Noise;
+    use crate::test_noise::TestNoise;
 
     #[test]
     fn polynomials_are_exact_on_uneven_times() {
@@ -69,13 +69,13 @@ mod tests {
             .iter()
             .map(|t| 1.0 - t + 3.0 * t.powi(2) - 2.0 * t.powi(4))
             .collect();
-        let found = smooth(&time, &q, 7).unwrap();
+        let found = smooth_by_polynomials(&time, &q, 7).unwrap();
         for (i, t) in time.iter().enumerate() {
             assert!((found.q[i] - q[i]).abs() < 1e-10);
             assert!((found.qd[i] - (-1.0 + 6.0 * t - 8.0 * t.powi(3))).abs() < 1e-8);
             assert!((found.qdd[i] - (6.0 - 24.0 * t.powi(2))).abs() < 1e-5);
         }
-        assert_eq!(smooth(&time[..10], &q[..10], 7), None);
+        assert_eq!(smooth_by_polynomials(&time[..10], &q[..10], 7), None);
     }
 
     /// A tone well below the cut-off passes, noise is much reduced.
@@ -83,13 +83,13 @@ mod tests {
     fn the_width_suits_the_cutoff() {
         let rate = 500.0;
         let time: Vec<f64> = (0..4000).map(|i| f64::from(i) / rate).collect();
-        let mut noise = Noise::new(3);
+        let mut noise = TestNoise::new(3);
         let w = std::f64::consts::TAU * 1.5;
         let q: Vec<f64> = time
             .iter()
             .map(|t| (w * t).sin() + 1e-5 * noise.normal())
             .collect();
-        let found = smooth(&time, &q, half_width(15.0, rate)).unwrap();
+        let found = smooth_by_polynomials(&time, &q, half_width(15.0, rate)).unwrap();
         let error: f64 = (100..3900)
             .map(|i| (found.qdd[i] + w * w * (w * time[i]).sin()).powi(2))
             .sum::<f64>()

@@ -18,13 +18,13 @@ mod series;
 mod smooth;
 
 pub use decimation::{
-    PASSED_BY_DECIMATION, decimate, decimate_columns, decimate_table, decimate_time,
+    DECIMATION_PASSBAND, decimate, decimate_columns, decimate_table, decimate_time,
 };
 pub(crate) use derivatives::mean_rate;
-pub use derivatives::{Smoothed, differentiate, filter_and_differentiate};
-pub(crate) use even::{is_even, on_even_times};
-pub use options::{DerivativeSource, Preparation, Smoothing};
-pub use periods::Repeats;
-pub use prepare::Open;
-pub use prepared_as::PreparedAs;
-pub use run::Run;
+pub use derivatives::{SmoothedCoordinate, differentiate, filter_and_differentiate};
+pub(crate) use even::{is_even, resample_evenly};
+pub use options::{DerivativeSource, StatePreparation, SmoothingMethod};
+pub use periods::RunRepeatability;
+pub use prepare::PreparationChoices;
+pub use prepared_as::PreparationRecord;
+pub use run::PreparedRun;

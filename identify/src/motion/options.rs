@@ -16,7 +16,7 @@ pub enum DerivativeSource {
 /// How positions become smooth positions, rates and accelerations.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Smoothing {
+pub enum SmoothingMethod {
     /// A Fourier series where the run is periodic and the series leaves nothing but noise, or less of the forces on held-out
     /// time, unless a cut-off is given; Butterworth's low-pass otherwise.
     #[default]
@@ -35,7 +35,7 @@ pub enum Smoothing {
 /// How states are prepared from a recording. [`Preparation::default`] suits a file of positions.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
-pub struct Preparation {
+pub struct StatePreparation {
     /// Cut-off of the low-pass on the positions, Hz; chosen from the signal when absent.
     pub cutoff_hz: Option<f64>,
     /// Order of the Butterworth filter in one direction.
@@ -50,7 +50,7 @@ pub struct Preparation {
     /// Which derivatives are prepared.
     pub source: DerivativeSource,
     /// How they are prepared.
-    pub smoothing: Smoothing,
+    pub smoothing: SmoothingMethod,
     /// Up to which frequency forces are compared beside the raw figures, Hz; the cut-off, or what the motion reaches, when
     /// absent.
     pub band_hz: Option<f64>,
@@ -63,7 +63,7 @@ pub struct Preparation {
     pub unexamined: bool,
 }
 
-impl Default for Preparation {
+impl Default for StatePreparation {
     fn default() -> Self {
         Self {
             cutoff_hz: None,
@@ -71,7 +71,7 @@ impl Default for Preparation {
             trim: None,
             decimate: 1,
             source: DerivativeSource::RecordedFirst,
-            smoothing: Smoothing::Automatic,
+            smoothing: SmoothingMethod::Automatic,
             band_hz: None,
             chosen: false,
             unexamined: false,
@@ -79,7 +79,7 @@ impl Default for Preparation {
     }
 }
 
-impl Preparation {
+impl StatePreparation {
     /// The recipe of the EMPS reference: order 4 at 100 Hz, the first 49 samples dropped,
     /// decimation by 10. As many are dropped at the end, where differences are one-sided: with
     /// one or two bad accelerations left there the error rises from 4.04 to 4.3 %, while any

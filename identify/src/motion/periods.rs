@@ -7,7 +7,7 @@
 use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 
-use crate::signal::{count, median};
+use crate::signal::{float_to_count, median};
 
 /// Points of the coarse search for a period.
 const GRID: usize = 2048;
@@ -19,7 +19,7 @@ const JUMP: f64 = 8.0;
 
 /// How well a periodic run repeats itself.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Repeats {
+pub struct RunRepeatability {
     /// The period, s.
     pub period: f64,
     /// Whole periods in the run.
@@ -49,7 +49,7 @@ pub(crate) fn find_period(time: &[f64], positions: &[&[f64]]) -> Option<f64> {
     let mut samples = time.len().min(GRID);
     loop {
         let found = coarse_period(&time[..samples], &moving)
-            .map(|(period, step)| refine(time, &moving, period, step))
+            .map(|(period, step)| refine_period(time, &moving, period, step))
             .filter(|(period, apart)| *apart < SAME && *period <= longest);
         if let Some((period, _)) = found {
             return Some(period);
@@ -103,7 +103,7 @@ fn coarse_period(time: &[f64], moving: &[(&[f64], f64)]) -> Option<(f64, f64)> {
 
 /// A period on the true time base of the whole run, to a small part of a step, and how far the motion is from itself
 /// after it.
-fn refine(time: &[f64], moving: &[(&[f64], f64)], period: f64, step: f64) -> (f64, f64) {
+fn refine_period(time: &[f64], moving: &[(&[f64], f64)], period: f64, step: f64) -> (f64, f64) {
     let end = time[time.len() - 1];
     let stride = (time.len() / (4 * GRID)).max(1);
     let apart = |period: f64| -> f64 {
@@ -120,23 +120,23 @@ fn refine(time: &[f64], moving: &[(&[f64], f64)], period: f64, step: f64) -> (f6
         }
         sum / f64::from(n.max(1))
     };
-    let period = smallest(apart, period - 1.5 * step, period + 1.5 * step);
+    let period = minimise_by_golden_sections(apart, period - 1.5 * step, period + 1.5 * step);
     (period, apart(period))
 }
 
 /// The spread of forces over the periods of a run; `None` where it holds fewer than two, or no force.
-pub(crate) fn repeats(
+pub(crate) fn measure_repeatability(
     time: &[f64],
     period: f64,
     names: &[String],
     forces: &[Vec<f64>],
-) -> Option<Repeats> {
+) -> Option<RunRepeatability> {
     let (start, end) = (*time.first()?, *time.last()?);
     let step = (end - start) / (time.len() - 1) as f64;
     // The last sample of the last period lies one step before the next one would begin.
     // The period is known to a part of a step.
-    let periods = count((end + 1.5 * step - start) / period);
-    let phases = count((period / step).round());
+    let periods = float_to_count((end + 1.5 * step - start) / period);
+    let phases = float_to_count((period / step).round());
     if periods < 2 || phases < 2 {
         return None;
     }
@@ -146,7 +146,7 @@ pub(crate) fn repeats(
     for phase in 0..phases {
         let all = (0..periods).map(|k| {
             let t = start + period * (k as f64 + phase as f64 / phases as f64);
-            between(time, t, 1.5 * step)
+            bracketing_sample(time, t, 1.5 * step)
         });
         places.extend(all.collect::<Option<Vec<_>>>());
     }
@@ -177,7 +177,7 @@ pub(crate) fn repeats(
     let total = sums
         .iter()
         .fold((0.0, 0.0), |(e, s), (error, size)| (e + error, s + size));
-    Some(Repeats {
+    Some(RunRepeatability {
         period,
         periods,
         noise_floor: ratio(total)?,
@@ -198,7 +198,7 @@ fn variance(values: &[f64]) -> f64 {
 
 /// The sample before a time and the part of the way to the next one; `None` where these are more than `apart` from each
 /// other. Beyond the ends the first and the last pair go on for half as long.
-fn between(time: &[f64], at: f64, apart: f64) -> Option<(usize, f64)> {
+fn bracketing_sample(time: &[f64], at: f64, apart: f64) -> Option<(usize, f64)> {
     let after = time.partition_point(|t| *t < at).clamp(1, time.len() - 1);
     let (t0, t1) = (time[after - 1], time[after]);
     let is_near = t1 - t0 <= apart && at >= t0 - 0.5 * apart && at <= t1 + 0.5 * apart;
@@ -213,7 +213,7 @@ fn interpolate(time: &[f64], values: &[f64], at: f64) -> f64 {
 }
 
 /// Where a function with one dip is smallest, by golden sections.
-fn smallest(f: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
+fn minimise_by_golden_sections(f: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
     let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
     for _ in 0..40 {
         let (a, b) = (high - golden * (high - low), low + golden * (high - low));
@@ -231,7 +231,7 @@ mod tests {
     use std::f64::consts::TAU;
 
     use super::*;
-    use crate::test_noise::Noise;
+    use crate::test_noise::TestNoise;
 
     const PERIOD: f64 = 2.37;
 
@@ -250,7 +250,7 @@ mod tests {
     #[test]
     fn the_period_is_found_on_the_true_time_base() {
         let time = times(2500);
-        let mut noise = Noise::new(4);
+        let mut noise = TestNoise::new(4);
         let q: Vec<f64> = time
             .iter()
             .map(|t| motion(*t) + 1e-4 * noise.normal())
@@ -276,7 +276,7 @@ mod tests {
     /// jump with the sign of a rate, and a piece of the run is missing.
     #[test]
     fn the_spread_over_periods_is_the_noise() {
-        let mut noise = Noise::new(9);
+        let mut noise = TestNoise::new(9);
         for (jump, missing) in [(0.0, 0), (20.0, 0), (20.0, 100)] {
             let time: Vec<f64> = (0..5925)
                 .filter(|i| !(1500..1500 + missing).contains(i))
@@ -290,7 +290,7 @@ mod tests {
                 })
                 .collect();
             let size = (force.iter().map(|f| f * f).sum::<f64>() / force.len() as f64).sqrt();
-            let found = repeats(&time, PERIOD, &["a".to_owned()], &[force]).expect("ten periods");
+            let found = measure_repeatability(&time, PERIOD, &["a".to_owned()], &[force]).expect("ten periods");
             assert_eq!(found.periods, 10);
             assert!(
                 (found.noise_floor * size / 0.3 - 1.0).abs() < 0.05,

@@ -1,46 +1,46 @@
 //! Which way of smoothing suits a recording, and states by it: columns go in, positions with both derivatives come out.
 
-use crate::motion::cutoff::{LONGEST_TRIM, Signal, TRIMMED_PERIODS, choose_cutoff};
+use crate::motion::cutoff::{LONGEST_TRIM, DifferentiatedSignal, TRIMMED_PERIODS, choose_cutoff};
 use crate::motion::derivatives::mean_rate;
-use crate::motion::even::{is_even, on_even_times};
-use crate::motion::options::{Preparation, Smoothing};
-use crate::motion::prepared_as::PreparedAs;
-use crate::motion::run::Run;
-use crate::motion::series::{self, Periodic};
-use crate::motion::smooth::{Recorded, Way};
+use crate::motion::even::{is_even, resample_evenly};
+use crate::motion::options::{StatePreparation, SmoothingMethod};
+use crate::motion::prepared_as::PreparationRecord;
+use crate::motion::run::PreparedRun;
+use crate::motion::series::{self, PeriodicSeries};
+use crate::motion::smooth::{RecordedCoordinate, SmoothingFilter};
 use crate::motion::{local_polynomials, periods};
-use crate::recording::{Fault, Note, Recording, RecordingError};
-use crate::signal::{LowPass, count};
-use crate::words::list;
+use crate::recording::{RecordingFault, RecordingNote, SignalRecording, RecordingError};
+use crate::signal::{LowPass, float_to_count};
+use crate::words::backquoted_list;
 
-impl Recording {
+impl SignalRecording {
     /// States of all coordinates by the way of smoothing that the preparation asks for, or that suits them; what was
     /// chosen goes into `prepared` and `notes`.
     pub(crate) fn prepare_states(
         &self,
         time: &[f64],
-        columns: &[Recorded<'_>],
-        preparation: &Preparation,
-        prepared: &mut PreparedAs,
-        notes: &mut Vec<Note>,
+        columns: &[RecordedCoordinate<'_>],
+        preparation: &StatePreparation,
+        prepared: &mut PreparationRecord,
+        notes: &mut Vec<RecordingNote>,
     ) -> Result<Vec<[Vec<f64>; 3]>, RecordingError> {
-        let incomplete: Vec<&Recorded<'_>> = columns.iter().filter(|c| !c.is_complete()).collect();
+        let incomplete: Vec<&RecordedCoordinate<'_>> = columns.iter().filter(|c| !c.is_complete()).collect();
         if incomplete.is_empty() {
-            return Ok(columns.iter().filter_map(Recorded::complete).collect());
+            return Ok(columns.iter().filter_map(RecordedCoordinate::recorded_states).collect());
         }
         prepared.coordinates = incomplete.iter().map(|c| c.name.clone()).collect();
         let order = preparation.order;
         let rate = mean_rate(time);
         if time.len() < 3 {
-            return Err(self.fault(Fault::TooFewSamples {
+            return Err(self.fault(RecordingFault::TooFewSamples {
                 have: time.len(),
-                need: Way::Butterworth { order }.need(),
+                need: SmoothingFilter::Butterworth { order }.min_samples(),
                 purpose: "preparing derivatives from positions",
             }));
         }
         let design = |cutoff: f64| {
             LowPass::butterworth(order, cutoff, rate).map_err(|error| {
-                self.fault(Fault::Filter {
+                self.fault(RecordingFault::Filter {
                     column: prepared.coordinates.join(", "),
                     error,
                 })
@@ -48,15 +48,15 @@ impl Recording {
         };
         let need = design(rate / 4.0)?.padding() + 1;
         if time.len() < need {
-            return Err(self.fault(Fault::TooFewSamples {
+            return Err(self.fault(RecordingFault::TooFewSamples {
                 have: time.len(),
                 need,
                 purpose: "preparing derivatives from positions",
             }));
         }
-        let found = series_of(time, columns, preparation);
+        let found = find_motion_series(time, columns, preparation);
         // One cut-off for all coordinates keeps loops consistent.
-        let chosen = || cutoff_of(time, &incomplete, order);
+        let chosen = || choose_cutoff_for(time, &incomplete, order);
         let cutoff = match &found {
             Some(found) => found.harmonics as f64 / found.period,
             None => preparation.cutoff_hz.or_else(chosen).unwrap_or(0.1 * rate),
@@ -65,86 +65,86 @@ impl Recording {
         // A cut-off whose period is longer than the recording leaves nothing of it but a trend.
         let lowest = rate / time.len() as f64;
         if cutoff < lowest && found.is_none() {
-            return Err(self.fault(Fault::CutoffTooLow {
+            return Err(self.fault(RecordingFault::CutoffTooLow {
                 cutoff_hz: cutoff,
                 lowest_hz: lowest,
                 duration: time.len() as f64 / rate,
             }));
         }
         let way = match (preparation.smoothing, &found) {
-            (_, Some(found)) => Way::Series {
+            (_, Some(found)) => SmoothingFilter::Series {
                 period: found.period,
                 harmonics: found.harmonics,
             },
-            (Smoothing::Automatic | Smoothing::Butterworth, None) => Way::Butterworth { order },
-            (Smoothing::SavitzkyGolay, None) => Way::Polynomials {
+            (SmoothingMethod::Automatic | SmoothingMethod::Butterworth, None) => SmoothingFilter::Butterworth { order },
+            (SmoothingMethod::SavitzkyGolay, None) => SmoothingFilter::Polynomials {
                 half_width: local_polynomials::half_width(cutoff, rate),
             },
-            (Smoothing::Fourier { period }, None) => {
+            (SmoothingMethod::Fourier { period }, None) => {
                 let positions: Vec<&[f64]> = columns.iter().map(|c| c.q).collect();
                 let period = period.or_else(|| periods::find_period(time, &positions));
-                let period = period.ok_or_else(|| self.fault(Fault::NoPeriod))?;
+                let period = period.ok_or_else(|| self.fault(RecordingFault::NoPeriod))?;
                 let duration = time[time.len() - 1] - time[0];
                 let (shortest, longest) = (4.0 / rate, 1.5 * duration);
                 if !(shortest..longest).contains(&period) {
-                    return Err(self.fault(Fault::Period {
+                    return Err(self.fault(RecordingFault::Period {
                         period,
                         shortest,
                         longest,
                     }));
                 }
-                let harmonics = count(cutoff * period).max(1);
-                Way::Series { period, harmonics }
+                let harmonics = float_to_count(cutoff * period).max(1);
+                SmoothingFilter::Series { period, harmonics }
             }
         };
         prepared.cutoff_hz = Some(cutoff);
         prepared.cutoff_chosen = preparation.cutoff_hz.is_none() || preparation.chosen;
         // A series has no transients at its ends.
-        if !matches!(way, Way::Series { .. }) {
-            prepared.trimmed = self.transients(rate / cutoff, time.len(), preparation, notes);
+        if !matches!(way, SmoothingFilter::Series { .. }) {
+            prepared.trimmed = self.transient_samples(rate / cutoff, time.len(), preparation, notes);
         }
-        if let Way::Series { period, .. } = way {
+        if let SmoothingFilter::Series { period, .. } = way {
             prepared.period = Some(period);
         }
         if let Some(found) = &found {
-            notes.push(Note::info(self.describe_series(found, &incomplete)));
+            notes.push(RecordingNote::info(self.describe_series(found, &incomplete)));
         } else {
-            notes.push(Note::info(format!(
+            notes.push(RecordingNote::info(format!(
                 "Derivatives of {} in {} are prepared: {}.",
-                list(&prepared.coordinates),
+                backquoted_list(&prepared.coordinates),
                 self.file(),
                 way.describe(cutoff, prepared.cutoff_chosen && !preparation.chosen),
             )));
         }
-        let states = self.smoothed(time, columns, cutoff, way)?;
+        let states = self.smooth_columns(time, columns, cutoff, way)?;
         // Where forces have chosen a series, they have told that what it leaves is no motion.
-        if found.is_none() && !preparation.chosen && matches!(way, Way::Series { .. }) {
-            self.note_left_over(columns, &states, notes);
+        if found.is_none() && !preparation.chosen && matches!(way, SmoothingFilter::Series { .. }) {
+            self.note_series_residual(columns, &states, notes);
         }
         Ok(states)
     }
 
     /// All columns smoothed and differentiated in one way.
-    fn smoothed(
+    fn smooth_columns(
         &self,
         time: &[f64],
-        columns: &[Recorded<'_>],
+        columns: &[RecordedCoordinate<'_>],
         cutoff: f64,
-        way: Way,
+        way: SmoothingFilter,
     ) -> Result<Vec<[Vec<f64>; 3]>, RecordingError> {
         columns
             .iter()
             .map(|column| {
                 let all = column.prepare(time, cutoff, way).map_err(|error| {
-                    self.fault(Fault::Filter {
+                    self.fault(RecordingFault::Filter {
                         column: column.name.clone(),
                         error,
                     })
                 })?;
                 all.ok_or_else(|| {
-                    self.fault(Fault::TooFewSamples {
+                    self.fault(RecordingFault::TooFewSamples {
                         have: time.len(),
-                        need: way.need(),
+                        need: way.min_samples(),
                         purpose: "smoothing at this cut-off",
                     })
                 })
@@ -154,17 +154,17 @@ impl Recording {
 
     /// Samples that the filter's transients spoil at both ends, `period` being that of the cut-off
     /// in samples.
-    fn transients(
+    fn transient_samples(
         &self,
         period: f64,
         samples: usize,
-        preparation: &Preparation,
-        notes: &mut Vec<Note>,
+        preparation: &StatePreparation,
+        notes: &mut Vec<RecordingNote>,
     ) -> (usize, usize) {
-        let most = count(samples as f64 / LONGEST_TRIM);
+        let most = float_to_count(samples as f64 / LONGEST_TRIM);
         let spoilt = (1..most).find(|count| *count as f64 >= TRIMMED_PERIODS * period);
         if spoilt.is_none() && preparation.trim.is_none() {
-            notes.push(Note::warning(format!(
+            notes.push(RecordingNote::warning(format!(
                 "{} is short for its cut-off: the filter's transients reach beyond the samples dropped at the ends; \
                  use a longer recording or a higher cut-off.",
                 self.file()
@@ -176,18 +176,18 @@ impl Recording {
 }
 
 /// The cut-off that suits what is to be differentiated, on even times.
-fn cutoff_of(time: &[f64], columns: &[&Recorded<'_>], order: usize) -> Option<f64> {
+fn choose_cutoff_for(time: &[f64], columns: &[&RecordedCoordinate<'_>], order: usize) -> Option<f64> {
     let rate = mean_rate(time);
-    let sources: Vec<Signal<'_>> = columns.iter().map(|c| c.source()).collect();
+    let sources: Vec<DifferentiatedSignal<'_>> = columns.iter().map(|c| c.signal_to_differentiate()).collect();
     if is_even(time) {
         return choose_cutoff(&sources, rate, order);
     }
     let even: Vec<Vec<f64>> = sources
         .iter()
-        .map(|signal| on_even_times(time, signal.values))
+        .map(|signal| resample_evenly(time, signal.values))
         .collect();
-    let even: Vec<Signal<'_>> = (sources.iter().zip(&even))
-        .map(|(signal, values)| Signal { values, ..*signal })
+    let even: Vec<DifferentiatedSignal<'_>> = (sources.iter().zip(&even))
+        .map(|(signal, values)| DifferentiatedSignal { values, ..*signal })
         .collect();
     choose_cutoff(&even, rate, order)
 }
@@ -197,7 +197,7 @@ const MANY_HARMONICS: f64 = 25.5;
 
 /// What is open in the preparation of a recording.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Open {
+pub struct PreparationChoices {
     /// Mean sampling rate, Hz.
     pub rate_hz: f64,
     /// Up to where forces follow the motion, Hz.
@@ -208,17 +208,17 @@ pub struct Open {
     pub period: Option<f64>,
 }
 
-impl Recording {
+impl SignalRecording {
     /// What there is to choose where the preparation leaves cut-off, smoothing and decimation open; `None` where it does not,
     /// where all derivatives are recorded, where a Fourier series leaves nothing but noise, and where nothing moves.
     /// Fails as [`Recording::runs_with`] does.
-    pub fn open(
+    pub fn find_open_choices(
         &self,
         coordinates: &[String],
         drives: &[String],
-        preparation: &Preparation,
-    ) -> Result<Option<Open>, RecordingError> {
-        let usual = Preparation::default();
+        preparation: &StatePreparation,
+    ) -> Result<Option<PreparationChoices>, RecordingError> {
+        let usual = StatePreparation::default();
         let is_open = preparation.cutoff_hz.is_none()
             && preparation.smoothing == usual.smoothing
             && preparation.decimate <= 1;
@@ -226,7 +226,7 @@ impl Recording {
             return Ok(None);
         }
         // The band that figures are asked for is none of the motion.
-        let preparation = Preparation {
+        let preparation = StatePreparation {
             band_hz: None,
             ..preparation.clone()
         };
@@ -243,14 +243,14 @@ impl Recording {
             Some((mean_rate(&run.time), prepared.band_hz?, cutoff?))
         });
         Ok(found.map(|(rate_hz, band_hz, cutoff_hz)| {
-            let as_series = Preparation {
-                smoothing: Smoothing::Fourier { period: None },
+            let as_series = StatePreparation {
+                smoothing: SmoothingMethod::Fourier { period: None },
                 cutoff_hz: Some(cutoff_hz),
                 ..preparation
             };
             let runs = self.runs_with(coordinates, drives, &as_series).ok();
-            let longest = runs.and_then(|runs| runs.into_iter().max_by_key(Run::samples));
-            Open {
+            let longest = runs.and_then(|runs| runs.into_iter().max_by_key(PreparedRun::samples));
+            PreparationChoices {
                 rate_hz,
                 band_hz,
                 cutoff_hz,
@@ -261,19 +261,19 @@ impl Recording {
 }
 
 /// The series of which what is to be differentiated is samples, where the preparation leaves that open.
-pub(crate) fn series_of(
+pub(crate) fn find_motion_series(
     time: &[f64],
-    columns: &[Recorded<'_>],
-    preparation: &Preparation,
-) -> Option<Periodic> {
+    columns: &[RecordedCoordinate<'_>],
+    preparation: &StatePreparation,
+) -> Option<PeriodicSeries> {
     let is_open = matches!(
         preparation.smoothing,
-        Smoothing::Automatic | Smoothing::Fourier { period: None }
+        SmoothingMethod::Automatic | SmoothingMethod::Fourier { period: None }
     );
     if !is_open || preparation.cutoff_hz.is_some() {
         return None;
     }
     let incomplete = columns.iter().filter(|column| !column.is_complete());
-    let signals: Vec<&[f64]> = incomplete.map(|column| column.source().values).collect();
+    let signals: Vec<&[f64]> = incomplete.map(|column| column.signal_to_differentiate().values).collect();
     series::find_series(time, &signals)
 }

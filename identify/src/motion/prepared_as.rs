@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 /// What was done on the way from the recording to the states.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub struct PreparedAs {
+pub struct PreparationRecord {
     /// Cut-off of the low-pass, Hz, when anything was filtered.
     pub cutoff_hz: Option<f64>,
     /// Whether the cut-off was chosen from the signal rather than given.

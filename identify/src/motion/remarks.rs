@@ -4,14 +4,14 @@ use std::f64::consts::TAU;
 
 use crate::motion::derivatives::mean_rate;
 use crate::motion::periods;
-use crate::motion::run::Run;
-use crate::motion::series::Periodic;
-use crate::motion::smooth::Recorded;
-use crate::recording::{Note, Recording};
-use crate::words::{count_of, list, seven_digits, with_digits};
+use crate::motion::run::PreparedRun;
+use crate::motion::series::PeriodicSeries;
+use crate::motion::smooth::RecordedCoordinate;
+use crate::recording::{RecordingNote, SignalRecording};
+use crate::words::{count_of, backquoted_list, seven_digits, with_digits};
 
 /// A series that leaves more of a motion than this part is not its series.
-const LEFT_OVER: f64 = 1e-2;
+const MAX_SERIES_RESIDUAL: f64 = 1e-2;
 
 /// Encoder steps count where they leave more noise of the accelerations than this part.
 const COARSE: f64 = 0.005;
@@ -40,17 +40,17 @@ fn encoder_step(q: &[f64]) -> Option<f64> {
     (whole as f64 >= ON_GRID * steps.len() as f64).then_some(step)
 }
 
-impl Recording {
+impl SignalRecording {
     /// Looks for a period, unless that of the motion's series is known; the spread of the forces over it is the noise floor.
-    pub(crate) fn note_repeats(&self, columns: &[Recorded<'_>], drives: &[String], run: &mut Run) {
+    pub(crate) fn note_repeatability(&self, columns: &[RecordedCoordinate<'_>], drives: &[String], run: &mut PreparedRun) {
         let positions: Vec<&[f64]> = columns.iter().map(|column| column.q).collect();
         let Some(forces) = &run.force else { return };
         let known = run.prepared.period;
         let period = known.or_else(|| periods::find_period(&run.time, &positions));
         let Some(period) = period else { return };
-        run.repeats = periods::repeats(&run.time, period, drives, forces);
-        if let Some(repeats) = &run.repeats {
-            run.notes.push(Note::info(format!(
+        run.repeatability = periods::measure_repeatability(&run.time, period, drives, forces);
+        if let Some(repeats) = &run.repeatability {
+            run.notes.push(RecordingNote::info(format!(
                 "The motion in {} repeats itself every {} s, {} times in all; over these periods the forces spread \
                  by {:.3} % of their size, the noise floor.",
                 self.file(),
@@ -62,7 +62,7 @@ impl Recording {
     }
 
     /// Says that the motion is taken for a series, and what that leaves of it.
-    pub(crate) fn describe_series(&self, found: &Periodic, columns: &[&Recorded<'_>]) -> String {
+    pub(crate) fn describe_series(&self, found: &PeriodicSeries, columns: &[&RecordedCoordinate<'_>]) -> String {
         let names: Vec<String> = columns.iter().map(|column| column.name.clone()).collect();
         let left = columns.iter().zip(&found.noise).map(|(column, noise)| {
             let derivative = if column.qd.is_some() { "_d" } else { "" };
@@ -71,7 +71,7 @@ impl Recording {
         format!(
             "Derivatives of {} in {} are those of a Fourier series of period {} s with {}, since it leaves nothing but \
              white noise: {} (RMS); option `smoothing` = `butterworth` filters instead.",
-            list(&names),
+            backquoted_list(&names),
             self.file(),
             seven_digits(found.period),
             count_of(found.harmonics, "harmonic", "harmonics"),
@@ -80,18 +80,18 @@ impl Recording {
     }
 
     /// Says what a series that was asked for leaves of the motion, where that is too much.
-    pub(crate) fn note_left_over(
+    pub(crate) fn note_series_residual(
         &self,
-        columns: &[Recorded<'_>],
+        columns: &[RecordedCoordinate<'_>],
         states: &[[Vec<f64>; 3]],
-        notes: &mut Vec<Note>,
+        notes: &mut Vec<RecordingNote>,
     ) {
         for (column, [q, ..]) in columns.iter().zip(states) {
             let mean = column.q.iter().sum::<f64>() / column.q.len() as f64;
             let size: f64 = column.q.iter().map(|v| (v - mean).powi(2)).sum();
             let left: f64 = column.q.iter().zip(q).map(|(a, b)| (a - b).powi(2)).sum();
-            if left > LEFT_OVER.powi(2) * size {
-                notes.push(Note::warning(format!(
+            if left > MAX_SERIES_RESIDUAL.powi(2) * size {
+                notes.push(RecordingNote::warning(format!(
                     "The Fourier series leaves {:.1} % of the motion of `{}` in {} (RMS): it has another period, or none; \
                      take another smoothing.",
                     100.0 * (left / size).sqrt(),
@@ -103,7 +103,7 @@ impl Recording {
     }
 
     /// Says which encoders have steps so coarse that they are a part of the accelerations.
-    pub(crate) fn note_encoder_steps(&self, columns: &[Recorded<'_>], run: &mut Run) {
+    pub(crate) fn note_encoder_steps(&self, columns: &[RecordedCoordinate<'_>], run: &mut PreparedRun) {
         let Some(cutoff) = run.prepared.cutoff_hz else {
             return;
         };
@@ -133,7 +133,7 @@ impl Recording {
             }
         }
         if !found.is_empty() {
-            run.notes.push(Note::warning(format!(
+            run.notes.push(RecordingNote::warning(format!(
                 "Positions in {} come in steps of the encoder: {}; in brackets the noise that they leave of the accelerations. \
                  It makes inertias too small and hides weak effects; a motion that repeats itself, or a finer encoder, helps.",
                 self.file(),
@@ -143,7 +143,7 @@ impl Recording {
     }
 
     /// Says which coordinates stand still, for how much of the time.
-    pub(crate) fn note_standstill(&self, coordinates: &[String], run: &mut Run) {
+    pub(crate) fn note_standstill(&self, coordinates: &[String], run: &mut PreparedRun) {
         for (name, q) in coordinates.iter().zip(&run.q) {
             let (low, high) = q
                 .iter()
@@ -151,7 +151,7 @@ impl Recording {
                     (l.min(*v), h.max(*v))
                 });
             if q.len() > 1 && high <= low {
-                run.notes.push(Note::warning(format!(
+                run.notes.push(RecordingNote::warning(format!(
                     "`{name}` does not move in {}: what depends on its motion cannot be identified.",
                     self.file()
                 )));
@@ -170,7 +170,7 @@ impl Recording {
             }
         }
         if !resting.is_empty() {
-            run.notes.push(Note::info(format!(
+            run.notes.push(RecordingNote::info(format!(
                 "In {} there is standstill, a rate below a hundredth of the fastest: {} of the samples. Friction takes any \
                  value there; option `standstill` = `0.01` leaves such equations out of a fit.",
                 self.file(),

@@ -7,25 +7,25 @@ use std::fmt::Write as _;
 
 use crate::motion::band;
 use crate::motion::even;
-use crate::motion::options::{DerivativeSource, Preparation, Smoothing};
-use crate::motion::periods::Repeats;
-use crate::motion::prepare::series_of;
-use crate::motion::prepared_as::PreparedAs;
-use crate::motion::smooth::Recorded;
-use crate::recording::{Fault, GAP, Note, Recording, RecordingError, Severity, place_word};
+use crate::motion::options::{DerivativeSource, StatePreparation, SmoothingMethod};
+use crate::motion::periods::RunRepeatability;
+use crate::motion::prepare::find_motion_series;
+use crate::motion::prepared_as::PreparationRecord;
+use crate::motion::smooth::RecordedCoordinate;
+use crate::recording::{RecordingFault, GAP, RecordingNote, SignalRecording, RecordingError, NoteSeverity, sample_place_word};
 use crate::signal::median;
-use crate::words::{count_of, list};
+use crate::words::{count_of, backquoted_list};
 
 /// A gap of this part of a period of the highest frequency at which forces follow a motion is bridged by the spline.
-const BRIDGED: f64 = 0.5;
+const BRIDGED_GAP_PART: f64 = 0.5;
 /// In a step so many times as long as the usual one samples lack.
-const LACKS: f64 = 1.5;
+const MISSING_SAMPLE_STEP: f64 = 1.5;
 /// One step in so many is less than half as long as the usual one where times jitter.
 const JITTERS: usize = 100;
 
 /// States along a run, ready for the regressor. All columns have the length of `time`.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Run {
+pub struct PreparedRun {
     /// What messages call the recording.
     pub file: String,
     /// Times, s.
@@ -47,18 +47,18 @@ pub struct Run {
     /// Line in the file for each sample.
     pub lines: Vec<u64>,
     /// How well the run repeats itself, if its motion is periodic and the forces are known.
-    pub repeats: Option<Repeats>,
+    pub repeatability: Option<RunRepeatability>,
     /// What was done to the recording.
-    pub prepared: PreparedAs,
+    pub prepared: PreparationRecord,
     /// What the user should know, the recording's own notes included.
-    pub notes: Vec<Note>,
+    pub notes: Vec<RecordingNote>,
 }
 
-impl Recording {
+impl SignalRecording {
     /// States of the given coordinates and forces of the given drives, with the default
     /// [`Preparation`]: columns `t`, `NAME`, `NAME_d`, `NAME_dd` and the drive's name.
-    pub fn states(&self, coordinates: &[String], drives: &[String]) -> Result<Run, RecordingError> {
-        self.states_with(coordinates, drives, &Preparation::default())
+    pub fn states(&self, coordinates: &[String], drives: &[String]) -> Result<PreparedRun, RecordingError> {
+        self.states_with(coordinates, drives, &StatePreparation::default())
     }
 
     /// [`Recording::states_with`] for each stretch between gaps in time, so that no filter and no difference reaches
@@ -68,39 +68,39 @@ impl Recording {
         &self,
         coordinates: &[String],
         drives: &[String],
-        preparation: &Preparation,
-    ) -> Result<Vec<Run>, RecordingError> {
+        preparation: &StatePreparation,
+    ) -> Result<Vec<PreparedRun>, RecordingError> {
         // What is wrong with the whole is said of the whole, before it is cut.
-        let wanted = wanted_names(coordinates, drives);
+        let wanted = expected_column_names(coordinates, drives);
         let needed: Vec<String> = std::iter::once("t".to_owned())
             .chain(coordinates.iter().cloned())
             .collect();
         self.check_columns(&needed, &wanted)?;
-        self.check_time(self.column_beside("t", &wanted)?, &mut Vec::new())?;
-        let columns: Result<Vec<Recorded<'_>>, _> = coordinates
+        self.check_time(self.column_without_suggesting("t", &wanted)?, &mut Vec::new())?;
+        let columns: Result<Vec<RecordedCoordinate<'_>>, _> = coordinates
             .iter()
-            .map(|name| self.recorded(name, preparation.source, &wanted))
+            .map(|name| self.recorded_coordinate(name, preparation.source, &wanted))
             .collect();
         let columns = columns?;
         let is_filtered = preparation.decimate > 1 || columns.iter().any(|c| !c.is_complete());
         let time = self.column("t")?;
         let stretches = if is_filtered && !even::is_even(time) {
             let positions = columns.iter().map(|c| c.q);
-            let bridged = band::of_motion(time, positions).map(|band| BRIDGED / band);
-            self.stretches(bridged.unwrap_or(0.0))
+            let bridged = band::motion_band(time, positions).map(|band| BRIDGED_GAP_PART / band);
+            self.split_at_gaps(bridged.unwrap_or(0.0))
         } else {
             Vec::new()
         };
         // A series is fitted on the true times, so gaps do it no harm; only decimation would reach across them.
         let is_whole = stretches.len() < 2
             || preparation.decimate <= 1
-                && series_of(self.column("t")?, &columns, preparation).is_some();
+                && find_motion_series(self.column("t")?, &columns, preparation).is_some();
         if is_whole {
             return Ok(vec![self.states_with(coordinates, drives, preparation)?]);
         }
-        let preparation = &Preparation {
+        let preparation = &StatePreparation {
             smoothing: match preparation.smoothing {
-                Smoothing::Automatic => Smoothing::Butterworth,
+                SmoothingMethod::Automatic => SmoothingMethod::Butterworth,
                 chosen => chosen,
             },
             ..preparation.clone()
@@ -109,7 +109,7 @@ impl Recording {
         let longest = longest.unwrap_or(0);
         let first = stretches[longest].states_with(coordinates, drives, preparation)?;
         // One cut-off for all: that which suits the longest.
-        let preparation = Preparation {
+        let preparation = StatePreparation {
             cutoff_hz: preparation.cutoff_hz.or(first.prepared.cutoff_hz),
             ..preparation.clone()
         };
@@ -126,7 +126,7 @@ impl Recording {
                 Err(error)
                     if matches!(
                         error.fault,
-                        Fault::TooFewSamples { .. } | Fault::CutoffTooLow { .. }
+                        RecordingFault::TooFewSamples { .. } | RecordingFault::CutoffTooLow { .. }
                     ) =>
                 {
                     short += 1;
@@ -160,10 +160,10 @@ impl Recording {
                 self.samples()
             );
         }
-        notes.push(Note::warning(says));
+        notes.push(RecordingNote::warning(says));
         for (i, run) in runs.iter_mut().enumerate() {
             if i > 0 {
-                run.notes.retain(|note| note.severity == Severity::Warning);
+                run.notes.retain(|note| note.severity == NoteSeverity::Warning);
             }
         }
         if let Some(run) = runs.first_mut() {
@@ -182,19 +182,19 @@ impl Recording {
         &self,
         coordinates: &[String],
         drives: &[String],
-        preparation: &Preparation,
-    ) -> Result<Run, RecordingError> {
-        let wanted = wanted_names(coordinates, drives);
+        preparation: &StatePreparation,
+    ) -> Result<PreparedRun, RecordingError> {
+        let wanted = expected_column_names(coordinates, drives);
         let needed: Vec<String> = std::iter::once("t".to_owned())
             .chain(coordinates.iter().cloned())
             .collect();
         self.check_columns(&needed, &wanted)?;
-        let time = self.column_beside("t", &wanted)?;
+        let time = self.column_without_suggesting("t", &wanted)?;
         let mut notes = self.notes().to_vec();
         self.check_time(time, &mut notes)?;
         let missing_force: Vec<String> = drives
             .iter()
-            .filter(|drive| !self.has(drive))
+            .filter(|drive| !self.has_column(drive))
             .cloned()
             .collect();
         let force = if missing_force.is_empty() {
@@ -204,30 +204,30 @@ impl Recording {
                 .collect();
             Some(columns?)
         } else {
-            notes.push(Note::info(format!(
+            notes.push(RecordingNote::info(format!(
                 "{} holds no measured force of {}.",
                 self.file(),
-                list(&missing_force)
+                backquoted_list(&missing_force)
             )));
             None
         };
-        let columns: Result<Vec<Recorded<'_>>, _> = coordinates
+        let columns: Result<Vec<RecordedCoordinate<'_>>, _> = coordinates
             .iter()
-            .map(|name| self.recorded(name, preparation.source, &wanted))
+            .map(|name| self.recorded_coordinate(name, preparation.source, &wanted))
             .collect();
         let columns = columns?;
-        let mut prepared = PreparedAs {
+        let mut prepared = PreparationRecord {
             decimate: preparation.decimate,
-            ..PreparedAs::default()
+            ..PreparationRecord::default()
         };
         let states = self.prepare_states(time, &columns, preparation, &mut prepared, &mut notes)?;
         prepared.band_hz = preparation
             .band_hz
-            .or_else(|| band::of_motion(time, columns.iter().map(|c| c.q)));
+            .or_else(|| band::motion_band(time, columns.iter().map(|c| c.q)));
         prepared.decimate_chosen = preparation.chosen;
         prepared.trimmed = preparation.trim.unwrap_or(prepared.trimmed);
         prepared.trim_asked_for = preparation.trim.is_some();
-        let mut run = Run {
+        let mut run = PreparedRun {
             file: self.file().to_owned(),
             time: time.to_vec(),
             q: Vec::new(),
@@ -235,9 +235,9 @@ impl Recording {
             qdd: Vec::new(),
             force,
             missing_force,
-            left_out: if drives.iter().any(|drive| self.lost(drive).is_some()) {
+            left_out: if drives.iter().any(|drive| self.lost_samples(drive).is_some()) {
                 let lost = |drive: &String| {
-                    let lost = self.lost(drive).map(<[bool]>::to_vec);
+                    let lost = self.lost_samples(drive).map(<[bool]>::to_vec);
                     lost.unwrap_or_else(|| vec![false; time.len()])
                 };
                 drives.iter().map(lost).collect()
@@ -245,48 +245,48 @@ impl Recording {
                 Vec::new()
             },
             lines: (0..time.len()).map(|i| self.line(i).unwrap_or(0)).collect(),
-            repeats: None,
+            repeatability: None,
             prepared,
             notes,
         };
         if !preparation.unexamined {
-            self.note_repeats(&columns, drives, &mut run);
+            self.note_repeatability(&columns, drives, &mut run);
         }
         for [q, qd, qdd] in states {
             run.q.push(q);
             run.qd.push(qd);
             run.qdd.push(qdd);
         }
-        self.trim(&mut run)?;
+        self.trim_transients(&mut run)?;
         self.note_encoder_steps(&columns, &mut run);
         self.note_standstill(coordinates, &mut run);
         Ok(run)
     }
 
-    fn recorded(
+    fn recorded_coordinate(
         &self,
         name: &str,
         source: DerivativeSource,
         wanted: &[String],
-    ) -> Result<Recorded<'_>, RecordingError> {
+    ) -> Result<RecordedCoordinate<'_>, RecordingError> {
         let optional = |suffix: &str| {
             let derivative = format!("{name}{suffix}");
-            let wanted = source == DerivativeSource::RecordedFirst && self.has(&derivative);
+            let wanted = source == DerivativeSource::RecordedFirst && self.has_column(&derivative);
             wanted.then(|| self.column(&derivative)).transpose()
         };
-        Ok(Recorded {
+        Ok(RecordedCoordinate {
             name: name.to_owned(),
-            q: self.column_beside(name, wanted)?,
+            q: self.column_without_suggesting(name, wanted)?,
             qd: optional("_d")?,
             qdd: optional("_dd")?,
         })
     }
 
     /// Time must increase; uneven steps and gaps are worth a note.
-    fn check_time(&self, time: &[f64], notes: &mut Vec<Note>) -> Result<(), RecordingError> {
+    fn check_time(&self, time: &[f64], notes: &mut Vec<RecordingNote>) -> Result<(), RecordingError> {
         if let Some(i) = time.windows(2).position(|w| w[1] <= w[0]) {
             let line = self.line(i + 1).unwrap_or(0);
-            return Err(self.fault(Fault::TimeNotIncreasing {
+            return Err(self.fault(RecordingFault::TimeNotIncreasing {
                 line,
                 previous: time[i],
                 here: time[i + 1],
@@ -306,11 +306,11 @@ impl Recording {
         let many = |is: &dyn Fn(f64) -> bool| steps.iter().filter(|step| is(**step)).count();
         let short = many(&|step| step < 0.5 * median);
         let jitters =
-            2 * short > many(&|step| step > LACKS * median) && JITTERS * short > steps.len();
+            2 * short > many(&|step| step > MISSING_SAMPLE_STEP * median) && JITTERS * short > steps.len();
         let longer = if jitters {
-            (1.05 * (2.0 * median - shortest)).max(LACKS * median)
+            (1.05 * (2.0 * median - shortest)).max(MISSING_SAMPLE_STEP * median)
         } else {
-            LACKS * median
+            MISSING_SAMPLE_STEP * median
         };
         let gaps = many(&|step| step > longer);
         let how = "Where anything is filtered, positions are put on even times by the spline through them at their true \
@@ -319,17 +319,17 @@ impl Recording {
             let lost = steps.iter().filter(|step| **step > longer);
             let lost = lost.map(|step| (step / median).round() - 1.0);
             let first = steps.iter().position(|step| *step > longer);
-            Note::warning(format!(
+            RecordingNote::warning(format!(
                 "{} has {} in time: steps up to {longest:.6} s where {median:.6} s is usual, {} samples too few, the first \
                  after {} {}. {how}",
                 self.file(),
                 count_of(gaps, "gap", "gaps"),
                 lost.fold(0.0, |sum, n| sum + n.max(0.0)),
-                place_word(self.file()),
+                sample_place_word(self.file()),
                 self.line(first.unwrap_or(0)).unwrap_or(0)
             ))
         } else {
-            Note::info(format!(
+            RecordingNote::info(format!(
                 "The steps of {} are uneven, from {shortest:.6} s to {longest:.6} s. {how}",
                 self.file(),
             ))
@@ -337,11 +337,11 @@ impl Recording {
         Ok(())
     }
 
-    fn trim(&self, run: &mut Run) -> Result<(), RecordingError> {
+    fn trim_transients(&self, run: &mut PreparedRun) -> Result<(), RecordingError> {
         let (start, end) = run.prepared.trimmed;
         let have = run.time.len();
         if have < start.saturating_add(end).saturating_add(1) {
-            return Err(self.fault(Fault::TooFewSamples {
+            return Err(self.fault(RecordingFault::TooFewSamples {
                 have,
                 need: start.saturating_add(end).saturating_add(1),
                 purpose: if run.prepared.trim_asked_for {
@@ -375,7 +375,7 @@ impl Recording {
         {
             cut(column);
         }
-        run.notes.push(Note::info(format!(
+        run.notes.push(RecordingNote::info(format!(
             "The first {start} and the last {end} of {have} samples of {} are dropped ({}).",
             self.file(),
             if run.prepared.trim_asked_for {
@@ -388,31 +388,31 @@ impl Recording {
     }
 }
 
-impl Run {
+impl PreparedRun {
     /// Number of samples.
     pub fn samples(&self) -> usize {
         self.time.len()
     }
 
     /// The measured forces, `force[drive][sample]`; fails when the file lacks any of them.
-    pub fn measured(&self) -> Result<&[Vec<f64>], RecordingError> {
+    pub fn measured_forces(&self) -> Result<&[Vec<f64>], RecordingError> {
         self.force.as_deref().ok_or_else(|| RecordingError {
             file: self.file.clone(),
-            fault: Fault::MissingForce {
+            fault: RecordingFault::MissingForce {
                 drives: self.missing_force.clone(),
             },
         })
     }
 
     /// Whether the force of a drive was measured in a sample, so that it counts.
-    pub fn counts(&self, drive: usize, sample: usize) -> bool {
+    pub fn is_force_measured(&self, drive: usize, sample: usize) -> bool {
         self.left_out.get(drive).is_none_or(|out| !out[sample])
     }
 
     /// The measured forces interleaved per sample, `[sample * n_drives + drive]`, as the rows of
     /// the regression are; fails when the file lacks any of them.
     pub fn measured_interleaved(&self) -> Result<Vec<f64>, RecordingError> {
-        let force = self.measured()?;
+        let force = self.measured_forces()?;
         Ok((0..self.samples())
             .flat_map(|sample| force.iter().map(move |channel| channel[sample]))
             .collect())
@@ -420,7 +420,7 @@ impl Run {
 }
 
 /// All names that a model has for columns.
-fn wanted_names(coordinates: &[String], drives: &[String]) -> Vec<String> {
+fn expected_column_names(coordinates: &[String], drives: &[String]) -> Vec<String> {
     let mut names = vec!["t".to_owned()];
     for name in coordinates {
         names.extend([name.clone(), format!("{name}_d"), format!("{name}_dd")]);

@@ -10,9 +10,9 @@ use std::f64::consts::{LN_2, TAU};
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-use crate::motion::derivatives::Smoothed;
+use crate::motion::derivatives::SmoothedCoordinate;
 use crate::motion::periods::find_period;
-use crate::signal::{count, hann_power};
+use crate::signal::{float_to_count, hann_power};
 
 /// Harmonics that a motion is searched for at most.
 const MOST_HARMONICS: usize = 100;
@@ -23,13 +23,13 @@ const BEGINNING: usize = 1 << 16;
 /// Samples that are looked at side by side.
 const LANES: usize = 8;
 /// Changes of a period below this part of a step say nothing.
-const SETTLED: f64 = 1e-7;
+const CONVERGENCE_TOLERANCE: f64 = 1e-7;
 /// A line stands out when its power is so many times what noise has on the average: chance lifts one in three million.
-const STANDS_OUT: f64 = 15.0;
+const MIN_LINE_POWER_RATIO: f64 = 15.0;
 
 /// A motion that repeats itself, and what else is in its samples.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Periodic {
+pub(crate) struct PeriodicSeries {
     /// The period, s.
     pub(crate) period: f64,
     /// Harmonics that stand above the noise.
@@ -39,14 +39,14 @@ pub(crate) struct Periodic {
 }
 
 /// The least squares projection of signals on a Fourier series of one period: what depends on the times alone.
-struct Basis<'a> {
+struct FourierBasis<'a> {
     time: &'a [f64],
     period: f64,
     harmonics: usize,
     normal: Cholesky<f64, Dyn>,
 }
 
-impl<'a> Basis<'a> {
+impl<'a> FourierBasis<'a> {
     /// `None` if there are too few samples for so many harmonics, or their times do not tell them apart.
     fn new(time: &'a [f64], period: f64, harmonics: usize) -> Option<Self> {
         let columns = 2 * harmonics + 1;
@@ -95,7 +95,7 @@ impl<'a> Basis<'a> {
     }
 
     /// Coefficients: the constant, then cosine and sine of each harmonic.
-    fn series(&self, values: &[f64]) -> DVector<f64> {
+    fn fit_coefficients(&self, values: &[f64]) -> DVector<f64> {
         let mut sums = vec![[0.0; LANES]; 2 * self.harmonics + 1];
         for (chunk, values) in self.time.chunks(LANES).zip(values.chunks(LANES)) {
             let angles = lanes(chunk, |t| self.angle(*t));
@@ -121,7 +121,7 @@ impl<'a> Basis<'a> {
     }
 
     /// Values and both derivatives at all times.
-    fn along(&self, series: &DVector<f64>) -> [Vec<f64>; 3] {
+    fn evaluate_series(&self, series: &DVector<f64>) -> [Vec<f64>; 3] {
         let w = TAU / self.period;
         let mut along = [(); 3].map(|()| Vec::with_capacity(self.time.len()));
         for chunk in self.time.chunks(LANES) {
@@ -146,17 +146,17 @@ impl<'a> Basis<'a> {
 
     /// What a series leaves of the values, and the rates of the series.
     fn residual(&self, series: &DVector<f64>, values: &[f64]) -> (Vec<f64>, Vec<f64>) {
-        let [along, rates, _] = self.along(series);
+        let [along, rates, _] = self.evaluate_series(series);
         let pairs = values.iter().zip(along);
         (pairs.map(|(value, said)| value - said).collect(), rates)
     }
 
     /// One step of Gauss and Newton towards the period that leaves least of all signals, s; each signal counts by its
     /// residual, so that units do not matter.
-    fn step(&self, signals: &[&[f64]]) -> Option<f64> {
+    fn period_step(&self, signals: &[&[f64]]) -> Option<f64> {
         let (mut slope, mut curvature) = (0.0, 0.0);
         for values in signals {
-            let series = self.series(values);
+            let series = self.fit_coefficients(values);
             let (residual, rates) = self.residual(&series, values);
             let size: f64 = residual.iter().map(|r| r * r).sum();
             if size == 0.0 {
@@ -165,7 +165,7 @@ impl<'a> Basis<'a> {
             // A longer period slows the motion down about its start; the series itself takes part of that up.
             let slower = |(t, rate): (&f64, f64)| -(t - self.time[0]) / self.period * rate;
             let changes: Vec<f64> = self.time.iter().zip(rates).map(slower).collect();
-            let (changes, _) = self.residual(&self.series(&changes), &changes);
+            let (changes, _) = self.residual(&self.fit_coefficients(&changes), &changes);
             let pairs = changes.iter().zip(&residual);
             slope += pairs.map(|(c, r)| c * r).sum::<f64>() / size;
             curvature += changes.iter().map(|c| c * c).sum::<f64>() / size;
@@ -205,16 +205,16 @@ fn for_each_harmonic(
 
 /// The least squares projection of positions on a Fourier series of `harmonics` of the period, and its exact
 /// derivatives; `None` if there are too few samples for so many harmonics, or the run is far shorter than the period.
-pub(crate) fn project(
+pub(crate) fn project_on_series(
     time: &[f64],
     positions: &[f64],
     period: f64,
     harmonics: usize,
-) -> Option<Smoothed> {
-    let basis = Basis::new(time, period, harmonics)?;
-    let series = basis.series(positions);
-    let [q, qd, qdd] = basis.along(&series);
-    Some(Smoothed { q, qd, qdd })
+) -> Option<SmoothedCoordinate> {
+    let basis = FourierBasis::new(time, period, harmonics)?;
+    let series = basis.fit_coefficients(positions);
+    let [q, qd, qdd] = basis.evaluate_series(&series);
+    Some(SmoothedCoordinate { q, qd, qdd })
 }
 
 /// The series of which the signals are samples with nothing but white noise beside; `None` if there is none.
@@ -223,7 +223,7 @@ pub(crate) fn project(
 /// the run, with or without the first sample repeated at its end; then it is what leaves least.
 /// Harmonics count up to the last that stands above the noise. What is left is noise if its spectrum is flat: where
 /// the harmonics are no line may stand out, and the mean must be that of the upper half of the band.
-pub(crate) fn find_series(time: &[f64], signals: &[&[f64]]) -> Option<Periodic> {
+pub(crate) fn find_series(time: &[f64], signals: &[&[f64]]) -> Option<PeriodicSeries> {
     let moving: Vec<&[f64]> = signals
         .iter()
         .copied()
@@ -238,21 +238,21 @@ pub(crate) fn find_series(time: &[f64], signals: &[&[f64]]) -> Option<Periodic> 
     let whole = [duration + step, duration]
         .into_iter()
         .filter(|_| found.is_none() && time.len() <= LONGEST_ALONE)
-        .filter(|_| moving.iter().all(|values| closes(values)));
+        .filter(|_| moving.iter().all(|values| is_closed(values)));
     let (period, harmonics) = found
         .into_iter()
         .chain(whole)
-        .find_map(|period| settle(time, &moving, period, duration + 1.5 * step))?;
-    let basis = Basis::new(time, period, harmonics)?;
+        .find_map(|period| refine_series(time, &moving, period, duration + 1.5 * step))?;
+    let basis = FourierBasis::new(time, period, harmonics)?;
     let noise = signals
         .iter()
         .map(|values| {
-            let (residual, _) = basis.residual(&basis.series(values), values);
+            let (residual, _) = basis.residual(&basis.fit_coefficients(values), values);
             let left = (time.len() - 2 * harmonics - 1) as f64;
             (residual.iter().map(|r| r * r).sum::<f64>() / left).sqrt()
         })
         .collect();
-    Some(Periodic {
+    Some(PeriodicSeries {
         period,
         harmonics,
         noise,
@@ -260,7 +260,7 @@ pub(crate) fn find_series(time: &[f64], signals: &[&[f64]]) -> Option<Periodic> 
 }
 
 /// Whether a signal might go on at its end with its beginning: the gap between is no larger than a few of its steps.
-fn closes(values: &[f64]) -> bool {
+fn is_closed(values: &[f64]) -> bool {
     let largest = values
         .windows(2)
         .map(|w| (w[1] - w[0]).abs())
@@ -269,10 +269,10 @@ fn closes(values: &[f64]) -> bool {
 }
 
 /// The period near the one given, and as many harmonics as stand out, if they leave nothing but noise.
-fn settle(time: &[f64], signals: &[&[f64]], mut period: f64, longest: f64) -> Option<(f64, usize)> {
+fn refine_series(time: &[f64], signals: &[&[f64]], mut period: f64, longest: f64) -> Option<(f64, usize)> {
     let n = time.len();
     let step = (time[n - 1] - time[0]) / (n - 1) as f64;
-    let most = count(0.2 * period / step).min(MOST_HARMONICS);
+    let most = float_to_count(0.2 * period / step).min(MOST_HARMONICS);
     if most == 0 {
         return None;
     }
@@ -280,9 +280,9 @@ fn settle(time: &[f64], signals: &[&[f64]], mut period: f64, longest: f64) -> Op
         let signals: Vec<&[f64]> = signals.iter().map(|values| &values[..samples]).collect();
         let mut period = period;
         for _ in 0..4 {
-            let change = Basis::new(&time[..samples], period, harmonics)?.step(&signals)?;
+            let change = FourierBasis::new(&time[..samples], period, harmonics)?.period_step(&signals)?;
             period = (period + change.clamp(-step, step)).clamp(2.0 * step, longest);
-            if change.abs() < SETTLED * step {
+            if change.abs() < CONVERGENCE_TOLERANCE * step {
                 break;
             }
         }
@@ -290,10 +290,10 @@ fn settle(time: &[f64], signals: &[&[f64]], mut period: f64, longest: f64) -> Op
     };
     let harmonics_in = |samples: usize, period: f64, most: usize| {
         let signals: Vec<&[f64]> = signals.iter().map(|values| &values[..samples]).collect();
-        standing_out(&time[..samples], &signals, period, most)
+        last_significant_harmonic(&time[..samples], &signals, period, most)
     };
     // A long run tells its harmonics in its beginning; all of it would take minutes for a hundred of them.
-    let mut samples = count(3.0 * period / step).max(BEGINNING).min(n);
+    let mut samples = float_to_count(3.0 * period / step).max(BEGINNING).min(n);
     // Fewer harmonics first: their phases bear an error of the period that would turn high ones round after many periods.
     // Fewer last: what they leave free makes the period vague, and a wrong period adds harmonics.
     period = refined(period, samples, most.min(20))?;
@@ -313,12 +313,12 @@ fn settle(time: &[f64], signals: &[&[f64]], mut period: f64, longest: f64) -> Op
 
 /// The last harmonic that stands above the noise in any signal; `None` if what all harmonics leave is no white noise, or
 /// none stands out.
-fn standing_out(time: &[f64], signals: &[&[f64]], period: f64, most: usize) -> Option<usize> {
+fn last_significant_harmonic(time: &[f64], signals: &[&[f64]], period: f64, most: usize) -> Option<usize> {
     let step = (time[time.len() - 1] - time[0]) / (time.len() - 1) as f64;
-    let basis = Basis::new(time, period, most)?;
+    let basis = FourierBasis::new(time, period, most)?;
     let mut harmonics = 0;
     for values in signals {
-        let series = basis.series(values);
+        let series = basis.fit_coefficients(values);
         let (residual, _) = basis.residual(&series, values);
         let variance = white_variance(&residual, step, 2.0 * most as f64 / period)?;
         // The series took its share of the noise.
@@ -326,7 +326,7 @@ fn standing_out(time: &[f64], signals: &[&[f64]], period: f64, most: usize) -> O
         // The square of a line's amplitude that white noise gives on the average.
         let average = 4.0 * variance / time.len() as f64;
         let stands_out =
-            |k: &usize| series[2 * k - 1].powi(2) + series[2 * k].powi(2) > STANDS_OUT * average;
+            |k: &usize| series[2 * k - 1].powi(2) + series[2 * k].powi(2) > MIN_LINE_POWER_RATIO * average;
         harmonics = harmonics.max((1..=most).rev().find(stands_out).unwrap_or(0));
     }
     (harmonics > 0).then_some(harmonics)
@@ -340,13 +340,13 @@ fn white_variance(residual: &[f64], step: f64, up_to: f64) -> Option<f64> {
     let mut upper = power[bins / 2..].to_vec();
     upper.sort_by(f64::total_cmp);
     let level = upper[upper.len() / 2] / LN_2;
-    let low = count((2.0 * step * up_to * (bins - 1) as f64).ceil()).clamp(8, bins / 2);
+    let low = float_to_count((2.0 * step * up_to * (bins - 1) as f64).ceil()).clamp(8, bins / 2);
     let lower = &power[1..low];
     let mean = lower.iter().sum::<f64>() / lower.len() as f64;
     // Padding and the window make neighbours alike, which leaves about so many independent ones.
     let independent = lower.len() as f64 * residual.len() as f64 / (3 * bins) as f64;
     let is_flat = mean <= level * (1.0 + 5.0 / independent.sqrt().max(1.0));
-    let stands_out = lower.iter().any(|p| *p > STANDS_OUT * level);
+    let stands_out = lower.iter().any(|p| *p > MIN_LINE_POWER_RATIO * level);
     let variance = residual.iter().map(|r| r * r).sum::<f64>() / residual.len() as f64;
     (is_flat && !stands_out && variance > 0.0).then_some(variance)
 }
@@ -354,7 +354,7 @@ fn white_variance(residual: &[f64], step: f64, up_to: f64) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_noise::Noise;
+    use crate::test_noise::TestNoise;
 
     const PERIOD: f64 = 2.37;
 
@@ -380,7 +380,7 @@ mod tests {
     }
 
     fn noisy(time: &[f64], sigma: f64, truth: impl Fn(f64) -> f64) -> Vec<f64> {
-        let mut noise = Noise::new(11);
+        let mut noise = TestNoise::new(11);
         let sample = |t: &f64| truth(*t) + sigma * noise.normal();
         time.iter().map(sample).collect()
     }
@@ -389,21 +389,21 @@ mod tests {
     fn a_series_gives_exact_derivatives() {
         let time = times(2500);
         let q: Vec<f64> = time.iter().map(|t| motion(*t)[0]).collect();
-        let prepared = project(&time, &q, PERIOD, 5).expect("enough samples");
+        let prepared = project_on_series(&time, &q, PERIOD, 5).expect("enough samples");
         for (i, t) in time.iter().enumerate() {
             let truth = motion(*t);
             assert!((prepared.q[i] - truth[0]).abs() < 1e-9);
             assert!((prepared.qd[i] - truth[1]).abs() < 1e-8);
             assert!((prepared.qdd[i] - truth[2]).abs() < 1e-7);
         }
-        assert_eq!(project(&time[..10], &q[..10], PERIOD, 5), None);
+        assert_eq!(project_on_series(&time[..10], &q[..10], PERIOD, 5), None);
     }
 
     /// Over part of a period the columns are far from orthogonal; the shortcut for their products stays right.
     #[test]
     fn products_of_columns_are_those_of_the_columns() {
         let time = times(400);
-        let basis = Basis::new(&time, PERIOD, 3).expect("two thirds of a period");
+        let basis = FourierBasis::new(&time, PERIOD, 3).expect("two thirds of a period");
         let rows = DMatrix::from_fn(time.len(), 7, |i, j| {
             let angle = TAU * j.div_ceil(2) as f64 * (time[i] - time[0]) / PERIOD;
             if j % 2 == 0 && j > 0 {

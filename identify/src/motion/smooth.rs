@@ -1,35 +1,35 @@
 //! From what a file holds of a coordinate to its position, rate and acceleration, by one of the ways of smoothing.
 
-use crate::motion::cutoff::Signal;
-use crate::motion::derivatives::{Smoothed, filter_and_differentiate};
-use crate::motion::even::{Spline, Steps, even_times, spread_times, steps};
+use crate::motion::cutoff::DifferentiatedSignal;
+use crate::motion::derivatives::{SmoothedCoordinate, filter_and_differentiate};
+use crate::motion::even::{CubicSpline, SampleSpacing, even_times, spread_times, sample_spacing};
 use crate::motion::{local_polynomials, series};
 use crate::words::{count_of, seven_digits};
 
 /// What the file holds of a coordinate.
-pub(crate) struct Recorded<'a> {
+pub(crate) struct RecordedCoordinate<'a> {
     pub(crate) name: String,
     pub(crate) q: &'a [f64],
     pub(crate) qd: Option<&'a [f64]>,
     pub(crate) qdd: Option<&'a [f64]>,
 }
 
-impl Recorded<'_> {
+impl RecordedCoordinate<'_> {
     pub(crate) fn is_complete(&self) -> bool {
         self.qd.is_some() && self.qdd.is_some()
     }
 
-    pub(crate) fn complete(&self) -> Option<[Vec<f64>; 3]> {
+    pub(crate) fn recorded_states(&self) -> Option<[Vec<f64>; 3]> {
         Some([self.q.to_vec(), self.qd?.to_vec(), self.qdd?.to_vec()])
     }
 
     /// What is differentiated where something is missing: the rates if they are recorded, else the positions.
-    pub(crate) fn source(&self) -> Signal<'_> {
+    pub(crate) fn signal_to_differentiate(&self) -> DifferentiatedSignal<'_> {
         match self.qd {
-            Some(values) => Signal { values, times: 1 },
-            None => Signal {
+            Some(values) => DifferentiatedSignal { values, derivative_order: 1 },
+            None => DifferentiatedSignal {
                 values: self.q,
-                times: 2,
+                derivative_order: 2,
             },
         }
     }
@@ -41,13 +41,13 @@ impl Recorded<'_> {
         &self,
         time: &[f64],
         cutoff: f64,
-        way: Way,
+        way: SmoothingFilter,
     ) -> Result<Option<[Vec<f64>; 3]>, crate::FilterError> {
-        if let Some(complete) = self.complete() {
+        if let Some(complete) = self.recorded_states() {
             return Ok(Some(complete));
         }
         // What stands still has no rate; filters would leave rounding, whose sign is friction.
-        if is_still(self.q) && self.qd.is_none_or(is_still) {
+        if is_constant(self.q) && self.qd.is_none_or(is_constant) {
             let zero = vec![0.0; time.len()];
             let recorded =
                 |values: Option<&[f64]>| values.map_or_else(|| zero.clone(), <[f64]>::to_vec);
@@ -58,12 +58,12 @@ impl Recorded<'_> {
             ]));
         }
         let smooth = |values: &[f64]| match way {
-            Way::Butterworth { order } => on_true_times(time, values, cutoff, order).map(Some),
-            Way::Polynomials { half_width } => {
-                Ok(local_polynomials::smooth(time, values, half_width))
+            SmoothingFilter::Butterworth { order } => smooth_at_true_times(time, values, cutoff, order).map(Some),
+            SmoothingFilter::Polynomials { half_width } => {
+                Ok(local_polynomials::smooth_by_polynomials(time, values, half_width))
             }
-            Way::Series { period, harmonics } => {
-                Ok(series::project(time, values, period, harmonics))
+            SmoothingFilter::Series { period, harmonics } => {
+                Ok(series::project_on_series(time, values, period, harmonics))
             }
         };
         if let Some(qd) = self.qd {
@@ -79,24 +79,24 @@ impl Recorded<'_> {
 
 /// [`filter_and_differentiate`] of samples at any times: what is uneven is put on even times first, by the spline through
 /// the samples, and what comes out is read off at the true times again.
-fn on_true_times(
+fn smooth_at_true_times(
     time: &[f64],
     values: &[f64],
     cutoff: f64,
     order: usize,
-) -> Result<Smoothed, crate::FilterError> {
-    match steps(time) {
-        Steps::Even => return filter_and_differentiate(time, values, cutoff, order),
-        Steps::Rounded => {
+) -> Result<SmoothedCoordinate, crate::FilterError> {
+    match sample_spacing(time) {
+        SampleSpacing::Even => return filter_and_differentiate(time, values, cutoff, order),
+        SampleSpacing::Rounded => {
             return filter_and_differentiate(&even_times(time), values, cutoff, order);
         }
-        Steps::Uneven => {}
+        SampleSpacing::Uneven => {}
     }
     let even = spread_times(time);
-    let values = Spline::new(time, values).at_all(&even);
+    let values = CubicSpline::new(time, values).evaluate_at(&even);
     let smooth = filter_and_differentiate(&even, &values, cutoff, order)?;
-    let back = |values: &[f64]| Spline::new(&even, values).at_all(time);
-    Ok(Smoothed {
+    let back = |values: &[f64]| CubicSpline::new(&even, values).evaluate_at(time);
+    Ok(SmoothedCoordinate {
         q: back(&smooth.q),
         qd: back(&smooth.qd),
         qdd: back(&smooth.qdd),
@@ -104,19 +104,19 @@ fn on_true_times(
 }
 
 /// Whether all values are the same.
-fn is_still(values: &[f64]) -> bool {
+fn is_constant(values: &[f64]) -> bool {
     values.iter().all(|v| v.total_cmp(&values[0]).is_eq())
 }
 
 /// How positions are smoothed, with all that was left open settled.
 #[derive(Clone, Copy)]
-pub(crate) enum Way {
+pub(crate) enum SmoothingFilter {
     Butterworth { order: usize },
     Polynomials { half_width: usize },
     Series { period: f64, harmonics: usize },
 }
 
-impl Way {
+impl SmoothingFilter {
     pub(crate) fn describe(self, cutoff: f64, is_chosen: bool) -> String {
         let chosen = if is_chosen {
             " (chosen from the signal)"
@@ -142,7 +142,7 @@ impl Way {
     }
 
     /// Samples that it needs.
-    pub(crate) fn need(self) -> usize {
+    pub(crate) fn min_samples(self) -> usize {
         match self {
             Self::Butterworth { order } => 3 * (order + 1) + 1,
             Self::Polynomials { half_width } => 2 * half_width + 1,

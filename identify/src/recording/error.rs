@@ -2,9 +2,9 @@
 
 use std::fmt;
 
-use crate::recording::read::place_word;
+use crate::recording::read::sample_place_word;
 use crate::signal::FilterError;
-use crate::words::{count_of, list};
+use crate::words::{count_of, backquoted_list};
 
 /// A fault of a recording. Its `Display` names the file, the line and the column where they are
 /// known, and ends with what to do.
@@ -13,13 +13,13 @@ pub struct RecordingError {
     /// The file as the user named it, or a word for a stream.
     pub file: String,
     /// What is wrong.
-    pub fault: Fault,
+    pub fault: RecordingFault,
 }
 
 /// The kinds of faults of a recording. Lines count from 1 with the header.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
-pub enum Fault {
+pub enum RecordingFault {
     /// The file cannot be opened or read.
     Unreadable {
         /// The operating system's words.
@@ -39,7 +39,7 @@ pub enum Fault {
         /// What it is.
         format: &'static str,
         /// What is wrong, and what to do.
-        says: String,
+        message: String,
     },
     /// The recording holds more numbers than may be kept in memory.
     TooLarge {
@@ -53,26 +53,26 @@ pub enum Fault {
         until: Option<(f64, f64)>,
     },
     /// No sample lies in the time that was asked for.
-    NoneBetween {
+    NoSamplesInInterval {
         /// From, s.
         from: f64,
         /// To, s.
         to: f64,
     },
     /// Topics or files that are needed together were not recorded at the same time.
-    NothingInCommon {
+    NoCommonTime {
         /// What messages call them.
         parts: Vec<String>,
     },
     /// Two files of one run have a column that is needed.
-    InBoth {
+    ColumnInTwoFiles {
         /// Its name.
         name: String,
         /// The other file.
         other: String,
     },
     /// A sum of columns takes them from several files.
-    AcrossFiles {
+    SumAcrossFiles {
         /// The column that it makes.
         name: String,
     },
@@ -212,7 +212,7 @@ impl fmt::Display for RecordingError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let file = &self.file;
         match self.fault.line() {
-            Some(line) => write!(f, "{file}, {} {line}: {}", place_word(file), self.fault),
+            Some(line) => write!(f, "{file}, {} {line}: {}", sample_place_word(file), self.fault),
             None => write!(f, "{file}: {}", self.fault),
         }
     }
@@ -220,7 +220,7 @@ impl fmt::Display for RecordingError {
 
 impl std::error::Error for RecordingError {}
 
-impl Fault {
+impl RecordingFault {
     /// The line concerned, where there is one.
     pub fn line(&self) -> Option<u64> {
         match self {
@@ -236,7 +236,7 @@ impl Fault {
     }
 }
 
-impl fmt::Display for Fault {
+impl fmt::Display for RecordingFault {
     #[allow(clippy::too_many_lines, reason = "one arm per fault, each a sentence")]
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -256,7 +256,7 @@ impl fmt::Display for Fault {
                 f,
                 "this looks like {looks_like}, not like a recording; save it as CSV (UTF-8, with a header), Parquet, HDF5, MCAP or a MATLAB file"
             ),
-            Self::Format { format, says } => write!(f, "this is {format}: {says}"),
+            Self::Format { format, message: says } => write!(f, "this is {format}: {says}"),
             Self::TooLarge {
                 samples,
                 columns,
@@ -277,20 +277,20 @@ impl fmt::Display for Fault {
                     None => f.write_str("take a part of it with option `between` = `FROM,TO` (s)"),
                 }
             }
-            Self::NoneBetween { from, to } => write!(
+            Self::NoSamplesInInterval { from, to } => write!(
                 f,
                 "no sample lies between t = {from} s and {to} s, as option `between` asks; give times that the recording has"
             ),
-            Self::NothingInCommon { parts } => write!(
+            Self::NoCommonTime { parts } => write!(
                 f,
                 "{} have no samples at the same time, so they cannot be joined; are their clocks the same?",
-                list(parts)
+                backquoted_list(parts)
             ),
-            Self::InBoth { name, other } => write!(
+            Self::ColumnInTwoFiles { name, other } => write!(
                 f,
                 "the column `{name}` is in {other} too; rename it in one of the two files, or leave one of them out"
             ),
-            Self::AcrossFiles { name } => write!(
+            Self::SumAcrossFiles { name } => write!(
                 f,
                 "`{name}` is a sum of columns of several files, which is read from one file only; add them up in a file before"
             ),
@@ -354,7 +354,7 @@ impl fmt::Display for Fault {
                     Some(nearest) => write!(f, "; is `{nearest}` meant?")?,
                     None => f.write_str(".")?,
                 }
-                write!(f, " The columns are: {}.", list(present))?;
+                write!(f, " The columns are: {}.", backquoted_list(present))?;
                 if present.first().is_some_and(|first| first.starts_with('#')) {
                     f.write_str(
                         " The first line must name the columns: comment lines are not read, delete them.",
@@ -391,7 +391,7 @@ impl fmt::Display for Fault {
                     f,
                     "there are no columns {}. The columns are: {}.",
                     all.join(", "),
-                    list(present)
+                    backquoted_list(present)
                 )?;
                 if present.first().is_some_and(|first| first.starts_with('#')) {
                     f.write_str(
@@ -410,7 +410,7 @@ impl fmt::Display for Fault {
                     f,
                     "column `{column}` holds `{text}` where a number is expected"
                 )?;
-                others(f, *count, "fields of the column are no numbers")?;
+                write_other_count(f, *count, "fields of the column are no numbers")?;
                 if looks_like_decimal_comma(text) {
                     f.write_str("; write decimals with a point")
                 } else {
@@ -435,14 +435,14 @@ impl fmt::Display for Fault {
                         "column `{column}` holds `{text}` where {expected} is expected"
                     )?;
                 }
-                others(f, *count, "fields of the column are not finite or empty")?;
+                write_other_count(f, *count, "fields of the column are not finite or empty")?;
                 f.write_str("; repair the recording, or leave such samples out with option `skip_bad_samples` (they are counted)")
             }
             Self::MissingForce { drives } => write!(
                 f,
                 "the measured force of {} is needed, but there is no such column; \
                  map one onto it with option `columns` = `{}=THEIRS`",
-                list(drives),
+                backquoted_list(drives),
                 drives.first().map_or("DRIVE", String::as_str)
             ),
             Self::TimeNotIncreasing { previous, here, .. } => write!(
@@ -496,7 +496,7 @@ impl fmt::Display for Fault {
 }
 
 /// Says how many other fields share the fault.
-fn others(f: &mut fmt::Formatter<'_>, count: usize, what: &str) -> fmt::Result {
+fn write_other_count(f: &mut fmt::Formatter<'_>, count: usize, what: &str) -> fmt::Result {
     if count > 1 {
         write!(f, " ({count} {what})")
     } else {

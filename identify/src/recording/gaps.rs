@@ -1,15 +1,15 @@
 //! Gaps in time: a recording goes in, the stretches between its gaps come out.
 
-use crate::recording::Recording;
+use crate::recording::SignalRecording;
 use crate::signal::median;
 
 /// Steps of time above this many times the usual one are gaps, across which nothing is filtered.
 pub(crate) const GAP: f64 = 5.0;
 
-impl Recording {
+impl SignalRecording {
     /// The recording cut at its gaps in time that are longer than `bridged`, s, each stretch with its lines; the whole if there
     /// are none.
-    pub(crate) fn stretches(&self, bridged: f64) -> Vec<Self> {
+    pub(crate) fn split_at_gaps(&self, bridged: f64) -> Vec<Self> {
         let Ok(time) = self.column("t") else {
             return vec![self.clone()];
         };
@@ -27,7 +27,7 @@ impl Recording {
             .windows(2)
             .map(|edge| {
                 let name = format!("{} from t = {} s on", self.file(), time[edge[0]]);
-                self.stretch(name, edge[0], edge[1])
+                self.extract_segment(name, edge[0], edge[1])
             })
             .collect()
     }

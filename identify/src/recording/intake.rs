@@ -3,22 +3,22 @@
 
 use indexmap::IndexMap;
 
-use crate::recording::Recording;
-use crate::recording::column::{Column, Defect, Field, missing};
-use crate::recording::error::Fault;
-use crate::recording::notes::Note;
-use crate::recording::options::{Computed, NotFinite, ReadOptions};
+use crate::recording::SignalRecording;
+use crate::recording::column::{SignalColumn, ColumnDefect, SampleField, missing_column_fault};
+use crate::recording::error::RecordingFault;
+use crate::recording::notes::RecordingNote;
+use crate::recording::options::{ComputedColumn, NonFinitePolicy, ReadOptions};
 use crate::words::count_of;
 
 /// Whether more samples are wanted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Flow {
+pub(crate) enum IntakeFlow {
     Go,
     Stop,
 }
 
 /// Takes samples one by one.
-pub(crate) struct Intake<'a> {
+pub(crate) struct SampleIntake<'a> {
     options: &'a ReadOptions,
     theirs: Vec<String>,
     names: Vec<String>,
@@ -26,7 +26,7 @@ pub(crate) struct Intake<'a> {
     kept: Vec<bool>,
     /// Places of columns that only those need of which single values may be missing.
     may_lack: Vec<bool>,
-    columns: Vec<Column>,
+    columns: Vec<SignalColumn>,
     lines: Vec<u64>,
     /// The first sample that was left out, and how many were.
     left_out: Option<(u64, usize)>,
@@ -35,17 +35,17 @@ pub(crate) struct Intake<'a> {
     before: usize,
     /// The line from which on nothing was read.
     stopped: Option<u64>,
-    notes: Vec<Note>,
+    notes: Vec<RecordingNote>,
 }
 
-impl<'a> Intake<'a> {
+impl<'a> SampleIntake<'a> {
     /// Ready for samples of columns that the file calls `theirs`.
     /// Fails when names are missing or double, or a renaming or computed column asks for one that is not there.
-    pub(crate) fn new(theirs: Vec<String>, options: &'a ReadOptions) -> Result<Self, Fault> {
+    pub(crate) fn new(theirs: Vec<String>, options: &'a ReadOptions) -> Result<Self, RecordingFault> {
         check_names(&theirs)?;
         let place = |name: &String| {
             let place = theirs.iter().position(|other| other == name);
-            place.ok_or_else(|| missing(name, theirs.iter().map(String::as_str), true))
+            place.ok_or_else(|| missing_column_fault(name, theirs.iter().map(String::as_str), true))
         };
         let mut sources = Vec::new();
         for computed in &options.computed {
@@ -68,7 +68,7 @@ impl<'a> Intake<'a> {
             wanted.is_none_or(|wanted| wanted.contains(name))
         };
         let mut kept: Vec<bool> = names.iter().map(is_wanted).collect();
-        let is_optional = |name: &String| options.may_lack.contains(name);
+        let is_optional = |name: &String| options.may_be_missing.contains(name);
         let mut may_lack: Vec<bool> = names.iter().map(is_optional).collect();
         for (name, may_lack) in names.iter().zip(&mut may_lack) {
             // A column that nobody wants by itself is a source of computed ones.
@@ -82,26 +82,26 @@ impl<'a> Intake<'a> {
         for place in sources {
             kept[place] = true;
         }
-        let time = match options.between {
+        let time = match options.time_interval {
             None => None,
             Some(_) => match options.computed.iter().find(|one| one.name == "t") {
-                Some(Computed { terms, offset, .. }) => {
+                Some(ComputedColumn { terms, offset, .. }) => {
                     let terms = terms
                         .iter()
                         .map(|(name, factor)| Ok((place(name)?, *factor)));
-                    Some((terms.collect::<Result<Vec<_>, Fault>>()?, *offset))
+                    Some((terms.collect::<Result<Vec<_>, RecordingFault>>()?, *offset))
                 }
                 None => match names.iter().position(|name| name == "t") {
                     Some(place) => Some((vec![(place, 1.0)], 0.0)),
                     None => {
-                        return Err(missing("t", names.iter().map(String::as_str), false));
+                        return Err(missing_column_fault("t", names.iter().map(String::as_str), false));
                     }
                 },
             },
         };
         Ok(Self {
             options,
-            columns: vec![Column::default(); names.len()],
+            columns: vec![SignalColumn::default(); names.len()],
             theirs,
             names,
             kept,
@@ -121,44 +121,44 @@ impl<'a> Intake<'a> {
     }
 
     /// Whether the fields at this place are looked at.
-    pub(crate) fn reads(&self, place: usize) -> bool {
-        self.kept[place] || place_in(self.time.as_ref(), place)
+    pub(crate) fn is_place_needed(&self, place: usize) -> bool {
+        self.kept[place] || is_time_place(self.time.as_ref(), place)
     }
 
     /// A remark on the file.
-    pub(crate) fn note(&mut self, note: Note) {
+    pub(crate) fn note(&mut self, note: RecordingNote) {
         self.notes.push(note);
     }
 
     /// Takes a sample; `text` gives a field as it stands in the file, for messages.
     /// Fails when more numbers would be kept than allowed.
-    pub(crate) fn take(
+    pub(crate) fn take_sample(
         &mut self,
         line: u64,
-        sample: &[Field],
+        sample: &[SampleField],
         text: &dyn Fn(usize) -> String,
-    ) -> Result<Flow, Fault> {
-        if let (Some((from, to)), Some(time)) = (self.options.between, self.time_of(sample)) {
+    ) -> Result<IntakeFlow, RecordingFault> {
+        if let (Some((from, to)), Some(time)) = (self.options.time_interval, self.time_of(sample)) {
             if time < from {
                 self.before += 1;
-                return Ok(Flow::Go);
+                return Ok(IntakeFlow::Go);
             }
             if time > to {
                 self.stopped = Some(line);
-                return Ok(Flow::Stop);
+                return Ok(IntakeFlow::Stop);
             }
         }
         let is_read = |place: usize| self.kept[place] && !self.may_lack[place];
-        if self.options.not_finite == NotFinite::LeaveOut
-            && (0..sample.len()).any(|i| is_read(i) && sample[i] == Field::NotFinite)
+        if self.options.not_finite == NonFinitePolicy::LeaveOut
+            && (0..sample.len()).any(|i| is_read(i) && sample[i] == SampleField::NotFinite)
         {
             self.left_out.get_or_insert((line, 0)).1 += 1;
-            return Ok(Flow::Go);
+            return Ok(IntakeFlow::Go);
         }
         let n_kept = self.kept.iter().filter(|kept| **kept).count() + self.options.computed.len();
         // The line of each sample is kept with its numbers.
-        if (self.lines.len() + 1) * (n_kept + 1) > self.options.most_numbers {
-            return Err(Fault::TooLarge {
+        if (self.lines.len() + 1) * (n_kept + 1) > self.options.max_numbers {
+            return Err(RecordingFault::TooLarge {
                 line,
                 samples: self.lines.len(),
                 columns: n_kept,
@@ -171,17 +171,17 @@ impl<'a> Intake<'a> {
                 self.columns[place].push(sample[place], line, &|| text(place));
             }
         }
-        Ok(Flow::Go)
+        Ok(IntakeFlow::Go)
     }
 
-    fn time_of(&self, sample: &[Field]) -> Option<f64> {
+    fn time_of(&self, sample: &[SampleField]) -> Option<f64> {
         let (terms, offset) = self.time.as_ref()?;
         let mut time = *offset;
         for (place, factor) in terms {
             match sample[*place] {
-                Field::Number(value) => time += factor * value,
+                SampleField::Number(value) => time += factor * value,
                 // What has no time is kept: the check of time will name it.
-                Field::NotFinite | Field::Text => return None,
+                SampleField::NotFinite | SampleField::Text => return None,
             }
         }
         Some(time)
@@ -195,23 +195,23 @@ impl<'a> Intake<'a> {
     }
 
     /// The recording; fails when there are no samples.
-    pub(crate) fn finish(self, file: &str) -> Result<Recording, Fault> {
+    pub(crate) fn finish(self, file: &str) -> Result<SignalRecording, RecordingFault> {
         if self.lines.is_empty() {
             if let (Some((from, to)), true) = (
-                self.options.between,
+                self.options.time_interval,
                 self.before > 0 || self.stopped.is_some(),
             ) {
-                return Err(Fault::NoneBetween { from, to });
+                return Err(RecordingFault::NoSamplesInInterval { from, to });
             }
-            return Err(Fault::NoSamples);
+            return Err(RecordingFault::NoSamples);
         }
         let mut notes = self.notes;
-        if let Some((from, to)) = self.options.between {
+        if let Some((from, to)) = self.options.time_interval {
             let rest = match self.stopped {
                 Some(line) => format!(", and nothing from line {line} on"),
                 None => String::new(),
             };
-            notes.push(Note::info(format!(
+            notes.push(RecordingNote::info(format!(
                 "Of {file} the {} from t = {from} s to {to} s are read; {} before{rest} {} not.",
                 count_of(self.lines.len(), "sample", "samples"),
                 count_of(self.before, "sample", "samples"),
@@ -219,7 +219,7 @@ impl<'a> Intake<'a> {
             )));
         }
         if let Some((first, n)) = self.left_out {
-            notes.push(Note::warning(format!(
+            notes.push(RecordingNote::warning(format!(
                 "{n} of {} samples of {file} {} NaN, infinite or empty fields and {} left out, the first in line {first}.",
                 n + self.lines.len(),
                 if n == 1 { "holds" } else { "hold" },
@@ -228,7 +228,7 @@ impl<'a> Intake<'a> {
         }
         let mut computed = IndexMap::new();
         for one in &self.options.computed {
-            computed.insert(one.name.clone(), compute(one, &self.theirs, &self.columns));
+            computed.insert(one.name.clone(), compute_column(one, &self.theirs, &self.columns));
         }
         let wanted = self.options.wanted.as_ref();
         let mut columns = IndexMap::new();
@@ -246,15 +246,15 @@ impl<'a> Intake<'a> {
                 (&column.text, "text that is no number"),
                 (&column.not_finite, "NaN, infinite or empty fields"),
             ] {
-                if let Some(Defect { line, count, .. }) = defect {
-                    notes.push(Note::warning(format!(
+                if let Some(ColumnDefect { line, count, .. }) = defect {
+                    notes.push(RecordingNote::warning(format!(
                         "Column `{name}` of {file} holds {what} ({}, the first in line {line}) and cannot be used.",
                         count_of(*count, "field", "fields")
                     )));
                 }
             }
         }
-        Ok(Recording {
+        Ok(SignalRecording {
             file: file.to_owned(),
             columns,
             others,
@@ -264,13 +264,13 @@ impl<'a> Intake<'a> {
     }
 }
 
-fn place_in(time: Option<&(Vec<(usize, f64)>, f64)>, place: usize) -> bool {
+fn is_time_place(time: Option<&(Vec<(usize, f64)>, f64)>, place: usize) -> bool {
     time.is_some_and(|(terms, _)| terms.iter().any(|(other, _)| *other == place))
 }
 
 /// The sum of columns; what is wrong with any of them is wrong with the sum.
-fn compute(computed: &Computed, theirs: &[String], columns: &[Column]) -> Column {
-    let mut sum = Column::default();
+fn compute_column(computed: &ComputedColumn, theirs: &[String], columns: &[SignalColumn]) -> SignalColumn {
+    let mut sum = SignalColumn::default();
     for (name, factor) in &computed.terms {
         let Some(place) = theirs.iter().position(|other| other == name) else {
             continue;
@@ -288,20 +288,20 @@ fn compute(computed: &Computed, theirs: &[String], columns: &[Column]) -> Column
     sum
 }
 
-fn check_names(names: &[String]) -> Result<(), Fault> {
+fn check_names(names: &[String]) -> Result<(), RecordingFault> {
     for (i, name) in names.iter().enumerate() {
         if name.is_empty() {
-            return Err(Fault::UnnamedColumn { place: i + 1 });
+            return Err(RecordingFault::UnnamedColumn { place: i + 1 });
         }
     }
     find_duplicate(names, false)
 }
 
-fn find_duplicate(names: &[String], by_renaming: bool) -> Result<(), Fault> {
+fn find_duplicate(names: &[String], by_renaming: bool) -> Result<(), RecordingFault> {
     let mut seen = std::collections::BTreeMap::new();
     for (i, name) in names.iter().enumerate() {
         if let Some(first) = seen.insert(name, i) {
-            return Err(Fault::DuplicateColumn {
+            return Err(RecordingFault::DuplicateColumn {
                 name: name.clone(),
                 places: [first + 1, i + 1],
                 by_renaming,
@@ -311,18 +311,18 @@ fn find_duplicate(names: &[String], by_renaming: bool) -> Result<(), Fault> {
     Ok(())
 }
 
-fn rename(names: &[String], renames: &[(String, String)]) -> Result<Vec<String>, Fault> {
+fn rename(names: &[String], renames: &[(String, String)]) -> Result<Vec<String>, RecordingFault> {
     let mut renamed = names.to_vec();
     for (i, (ours, theirs)) in renames.iter().enumerate() {
         if renames[..i].iter().any(|(o, t)| o == ours || t == theirs) {
             let twice_ours = renames[..i].iter().any(|(o, _)| o == ours);
-            return Err(Fault::DuplicateRenaming {
+            return Err(RecordingFault::DuplicateRenaming {
                 name: if twice_ours { ours } else { theirs }.clone(),
             });
         }
         match names.iter().position(|name| name == theirs) {
             Some(place) => renamed[place].clone_from(ours),
-            None => return Err(missing(theirs, names.iter().map(String::as_str), true)),
+            None => return Err(missing_column_fault(theirs, names.iter().map(String::as_str), true)),
         }
     }
     Ok(renamed)

@@ -4,15 +4,15 @@
 //! The slowest part gives the times, so that no samples are invented; the others are interpolated linearly between the two
 //! samples around. Rows for which a part has no samples nearby are left out.
 
-use crate::recording::error::Fault;
+use crate::recording::error::RecordingFault;
 use crate::recording::gaps::GAP;
-use crate::recording::notes::Note;
+use crate::recording::notes::RecordingNote;
 use crate::signal::median;
-use crate::words::{count_of, list};
+use crate::words::{count_of, backquoted_list};
 
 /// Columns with the same times.
 #[derive(Debug)]
-pub(crate) struct Part {
+pub(crate) struct JoinPart {
     /// What messages call it.
     pub(crate) name: String,
     /// Times of the samples, s.
@@ -23,7 +23,7 @@ pub(crate) struct Part {
 
 /// Columns that have all the same times.
 #[derive(Debug)]
-pub(crate) struct Joined {
+pub(crate) struct JoinedColumns {
     pub(crate) time: Vec<f64>,
     pub(crate) columns: Vec<(usize, Vec<f64>)>,
 }
@@ -31,12 +31,12 @@ pub(crate) struct Joined {
 /// Joins parts; `None` if there are none. `tell` hears what was done.
 ///
 /// Fails when the times of a part do not increase, or parts have no time in common.
-pub(crate) fn joined(
-    mut parts: Vec<Part>,
-    tell: &mut dyn FnMut(Note),
-) -> Result<Option<Joined>, Fault> {
+pub(crate) fn join_parts(
+    mut parts: Vec<JoinPart>,
+    tell: &mut dyn FnMut(RecordingNote),
+) -> Result<Option<JoinedColumns>, RecordingFault> {
     if parts.len() < 2 {
-        return Ok(parts.pop().map(|part| Joined {
+        return Ok(parts.pop().map(|part| JoinedColumns {
             time: part.time,
             columns: part.columns,
         }));
@@ -67,7 +67,7 @@ pub(crate) fn joined(
         let around: Vec<Option<(usize, f64)>> = base
             .time
             .iter()
-            .map(|t| place_of(*t, &part.time, GAP * step.max(base_step)))
+            .map(|t| find_sample(*t, &part.time, GAP * step.max(base_step)))
             .collect();
         for (covered, around) in is_covered.iter_mut().zip(&around) {
             *covered &= around.is_some();
@@ -88,19 +88,19 @@ pub(crate) fn joined(
     }
     let covered = is_covered.iter().filter(|covered| **covered).count();
     if covered == 0 {
-        return Err(Fault::NothingInCommon { parts: names });
+        return Err(RecordingFault::NoCommonTime { parts: names });
     }
     if !others.is_empty() {
-        tell(Note::info(format!(
+        tell(RecordingNote::info(format!(
             "Samples are those of `{}`, {base_step:.3e} s apart; {} {} taken at their times, between samples by straight \
              lines.",
             base.name,
-            list(&others),
+            backquoted_list(&others),
             if others.len() == 1 { "is" } else { "are" },
         )));
     }
     if covered < n {
-        tell(Note::warning(format!(
+        tell(RecordingNote::warning(format!(
             "{} of `{}` {} not between samples of all others and left out.",
             count_of(n - covered, "sample", "samples"),
             base.name,
@@ -114,7 +114,7 @@ pub(crate) fn joined(
             .map(|(value, _)| value)
             .collect()
     };
-    Ok(Some(Joined {
+    Ok(Some(JoinedColumns {
         time: kept(base.time),
         columns: columns
             .into_iter()
@@ -123,10 +123,10 @@ pub(crate) fn joined(
     }))
 }
 
-fn check_increasing(part: &Part) -> Result<(), Fault> {
+fn check_increasing(part: &JoinPart) -> Result<(), RecordingFault> {
     for (k, pair) in part.time.windows(2).enumerate() {
         if pair[1].partial_cmp(&pair[0]) != Some(std::cmp::Ordering::Greater) {
-            return Err(Fault::TimeNotIncreasing {
+            return Err(RecordingFault::TimeNotIncreasing {
                 line: k as u64 + 2,
                 previous: pair[0],
                 here: pair[1],
@@ -136,12 +136,12 @@ fn check_increasing(part: &Part) -> Result<(), Fault> {
     Ok(())
 }
 
-fn usual_step(part: &Part) -> f64 {
+fn usual_step(part: &JoinPart) -> f64 {
     median(part.time.windows(2).map(|pair| pair[1] - pair[0]).collect())
 }
 
 /// The sample at or before `t` with the share of the way to the next one; `None` outside, and in gaps longer than `gap`.
-fn place_of(t: f64, times: &[f64], gap: f64) -> Option<(usize, f64)> {
+fn find_sample(t: f64, times: &[f64], gap: f64) -> Option<(usize, f64)> {
     let after = times.partition_point(|other| *other <= t);
     let k = after.checked_sub(1)?;
     if times[k].total_cmp(&t).is_eq() {

@@ -21,30 +21,30 @@ mod together;
 
 use indexmap::IndexMap;
 
-use crate::words::nearest;
-pub use error::{Fault, RecordingError};
+use crate::words::nearest_name;
+pub use error::{RecordingFault, RecordingError};
 pub use file::RecordingFile;
-pub use notes::{Note, Severity};
-pub use options::{Computed, NotFinite, ReadOptions};
-pub use read::{has_ending_of_a_recording, name_of_bytes, place_word};
+pub use notes::{RecordingNote, NoteSeverity};
+pub use options::{ComputedColumn, NonFinitePolicy, ReadOptions};
+pub use read::{has_recording_extension, display_name_of_bytes, sample_place_word};
 pub use tables::{ColumnInfo, TableInfo};
 pub use together::RecordingFiles;
 
-use column::{Column, Defect, missing};
+use column::{SignalColumn, ColumnDefect, missing_column_fault};
 pub(crate) use gaps::GAP;
 
 /// A recording in memory: columns of equal length by name, in the file's order.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Recording {
+pub struct SignalRecording {
     pub(crate) file: String,
-    pub(crate) columns: IndexMap<String, Column>,
+    pub(crate) columns: IndexMap<String, SignalColumn>,
     /// Names of the columns of the file that were not needed.
     pub(crate) others: Vec<String>,
     pub(crate) lines: Vec<u64>,
-    pub(crate) notes: Vec<Note>,
+    pub(crate) notes: Vec<RecordingNote>,
 }
 
-impl Recording {
+impl SignalRecording {
     /// What messages call the recording.
     pub fn file(&self) -> &str {
         &self.file
@@ -62,13 +62,13 @@ impl Recording {
     }
 
     /// Whether there is a column of that name.
-    pub fn has(&self, name: &str) -> bool {
+    pub fn has_column(&self, name: &str) -> bool {
         self.columns.contains_key(name)
     }
 
     /// Samples whose value of a column joins its neighbours, since none was measured or a sensor failed; `None` if there are none.
-    pub(crate) fn lost(&self, name: &str) -> Option<&[bool]> {
-        let lost = &self.columns.get(name)?.lost;
+    pub(crate) fn lost_samples(&self, name: &str) -> Option<&[bool]> {
+        let lost = &self.columns.get(name)?.interpolated;
         lost.contains(&true).then_some(lost.as_slice())
     }
 
@@ -78,7 +78,7 @@ impl Recording {
     }
 
     /// What the user should know about the file.
-    pub fn notes(&self) -> &[Note] {
+    pub fn notes(&self) -> &[RecordingNote] {
         &self.notes
     }
 
@@ -86,18 +86,18 @@ impl Recording {
     /// Fails when it is not there or holds fields that are no finite numbers.
     pub fn column(&self, name: &str) -> Result<&[f64], RecordingError> {
         let Some(column) = self.columns.get(name) else {
-            return Err(self.fault(missing(name, self.names(), false)));
+            return Err(self.fault(missing_column_fault(name, self.names(), false)));
         };
-        if let Some(Defect { line, text, count }) = column.text.clone() {
-            return Err(self.fault(Fault::NotANumber {
+        if let Some(ColumnDefect { line, text, count }) = column.text.clone() {
+            return Err(self.fault(RecordingFault::NotANumber {
                 column: name.to_owned(),
                 line,
                 text,
                 count,
             }));
         }
-        if let Some(Defect { line, text, count }) = column.not_finite.clone() {
-            return Err(self.fault(Fault::NotFinite {
+        if let Some(ColumnDefect { line, text, count }) = column.not_finite.clone() {
+            return Err(self.fault(RecordingFault::NotFinite {
                 column: name.to_owned(),
                 line,
                 text,
@@ -108,20 +108,20 @@ impl Recording {
     }
 
     /// The numbers of a column, as [`Recording::column`]; columns of the names `wanted` are not proposed for it.
-    pub(crate) fn column_beside(
+    pub(crate) fn column_without_suggesting(
         &self,
         name: &str,
         wanted: &[String],
     ) -> Result<&[f64], RecordingError> {
-        if self.has(name) {
+        if self.has_column(name) {
             return self.column(name);
         }
         let others = self
             .names()
             .filter(|name| !wanted.iter().any(|w| w == name));
-        let proposed = nearest(name, others).map(str::to_owned);
-        let mut fault = missing(name, self.names(), false);
-        if let Fault::MissingColumn { nearest, .. } = &mut fault {
+        let proposed = nearest_name(name, others).map(str::to_owned);
+        let mut fault = missing_column_fault(name, self.names(), false);
+        if let RecordingFault::MissingColumn { nearest, .. } = &mut fault {
             *nearest = proposed;
         }
         Err(self.fault(fault))
@@ -134,7 +134,7 @@ impl Recording {
         needed: &[String],
         wanted: &[String],
     ) -> Result<(), RecordingError> {
-        let missing: Vec<&String> = needed.iter().filter(|name| !self.has(name)).collect();
+        let missing: Vec<&String> = needed.iter().filter(|name| !self.has_column(name)).collect();
         if missing.len() < 2 {
             return Ok(());
         }
@@ -143,29 +143,29 @@ impl Recording {
             .filter(|name| !wanted.iter().any(|w| w == name))
             .collect();
         let missing = missing.into_iter().map(|name| {
-            let found = nearest(name, others.iter().copied()).map(str::to_owned);
+            let found = nearest_name(name, others.iter().copied()).map(str::to_owned);
             others.retain(|other| Some(*other) != found.as_deref());
             (name.clone(), found)
         });
-        Err(self.fault(Fault::MissingColumns {
+        Err(self.fault(RecordingFault::MissingColumns {
             missing: missing.collect(),
             present: self.names().map(str::to_owned).collect(),
         }))
     }
 
     /// Puts numbers in the place of a column, or adds one; one for each sample (asserted).
-    pub fn put(&mut self, name: &str, values: Vec<f64>) {
+    pub fn set_column(&mut self, name: &str, values: Vec<f64>) {
         assert_eq!(values.len(), self.samples(), "one number for each sample");
         let column = self.columns.entry(name.to_owned()).or_default();
         column.values = values;
     }
 
     /// The samples from `start` to before `end` as a recording of its own, without the notes.
-    pub(crate) fn stretch(&self, file: String, start: usize, end: usize) -> Self {
+    pub(crate) fn extract_segment(&self, file: String, start: usize, end: usize) -> Self {
         let columns = self.columns.iter().map(|(name, column)| {
-            let column = Column {
+            let column = SignalColumn {
                 values: column.values[start..end].to_vec(),
-                lost: column.lost.get(start..end).unwrap_or(&[]).to_vec(),
+                interpolated: column.interpolated.get(start..end).unwrap_or(&[]).to_vec(),
                 text: column.text.clone(),
                 not_finite: column.not_finite.clone(),
                 as_recorded: None,
@@ -181,7 +181,7 @@ impl Recording {
         }
     }
 
-    pub(crate) fn fault(&self, fault: Fault) -> RecordingError {
+    pub(crate) fn fault(&self, fault: RecordingFault) -> RecordingError {
         RecordingError {
             file: self.file.clone(),
             fault,

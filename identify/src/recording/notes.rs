@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 /// How much a [`Note`] matters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Severity {
+pub enum NoteSeverity {
     /// Said for the record: a choice that was made, a column that was prepared.
     Info,
     /// Likely to harm the result; worth a look before trusting it.
@@ -15,18 +15,18 @@ pub enum Severity {
 
 /// One remark about a recording or its preparation.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Note {
+pub struct RecordingNote {
     /// How much it matters.
-    pub severity: Severity,
+    pub severity: NoteSeverity,
     /// One or two full sentences.
     pub says: String,
 }
 
-impl Note {
+impl RecordingNote {
     /// A remark for the record.
     pub fn info(says: impl Into<String>) -> Self {
         Self {
-            severity: Severity::Info,
+            severity: NoteSeverity::Info,
             says: says.into(),
         }
     }
@@ -34,7 +34,7 @@ impl Note {
     /// A remark that asks for attention.
     pub fn warning(says: impl Into<String>) -> Self {
         Self {
-            severity: Severity::Warning,
+            severity: NoteSeverity::Warning,
             says: says.into(),
         }
     }

@@ -3,15 +3,15 @@
 use std::io::Read;
 use std::path::Path;
 
-use modelmill_boundary::files::Disk;
+use modelmill_boundary::files::DiskFiles;
 
 use crate::recording::error::RecordingError;
 use crate::recording::file::RecordingFile;
-use crate::recording::formats::{FORMATS, Format, Input, format_of};
+use crate::recording::formats::{FORMATS, RecordingFormat, RecordingInput, format_of};
 use crate::recording::table;
-use crate::recording::{ReadOptions, Recording};
+use crate::recording::{ReadOptions, SignalRecording};
 
-impl Recording {
+impl SignalRecording {
     /// Reads a file; `renames` are pairs `(ours, theirs)`.
     /// Every other format is told from CSV text by its first bytes.
     ///
@@ -36,12 +36,12 @@ impl Recording {
         path: impl AsRef<Path>,
         options: &ReadOptions,
     ) -> Result<Self, RecordingError> {
-        RecordingFile::open(&Disk::default(), path.as_ref())?.read(options)
+        RecordingFile::open(&DiskFiles::default(), path.as_ref())?.read(options)
     }
 
     /// The names of a file's columns as the file has them; fails when it cannot be read.
     pub fn names_in(path: impl AsRef<Path>) -> Result<Vec<String>, RecordingError> {
-        RecordingFile::open(&Disk::default(), path.as_ref())?.names()
+        RecordingFile::open(&DiskFiles::default(), path.as_ref())?.names()
     }
 
     /// [`Recording::read_with`] of a file that is in memory; `file` is what messages call it.
@@ -50,7 +50,7 @@ impl Recording {
         file: &str,
         options: &ReadOptions,
     ) -> Result<Self, RecordingError> {
-        let recording = format_of(bytes).read(Input::Bytes(bytes), file, options);
+        let recording = format_of(bytes).read(RecordingInput::Bytes(bytes), file, options);
         recording.map_err(|fault| RecordingError {
             file: file.to_owned(),
             fault,
@@ -59,7 +59,7 @@ impl Recording {
 
     /// [`Recording::names_in`] of a file that is in memory.
     pub fn names_in_bytes(bytes: &[u8], file: &str) -> Result<Vec<String>, RecordingError> {
-        let names = format_of(bytes).names(Input::Bytes(bytes));
+        let names = format_of(bytes).names(RecordingInput::Bytes(bytes));
         names.map_err(|fault| RecordingError {
             file: file.to_owned(),
             fault,
@@ -80,7 +80,7 @@ impl Recording {
         file: &str,
         options: &ReadOptions,
     ) -> Result<Self, RecordingError> {
-        let text = format_of(b"").read(Input::Stream(Box::new(stream)), file, options);
+        let text = format_of(b"").read(RecordingInput::Stream(Box::new(stream)), file, options);
         text.map_err(|fault| RecordingError {
             file: file.to_owned(),
             fault,
@@ -89,21 +89,21 @@ impl Recording {
 }
 
 /// What messages call a recording whose bytes came without a file: its name, and what they are unless they are text.
-pub fn name_of_bytes(name: &str, bytes: &[u8]) -> String {
+pub fn display_name_of_bytes(name: &str, bytes: &[u8]) -> String {
     format!("{name}{}", format_of(bytes).suffix())
 }
 
 /// Whether a file's name ends as names of recordings do.
-pub fn has_ending_of_a_recording(path: &Path) -> bool {
-    let mut endings = FORMATS.into_iter().flat_map(<dyn Format>::extensions);
+pub fn has_recording_extension(path: &Path) -> bool {
+    let mut endings = FORMATS.into_iter().flat_map(<dyn RecordingFormat>::extensions);
     path.extension()
         .is_some_and(|extension| endings.any(|ending| extension.eq_ignore_ascii_case(ending)))
 }
 
 /// What a sample of a file, or of bytes that [`name_of_bytes`] names, stands in: text has lines, tables have rows.
-pub fn place_word(file: &str) -> &'static str {
+pub fn sample_place_word(file: &str) -> &'static str {
     let extension = Path::new(file).extension();
-    let is_of = |format: &dyn Format| {
+    let is_of = |format: &dyn RecordingFormat| {
         let suffix = format.suffix();
         !suffix.is_empty() && file.ends_with(suffix)
             || extension.is_some_and(|extension| {

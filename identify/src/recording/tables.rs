@@ -1,6 +1,6 @@
 //! What a file holds, before anything is made of it: tables, or topics, with their columns.
 
-use crate::recording::Recording;
+use crate::recording::SignalRecording;
 
 /// A table of a file, or a topic of a robot's log.
 #[derive(Debug, Clone, PartialEq)]
@@ -38,7 +38,7 @@ impl TableInfo {
 }
 
 /// Names that time usually has, in small letters.
-const OF_TIME: [&str; 8] = [
+const TIME_NAMES: [&str; 8] = [
     "t",
     "time",
     "t_s",
@@ -50,22 +50,22 @@ const OF_TIME: [&str; 8] = [
 ];
 
 /// The column that is likely to be the time.
-pub(crate) fn likely_time(names: &[String]) -> Option<&String> {
+pub(crate) fn likely_time_column(names: &[String]) -> Option<&String> {
     let is_called = |name: &String, time: &str| {
         let last = name.rsplit('.').next().unwrap_or(name);
         last.eq_ignore_ascii_case(time)
     };
-    OF_TIME
+    TIME_NAMES
         .iter()
         .find_map(|time| names.iter().find(|name| is_called(name, time)))
 }
 
 /// First and last time of a table that has a column for it; `read` gives the recording of that column.
-pub(crate) fn found_time(
+pub(crate) fn find_time_range(
     names: &[String],
-    read: impl FnOnce(&str) -> Option<Recording>,
+    read: impl FnOnce(&str) -> Option<SignalRecording>,
 ) -> Option<(f64, f64)> {
-    let name = likely_time(names)?;
+    let name = likely_time_column(names)?;
     let recording = read(name)?;
     let time = recording.column(name).ok()?;
     Some((*time.first()?, *time.last()?))

@@ -2,14 +2,14 @@
 
 use std::path::Path;
 
-use modelmill_boundary::files::Files;
+use modelmill_boundary::files::FileSource;
 
-use crate::recording::column::Column;
-use crate::recording::error::{Fault, RecordingError};
-use crate::recording::join::{Part, joined};
-use crate::recording::notes::Note;
-use crate::recording::{ReadOptions, Recording, RecordingFile};
-use crate::words::list;
+use crate::recording::column::SignalColumn;
+use crate::recording::error::{RecordingFault, RecordingError};
+use crate::recording::join::{JoinPart, join_parts};
+use crate::recording::notes::RecordingNote;
+use crate::recording::{ReadOptions, SignalRecording, RecordingFile};
+use crate::words::backquoted_list;
 
 /// Files of one run, whose columns are joined on time; most often there is one.
 pub struct RecordingFiles {
@@ -19,13 +19,13 @@ pub struct RecordingFiles {
 
 impl RecordingFiles {
     /// Opens files; fails when one of them cannot be read, or there is none.
-    pub fn open(files: &dyn Files, paths: &[&Path]) -> Result<Self, RecordingError> {
+    pub fn open(files: &dyn FileSource, paths: &[&Path]) -> Result<Self, RecordingError> {
         let opened = paths.iter().map(|path| RecordingFile::open(files, path));
         let files = opened.collect::<Result<Vec<_>, _>>()?;
         if files.is_empty() {
             return Err(RecordingError {
                 file: "a recording".to_owned(),
-                fault: Fault::Unreadable {
+                fault: RecordingFault::Unreadable {
                     reason: "no file is given".to_owned(),
                 },
             });
@@ -38,8 +38,8 @@ impl RecordingFiles {
     }
 
     /// A table of columns in memory; `name` is what messages call it. Fails when columns differ in length.
-    pub fn of_table(name: &str, columns: Vec<(String, Vec<f64>)>) -> Result<Self, RecordingError> {
-        let file = RecordingFile::of_table(name, columns)?;
+    pub fn from_table(name: &str, columns: Vec<(String, Vec<f64>)>) -> Result<Self, RecordingError> {
+        let file = RecordingFile::from_table(name, columns)?;
         Ok(Self {
             name: file.name().to_owned(),
             files: vec![file],
@@ -70,21 +70,21 @@ impl RecordingFiles {
     ///
     /// Fails as [`Recording::read`] does, when two files have a column that is needed, when a sum of columns takes them
     /// from several files, and when the files have no time in common.
-    pub fn read(&self, options: &ReadOptions) -> Result<Recording, RecordingError> {
+    pub fn read(&self, options: &ReadOptions) -> Result<SignalRecording, RecordingError> {
         if let [file] = self.files.as_slice() {
             return file.read(options);
         }
         let names = self.files.iter().map(RecordingFile::names);
         let names = names.collect::<Result<Vec<_>, _>>()?;
-        self.check(&names, options)?;
+        self.check_unique_sources(&names, options)?;
         let mut parts = Vec::new();
         let mut notes = Vec::new();
         for (file, names) in self.files.iter().zip(&names) {
-            let recording = file.read(&of_file(options, names))?;
+            let recording = file.read(&options_for_file(options, names))?;
             notes.extend(recording.notes().iter().cloned());
             parts.push(recording);
         }
-        let mut columns: Vec<(String, Column)> = Vec::new();
+        let mut columns: Vec<(String, SignalColumn)> = Vec::new();
         let mut timed = Vec::new();
         let mut idle = Vec::new();
         for recording in &mut parts {
@@ -100,32 +100,32 @@ impl RecordingFiles {
                 idle.push(recording.file.clone());
                 continue;
             }
-            timed.push(Part {
+            timed.push(JoinPart {
                 name: recording.file.clone(),
                 time,
                 columns: values,
             });
         }
         if !idle.is_empty() {
-            notes.push(Note::warning(format!(
+            notes.push(RecordingNote::warning(format!(
                 "Nothing of {} is needed.",
-                list(&idle)
+                backquoted_list(&idle)
             )));
         }
-        let together = joined(timed, &mut |note| notes.push(note));
+        let together = join_parts(timed, &mut |note| notes.push(note));
         let Some(together) = together.map_err(|fault| self.fault(fault))? else {
-            return Err(self.fault(Fault::NoSamples));
+            return Err(self.fault(RecordingFault::NoSamples));
         };
         let lines = (1..=together.time.len() as u64).collect();
         for (place, values) in together.columns {
             columns[place].1.values = values;
         }
-        let time = Column {
+        let time = SignalColumn {
             values: together.time,
-            ..Column::default()
+            ..SignalColumn::default()
         };
         let others = parts.into_iter().flat_map(|part| part.others);
-        Ok(Recording {
+        Ok(SignalRecording {
             file: self.name.clone(),
             others: others.collect(),
             columns: std::iter::once(("t".to_owned(), time))
@@ -137,14 +137,14 @@ impl RecordingFiles {
     }
 
     /// Fails when it is not clear from which file something comes.
-    fn check(&self, names: &[Vec<String>], options: &ReadOptions) -> Result<(), RecordingError> {
-        let time: Vec<&str> = time_of(options);
+    fn check_unique_sources(&self, names: &[Vec<String>], options: &ReadOptions) -> Result<(), RecordingError> {
+        let time: Vec<&str> = time_names(options);
         for (k, of_file) in names.iter().enumerate() {
             for name in of_file {
                 let is_time = time.contains(&name.as_str());
                 let twin = names[..k].iter().position(|others| others.contains(name));
-                if let (false, true, Some(twin)) = (is_time, options.needs(name), twin) {
-                    return Err(self.files[k].fault(Fault::InBoth {
+                if let (false, true, Some(twin)) = (is_time, options.is_column_needed(name), twin) {
+                    return Err(self.files[k].fault(RecordingFault::ColumnInTwoFiles {
                         name: name.clone(),
                         other: self.files[twin].name().to_owned(),
                     }));
@@ -157,7 +157,7 @@ impl RecordingFiles {
                 terms.all(|(name, _)| names.contains(name))
             };
             if !names.iter().any(is_whole) {
-                return Err(self.fault(Fault::AcrossFiles {
+                return Err(self.fault(RecordingFault::SumAcrossFiles {
                     name: computed.name.clone(),
                 }));
             }
@@ -165,7 +165,7 @@ impl RecordingFiles {
         Ok(())
     }
 
-    fn fault(&self, fault: Fault) -> RecordingError {
+    fn fault(&self, fault: RecordingFault) -> RecordingError {
         RecordingError {
             file: self.name.clone(),
             fault,
@@ -174,7 +174,7 @@ impl RecordingFiles {
 }
 
 /// Names that files may have for the time.
-fn time_of(options: &ReadOptions) -> Vec<&str> {
+fn time_names(options: &ReadOptions) -> Vec<&str> {
     let renamed = options.renames.iter().filter(|(ours, _)| ours == "t");
     let computed = options.computed.iter().filter(|one| one.name == "t");
     let terms = computed.flat_map(|one| one.terms.iter().map(|(name, _)| name.as_str()));
@@ -183,7 +183,7 @@ fn time_of(options: &ReadOptions) -> Vec<&str> {
 }
 
 /// The options as far as they are about the columns of one file.
-fn of_file(options: &ReadOptions, names: &[String]) -> ReadOptions {
+fn options_for_file(options: &ReadOptions, names: &[String]) -> ReadOptions {
     let mut own = options.clone();
     own.renames.retain(|(_, theirs)| names.contains(theirs));
     own.computed

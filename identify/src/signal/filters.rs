@@ -97,17 +97,17 @@ pub const MAX_FILTER_ORDER: usize = 20;
 /// A low-pass filter in second-order sections `(b0 + b1/z + b2/z^2) / (1 + a1/z + a2/z^2)`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LowPass {
-    sections: Vec<Section>,
+    sections: Vec<SecondOrderSection>,
     order: usize,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Section {
+struct SecondOrderSection {
     b: [f64; 3],
     a: [f64; 2],
 }
 
-impl Section {
+impl SecondOrderSection {
     fn dc_gain(&self) -> f64 {
         (self.b[0] + self.b[1] + self.b[2]) / (1.0 + self.a[0] + self.a[1])
     }
@@ -170,14 +170,14 @@ impl LowPass {
         poles: impl Iterator<Item = (f64, f64)>,
         dc_gain: f64,
     ) -> Self {
-        let mut sections: Vec<Section> = poles
+        let mut sections: Vec<SecondOrderSection> = poles
             .enumerate()
             .map(|(k, (re, im))| {
                 let is_real = order % 2 == 1 && k == order / 2;
                 if is_real {
                     let pole = (1.0 + re) / (1.0 - re);
                     let gain = (1.0 - pole) / 2.0;
-                    Section {
+                    SecondOrderSection {
                         b: [gain, gain, 0.0],
                         a: [-pole, 0.0],
                     }
@@ -187,7 +187,7 @@ impl LowPass {
                     let a2 = ((1.0 + re).powi(2) + im * im) / denominator;
                     // 1 + a1 + a2, without the cancellation that a low cut-off would bring.
                     let gain = (re * re + im * im) / denominator;
-                    Section {
+                    SecondOrderSection {
                         b: [gain, 2.0 * gain, gain],
                         a: [a1, a2],
                     }
@@ -250,7 +250,7 @@ impl LowPass {
         extended.extend((1..=pad).map(|i| mirrored(n - 1, n - 1 - i)));
         let arch = Arch::new();
         for is_backward in [false, true] {
-            arch.dispatch(FromSteadyState {
+            arch.dispatch(SteadyStateFilter {
                 sections: &self.sections,
                 signal: &mut extended,
                 is_backward,
@@ -263,13 +263,13 @@ impl LowPass {
 }
 
 /// Sections one after the other, from the steady state of the first sample on, or back from that of the last one.
-struct FromSteadyState<'a, const N: usize> {
-    sections: &'a [Section],
+struct SteadyStateFilter<'a, const N: usize> {
+    sections: &'a [SecondOrderSection],
     signal: &'a mut [[f64; N]],
     is_backward: bool,
 }
 
-impl<const N: usize> WithSimd for FromSteadyState<'_, N> {
+impl<const N: usize> WithSimd for SteadyStateFilter<'_, N> {
     type Output = ();
 
     #[inline(always)]
@@ -297,9 +297,9 @@ impl<const N: usize> WithSimd for FromSteadyState<'_, N> {
             for (sections, states) in self.sections.chunks(2).zip(states.chunks_mut(2)) {
                 match (sections, states) {
                     ([a, b], [of_a, of_b]) => {
-                        through([a, b], [of_a, of_b], chunk, self.is_backward);
+                        run_sections([a, b], [of_a, of_b], chunk, self.is_backward);
                     }
-                    ([one], [state]) => through([one], [state], chunk, self.is_backward),
+                    ([one], [state]) => run_sections([one], [state], chunk, self.is_backward),
                     _ => {}
                 }
             }
@@ -318,8 +318,8 @@ impl<const N: usize> WithSimd for FromSteadyState<'_, N> {
     reason = "a function of its own would be compiled for the narrowest vectors"
 )]
 #[inline(always)]
-fn through<const M: usize, const N: usize>(
-    sections: [&Section; M],
+fn run_sections<const M: usize, const N: usize>(
+    sections: [&SecondOrderSection; M],
     states: [&mut [[f64; N]; 2]; M],
     samples: &mut [[f64; N]],
     is_backward: bool,

@@ -7,4 +7,4 @@ mod statistics;
 pub use filters::{FilterError, LowPass, MAX_FILTER_ORDER};
 pub(crate) use spectrum::hann_power;
 pub use statistics::white_noise;
-pub(crate) use statistics::{count, median};
+pub(crate) use statistics::{float_to_count, median};

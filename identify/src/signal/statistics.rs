@@ -33,6 +33,6 @@ pub fn white_noise(values: &[f64]) -> f64 {
     clippy::cast_sign_loss,
     reason = "a float becomes the nearest count there is"
 )]
-pub(crate) fn count(value: f64) -> usize {
+pub(crate) fn float_to_count(value: f64) -> usize {
     value as usize
 }

@@ -6,10 +6,10 @@
 
 use std::path::PathBuf;
 
-use modelmill_identify::estimate::autocorrelated_deviations;
+use modelmill_identify::estimate::uncertainty_with_autocorrelation;
 use modelmill_identify::{
-    LeastSquares, LeastSquaresError, LocateOptions, Preparation, Recording, Run, compare,
-    decimate_table, decimate_time, locate,
+    LeastSquares, LeastSquaresError, LocateOptions, StatePreparation, SignalRecording, PreparedRun, compare_forces,
+    decimate_table, decimate_time, locate_errors,
 };
 
 fn data() -> Option<PathBuf> {
@@ -30,8 +30,8 @@ struct Regression {
     rate: Vec<f64>,
 }
 
-fn read(path: PathBuf) -> Run {
-    let recording = Recording::read(
+fn read(path: PathBuf) -> PreparedRun {
+    let recording = SignalRecording::read(
         path,
         &[("t", "t_s"), ("x", "q_meas_m"), ("axis", "force_N")],
     )
@@ -40,13 +40,13 @@ fn read(path: PathBuf) -> Run {
         .states_with(
             &["x".to_owned()],
             &["axis".to_owned()],
-            &Preparation::emps(),
+            &StatePreparation::emps(),
         )
         .expect("states")
 }
 
 /// Columns qdd, qd, sign(qd), 1, decimated in parallel with the force.
-fn regression(run: &Run) -> Regression {
+fn regression(run: &PreparedRun) -> Regression {
     let (qd, qdd) = (&run.qd[0], &run.qdd[0]);
     let full: Vec<f64> = qd
         .iter()
@@ -75,7 +75,7 @@ fn model(data: &Regression, values: &[f64]) -> Vec<f64> {
 }
 
 fn relative_error(data: &Regression, values: &[f64]) -> f64 {
-    let figures = compare(
+    let figures = compare_forces(
         &["axis".to_owned()],
         std::slice::from_ref(&data.force),
         std::slice::from_ref(&model(data, values)),
@@ -98,7 +98,7 @@ fn the_published_parameters_come_out() {
     fit.add_rows(&train.regressor, &train.force)
         .expect("finite rows");
     let solution = fit.solve().expect("a solution");
-    let deviations = autocorrelated_deviations(&solution, 1, |visit| {
+    let deviations = uncertainty_with_autocorrelation(&solution, 1, |visit| {
         visit(&train.regressor, &train.force)?;
         Ok::<(), LeastSquaresError>(())
     })
@@ -152,7 +152,7 @@ fn the_published_parameters_come_out() {
         .zip(model(&train, &solution.values))
         .map(|(y, m)| y - m)
         .collect();
-    let regions = locate(
+    let regions = locate_errors(
         &[("axis", &error)],
         &[("t", &train.time), ("x_d", &train.rate)],
         &LocateOptions::default(),

@@ -4,8 +4,8 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use modelmill_boundary::files::Disk;
-use modelmill_identify::{ReadOptions, Recording, RecordingFile, TableInfo};
+use modelmill_boundary::files::DiskFiles;
+use modelmill_identify::{ReadOptions, SignalRecording, RecordingFile, TableInfo};
 
 fn fixtures() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures")
@@ -64,16 +64,16 @@ fn options(theirs: &[String; 7]) -> ReadOptions {
 }
 
 fn tables(path: &Path) -> Vec<TableInfo> {
-    let file = RecordingFile::open(&Disk::default(), path).unwrap();
+    let file = RecordingFile::open(&DiskFiles::default(), path).unwrap();
     file.tables().unwrap()
 }
 
 /// Holds all files of a folder against its CSV.
 fn same_in(folder: &Path) {
-    let csv = Recording::read(folder.join("run.csv"), &[]).unwrap();
+    let csv = SignalRecording::read(folder.join("run.csv"), &[]).unwrap();
     for (file, theirs) in forms() {
         let path = folder.join(file);
-        let recording = Recording::read_with(&path, &options(&theirs)).unwrap();
+        let recording = SignalRecording::read_with(&path, &options(&theirs)).unwrap();
         assert_eq!(recording.samples(), csv.samples(), "{file}");
         for name in OURS {
             let (found, expected) = (recording.column(name).unwrap(), csv.column(name).unwrap());
@@ -86,7 +86,7 @@ fn same_in(folder: &Path) {
             }
         }
         let bytes = std::fs::read(&path).unwrap();
-        let piped = Recording::from_bytes(&bytes, "a pipe", &options(&theirs)).unwrap();
+        let piped = SignalRecording::from_bytes(&bytes, "a pipe", &options(&theirs)).unwrap();
         assert_eq!(
             piped.column("tau_2").unwrap(),
             csv.column("tau_2").unwrap(),
@@ -101,7 +101,7 @@ fn same_in(folder: &Path) {
         let rate = table.rate().unwrap();
         assert!((rate - 250.0).abs() < 1e-6, "{file}: {rate}");
         // A file that lost its end is no recording.
-        let cut = Recording::from_bytes(&bytes[..bytes.len() * 2 / 3], file, &options(&theirs));
+        let cut = SignalRecording::from_bytes(&bytes[..bytes.len() * 2 / 3], file, &options(&theirs));
         assert!(cut.is_err(), "{file}");
     }
 }
@@ -143,7 +143,7 @@ fn files_that_are_made_now_give_the_same_numbers() {
 #[test]
 fn whole_numbers_of_all_types_are_read_right() {
     for file in ["run-zstd-v1.parquet", "run-brotli-v2.parquet"] {
-        let recording = Recording::read(fixtures().join(file), &[]).unwrap();
+        let recording = SignalRecording::read(fixtures().join(file), &[]).unwrap();
         let kinds = tables(&fixtures().join(file)).remove(0).columns;
         for k in [0, 1, 59] {
             let x = k as f64;
@@ -173,7 +173,7 @@ fn whole_numbers_of_all_types_are_read_right() {
 #[test]
 fn datasets_of_all_types_are_read_right() {
     for file in ["run-earliest.h5", "run-latest.h5"] {
-        let recording = Recording::read(fixtures().join(file), &[]).unwrap();
+        let recording = SignalRecording::read(fixtures().join(file), &[]).unwrap();
         for k in [0, 1, 59] {
             let q = recording.column("run.q_1").unwrap()[k];
             for (name, expected) in [
@@ -239,7 +239,7 @@ fn messages_of_any_type_become_columns() {
             wanted: Some(vec!["t".to_owned(), name.to_owned()]),
             ..ReadOptions::default()
         };
-        Recording::read_with(&path, &options).unwrap()
+        SignalRecording::read_with(&path, &options).unwrap()
     };
     let current = one("status.drives.right.current");
     let expected: Vec<f64> = (0..12).map(|i| -5.0 * f64::from(i)).collect();
@@ -273,7 +273,7 @@ fn topics_are_joined_on_time() {
         ),
         ..ReadOptions::default()
     };
-    let recording = Recording::read_with(&path, &options).unwrap();
+    let recording = SignalRecording::read_with(&path, &options).unwrap();
     let command = recording.column("command.data").unwrap();
     // The first command comes 1 us after the first state, which has none before it.
     assert_eq!(recording.samples(), 59);

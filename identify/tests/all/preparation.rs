@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
 
-use modelmill_identify::{Preparation, ReadOptions, Recording, Run, Smoothing};
+use modelmill_identify::{StatePreparation, ReadOptions, SignalRecording, PreparedRun, SmoothingMethod};
 
 const RATE: f64 = 250.0;
 const PERIOD: f64 = 7.29;
@@ -33,7 +33,7 @@ fn motion(seed: u64, t: f64) -> [f64; 3] {
 }
 
 /// What an encoder of 20 bits with noise reads, prepared.
-fn prepared(seed: u64, samples: u32, smoothing: Smoothing) -> Run {
+fn prepared(seed: u64, samples: u32, smoothing: SmoothingMethod) -> PreparedRun {
     let mut state = seed.wrapping_mul(77);
     let step = TAU / f64::from(1 << 20);
     let mut text = "t,q\n".to_owned();
@@ -45,10 +45,10 @@ fn prepared(seed: u64, samples: u32, smoothing: Smoothing) -> Run {
         writeln!(text, "{t},{read:.9}").unwrap();
     }
     let recording =
-        Recording::from_reader(text.as_bytes(), "run.csv", &ReadOptions::default()).unwrap();
-    let preparation = Preparation {
+        SignalRecording::from_reader(text.as_bytes(), "run.csv", &ReadOptions::default()).unwrap();
+    let preparation = StatePreparation {
         smoothing,
-        ..Preparation::default()
+        ..StatePreparation::default()
     };
     recording
         .states_with(&["q".to_owned()], &[], &preparation)
@@ -56,14 +56,14 @@ fn prepared(seed: u64, samples: u32, smoothing: Smoothing) -> Run {
 }
 
 /// RMS error of the acceleration.
-fn acceleration_error(seed: u64, run: &Run) -> f64 {
+fn acceleration_error(seed: u64, run: &PreparedRun) -> f64 {
     let pairs = run.time.iter().zip(&run.qdd[0]);
     let sum: f64 = pairs.map(|(t, a)| (a - motion(seed, *t)[2]).powi(2)).sum();
     (sum / run.samples() as f64).sqrt()
 }
 
 /// The signs of friction come from the rates: they must be right but for the sample beside a reversal.
-fn check_signs(seed: u64, run: &Run) {
+fn check_signs(seed: u64, run: &PreparedRun) {
     for (t, rate) in run.time.iter().zip(&run.qd[0]) {
         let around = [-1.0, 0.0, 1.0].map(|i| motion(seed, t + i / RATE)[1]);
         let reverses = around.iter().any(|r| r.signum() != around[1].signum());
@@ -79,7 +79,7 @@ fn check_signs(seed: u64, run: &Run) {
 fn two_periods_or_one_are_projected_on_their_series() {
     for seed in 1..=8 {
         for samples in [3645, 1823] {
-            let run = prepared(seed, samples, Smoothing::default());
+            let run = prepared(seed, samples, SmoothingMethod::default());
             let note = &run.notes[0].says;
             assert!(
                 note.contains("with 7 harmonics, since it leaves nothing but white noise"),
@@ -98,7 +98,7 @@ fn two_periods_or_one_are_projected_on_their_series() {
 fn part_of_a_period_is_filtered_where_motion_ends() {
     for seed in 1..=8 {
         for samples in [1325, 1000, 2200] {
-            let run = prepared(seed, samples, Smoothing::default());
+            let run = prepared(seed, samples, SmoothingMethod::default());
             let cutoff = run.prepared.cutoff_hz.unwrap();
             assert!(
                 (3.0..15.0).contains(&cutoff),
@@ -113,8 +113,8 @@ fn part_of_a_period_is_filtered_where_motion_ends() {
 
 #[test]
 fn a_series_beats_the_low_pass_by_far() {
-    let series = acceleration_error(3, &prepared(3, 3645, Smoothing::Automatic));
-    let filtered = acceleration_error(3, &prepared(3, 3645, Smoothing::Butterworth));
+    let series = acceleration_error(3, &prepared(3, 3645, SmoothingMethod::Automatic));
+    let filtered = acceleration_error(3, &prepared(3, 3645, SmoothingMethod::Butterworth));
     println!("error of the acceleration: {series:.2e} by the series, {filtered:.2e} by the filter");
     assert!(series < 0.1 * filtered);
 }

@@ -4,12 +4,12 @@
 use std::fmt::Write as _;
 
 use modelmill_identify::{
-    DerivativeSource, Fault, NotFinite, Preparation, ReadOptions, Recording, RecordingError,
-    Severity,
+    DerivativeSource, RecordingFault, NonFinitePolicy, StatePreparation, ReadOptions, SignalRecording, RecordingError,
+    NoteSeverity,
 };
 
-fn read(text: &str) -> Result<Recording, RecordingError> {
-    Recording::from_reader(text.as_bytes(), "run.csv", &ReadOptions::default())
+fn read(text: &str) -> Result<SignalRecording, RecordingError> {
+    SignalRecording::from_reader(text.as_bytes(), "run.csv", &ReadOptions::default())
 }
 
 fn names(list: &[&str]) -> Vec<String> {
@@ -57,14 +57,14 @@ fn files_that_are_no_recordings() {
         .flat_map(u16::to_le_bytes)
         .collect();
     let error =
-        Recording::from_reader(utf16.as_slice(), "run.csv", &ReadOptions::default()).unwrap_err();
+        SignalRecording::from_reader(utf16.as_slice(), "run.csv", &ReadOptions::default()).unwrap_err();
     assert_eq!(
         error.fault,
-        Fault::NotCsv {
+        RecordingFault::NotCsv {
             looks_like: "UTF-16 text"
         }
     );
-    let error = Recording::from_reader(
+    let error = SignalRecording::from_reader(
         [b't', b',', 0xE9, b'\n'].as_slice(),
         "run.csv",
         &ReadOptions::default(),
@@ -75,14 +75,14 @@ fn files_that_are_no_recordings() {
             .to_string()
             .contains("another encoding than UTF-8")
     );
-    let missing = Recording::read("no/such/run.csv", &[])
+    let missing = SignalRecording::read("no/such/run.csv", &[])
         .unwrap_err()
         .to_string();
     assert!(
         missing.starts_with("no/such/run.csv: the recording cannot be read:"),
         "{missing}"
     );
-    let folder = Recording::read(env!("CARGO_MANIFEST_DIR"), &[])
+    let folder = SignalRecording::read(env!("CARGO_MANIFEST_DIR"), &[])
         .unwrap_err()
         .to_string();
     assert!(folder.contains("a folder, not a file"), "{folder}");
@@ -112,7 +112,7 @@ fn faults_of_header_and_lines() {
 fn a_quote_left_open_is_named_where_it_opens() {
     let check = |text: &str, line: u64| {
         let error = read(text).expect_err("the recording is faulty");
-        assert_eq!(error.fault, Fault::OpenQuote { line }, "{text:?}: {error}");
+        assert_eq!(error.fault, RecordingFault::OpenQuote { line }, "{text:?}: {error}");
         assert!(
             error.to_string().starts_with(&format!(
                 "run.csv, line {line}: a quote opens here, but the field that it begins does not end in the same line;"
@@ -138,7 +138,7 @@ fn a_quote_left_open_is_named_where_it_opens() {
         wanted: Some(names(&["t", "q"])),
         ..ReadOptions::default()
     };
-    let recording = Recording::from_reader(text.as_bytes(), "run.csv", &options).unwrap();
+    let recording = SignalRecording::from_reader(text.as_bytes(), "run.csv", &options).unwrap();
     assert_eq!(recording.column("q").unwrap(), [1.0, 2.0]);
     assert_eq!(recording.line(1), Some(4));
 }
@@ -182,11 +182,11 @@ fn a_column_with_other_things_than_numbers_is_refused_when_it_is_used() {
 #[test]
 fn samples_left_out_are_counted() {
     let options = ReadOptions {
-        not_finite: NotFinite::LeaveOut,
+        not_finite: NonFinitePolicy::LeaveOut,
         ..ReadOptions::default()
     };
     let text = "t,q\n0,1\n0.1,NaN\n0.2,2\n0.3,\n0.4,5\n";
-    let recording = Recording::from_reader(text.as_bytes(), "run.csv", &options).unwrap();
+    let recording = SignalRecording::from_reader(text.as_bytes(), "run.csv", &options).unwrap();
     assert_eq!(recording.column("q").unwrap(), [1.0, 2.0, 5.0]);
     assert_eq!(recording.line(1), Some(4));
     assert_eq!(
@@ -203,7 +203,7 @@ fn renamings_and_missing_columns() {
             .map(|(ours, theirs)| ((*ours).to_owned(), (*theirs).to_owned()))
             .collect();
         let text = "t_s,theta1,F_left\n0,1,2\n0.1,2,3\n";
-        Recording::from_reader(
+        SignalRecording::from_reader(
             text.as_bytes(),
             "run.csv",
             &ReadOptions {
@@ -235,11 +235,11 @@ fn renamings_and_missing_columns() {
     );
     assert!(matches!(
         read(&[("a", "t_s"), ("a", "F_left")]).unwrap_err().fault,
-        Fault::DuplicateRenaming { .. }
+        RecordingFault::DuplicateRenaming { .. }
     ));
     assert!(matches!(
         read(&[("a", "t_s"), ("b", "t_s")]).unwrap_err().fault,
-        Fault::DuplicateRenaming { .. }
+        RecordingFault::DuplicateRenaming { .. }
     ));
 }
 
@@ -286,7 +286,7 @@ fn a_force_may_be_missing_until_it_is_needed() {
         .unwrap();
     assert!(run.force.is_none());
     assert_eq!(
-        run.measured().unwrap_err().to_string(),
+        run.measured_forces().unwrap_err().to_string(),
         "run.csv: the measured force of `right` is needed, but there is no such column; \
          map one onto it with option `columns` = `right=THEIRS`"
     );
@@ -302,7 +302,7 @@ fn time_must_increase_and_gaps_are_said() {
     );
     let gap = read("t,q,q_d,q_dd\n0,1,1,1\n0.1,2,1,1\n0.2,3,1,1\n0.5,4,1,1\n0.6,5,1,1\n").unwrap();
     let run = gap.states(&names(&["q"]), &[]).unwrap();
-    assert_eq!(run.notes[0].severity, Severity::Warning);
+    assert_eq!(run.notes[0].severity, NoteSeverity::Warning);
     assert!(
         run.notes[0].says.contains("1 gap ") && run.notes[0].says.contains("after line 4"),
         "{}",
@@ -311,7 +311,7 @@ fn time_must_increase_and_gaps_are_said() {
 }
 
 /// `sin` at 200 Hz in 400 samples, with the columns asked for.
-fn sine(columns: &[&str]) -> Recording {
+fn sine(columns: &[&str]) -> SignalRecording {
     let mut text = format!("t,{}\n", columns.join(","));
     for i in 0..400 {
         let t = 0.005 * f64::from(i);
@@ -366,12 +366,12 @@ fn missing_derivatives_are_prepared_and_said() {
 
 #[test]
 fn a_preparation_of_ones_own_is_kept_to() {
-    let preparation = Preparation {
+    let preparation = StatePreparation {
         cutoff_hz: Some(30.0),
         trim: Some((7, 3)),
         decimate: 5,
         source: DerivativeSource::Positions,
-        ..Preparation::default()
+        ..StatePreparation::default()
     };
     let run = sine(&["q", "q_d", "q_dd"])
         .states_with(&names(&["q"]), &[], &preparation)
@@ -386,7 +386,7 @@ fn a_preparation_of_ones_own_is_kept_to() {
     );
     assert_eq!(run.samples(), 390);
     assert!((run.time[0] - 0.035).abs() < 1e-12);
-    let bad = Preparation {
+    let bad = StatePreparation {
         cutoff_hz: Some(150.0),
         ..preparation.clone()
     };
@@ -398,7 +398,7 @@ fn a_preparation_of_ones_own_is_kept_to() {
         error.contains("150 Hz") && error.contains("below 100"),
         "{error}"
     );
-    let bad = Preparation {
+    let bad = StatePreparation {
         trim: Some((usize::MAX, 1)),
         ..preparation
     };
@@ -409,7 +409,7 @@ fn a_preparation_of_ones_own_is_kept_to() {
             .to_string()
             .contains("option `trim`")
     );
-    let bad = Preparation {
+    let bad = StatePreparation {
         cutoff_hz: Some(1e-9),
         ..bad
     };
@@ -479,16 +479,16 @@ fn mutilated_recordings_get_an_answer() {
             }
         }
         let not_finite = if draw(2) == 0 {
-            NotFinite::Refuse
+            NonFinitePolicy::Refuse
         } else {
-            NotFinite::LeaveOut
+            NonFinitePolicy::LeaveOut
         };
         let options = ReadOptions {
             renames: Vec::new(),
             not_finite,
             ..ReadOptions::default()
         };
-        match Recording::from_reader(bytes.as_slice(), "run.csv", &options) {
+        match SignalRecording::from_reader(bytes.as_slice(), "run.csv", &options) {
             Ok(recording) => {
                 read_well += 1;
                 let _ = recording

@@ -7,10 +7,10 @@
 use std::f64::consts::PI;
 use std::fmt::Write as _;
 
-use modelmill_identify::estimate::autocorrelated_deviations;
+use modelmill_identify::estimate::uncertainty_with_autocorrelation;
 use modelmill_identify::{
-    Comparison, FitFile, LeastSquares, LeastSquaresError, ParameterInfo, Preparation, ReadOptions,
-    Recording, Run, fit_parameters,
+    ErrorAccumulator, FitFile, LeastSquares, LeastSquaresError, ParameterInfo, StatePreparation, ReadOptions,
+    SignalRecording, PreparedRun, fit_parameters,
 };
 
 const GRAVITY: f64 = 9.81;
@@ -77,7 +77,7 @@ impl Noise {
 }
 
 /// A recording of 14.58 s at 250 Hz; `bias` is a force on the right drive that the model lacks.
-fn recording(seed: u64, bias: f64) -> Recording {
+fn recording(seed: u64, bias: f64) -> SignalRecording {
     let mut noise = Noise(seed);
     let mut text = "t,theta1,theta2,left,right\n".to_owned();
     let step = 2.0 * PI / f64::from(1 << 20);
@@ -98,7 +98,7 @@ fn recording(seed: u64, bias: f64) -> Recording {
         )
         .expect("a string takes text");
     }
-    Recording::from_reader(text.as_bytes(), "synthetic.csv", &ReadOptions::default())
+    SignalRecording::from_reader(text.as_bytes(), "synthetic.csv", &ReadOptions::default())
         .expect("a sound recording")
 }
 
@@ -106,7 +106,7 @@ fn dot(row: &[f64], p: &[f64]) -> f64 {
     row.iter().zip(p).map(|(w, p)| w * p).sum()
 }
 
-fn regressor(run: &Run) -> Vec<f64> {
+fn regressor(run: &PreparedRun) -> Vec<f64> {
     (0..run.samples())
         .flat_map(|i| {
             let pick = |columns: &[Vec<f64>]| [columns[0][i], columns[1][i]];
@@ -115,12 +115,12 @@ fn regressor(run: &Run) -> Vec<f64> {
         .collect()
 }
 
-fn run(seed: u64, bias: f64) -> Run {
+fn run(seed: u64, bias: f64) -> PreparedRun {
     recording(seed, bias)
         .states_with(
             &NAMES.map(str::to_owned),
             &DRIVES.map(str::to_owned),
-            &Preparation::default(),
+            &StatePreparation::default(),
         )
         .expect("states")
 }
@@ -139,7 +139,7 @@ fn positions_alone_give_the_parameters_within_a_fifth_of_a_percent() {
         regression.add_rows(w, y).expect("finite rows");
     }
     let solution = regression.solve().expect("a solution");
-    let deviations = autocorrelated_deviations(&solution, 2, |visit| {
+    let deviations = uncertainty_with_autocorrelation(&solution, 2, |visit| {
         for (w, y) in w.chunks(300 * 10).zip(y.chunks(300 * 2)) {
             visit(w, y)?;
         }
@@ -168,7 +168,7 @@ fn positions_alone_give_the_parameters_within_a_fifth_of_a_percent() {
         .chunks_exact(5)
         .map(|row| dot(row, &solution.values))
         .collect();
-    let mut comparison = Comparison::new(DRIVES.map(str::to_owned));
+    let mut comparison = ErrorAccumulator::new(DRIVES.map(str::to_owned));
     comparison.add(&y, &model).expect("finite values");
     let infos: Vec<ParameterInfo> = (0..5)
         .map(|j| ParameterInfo {
@@ -190,7 +190,7 @@ fn positions_alone_give_the_parameters_within_a_fifth_of_a_percent() {
         fit: comparison.finish().expect("figures"),
         check: None,
         data: run.notes.clone(),
-        estimator: modelmill_identify::Estimator::default(),
+        estimator: modelmill_identify::EstimatorOutput::default(),
     };
     let again =
         FitFile::parse(&serde_json::to_string(&fit).expect("JSON"), "fit.json").expect("a fit");
@@ -215,7 +215,7 @@ fn a_missing_effect_widens_the_deviations() {
     regression.add_rows(&w, &y).expect("finite rows");
     let solution = regression.solve().expect("a solution");
     let deviations =
-        autocorrelated_deviations(&solution, 2, |visit| visit(&w, &y)).expect("deviations");
+        uncertainty_with_autocorrelation(&solution, 2, |visit| visit(&w, &y)).expect("deviations");
     println!(
         "lag 1: {:?}, effective samples {:?}",
         deviations.residual_lag1, deviations.effective_samples

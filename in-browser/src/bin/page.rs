@@ -26,8 +26,8 @@ fn run() -> Result<String, String> {
     };
     let program = std::env::current_exe().map_err(|error| error.to_string())?;
     let builds = program.ancestors().nth(2).unwrap_or(&program);
-    let module = make::module("page", builds)?;
-    let page = make::page(&module)?;
+    let module = make::build_module("page", builds)?;
+    let page = make::build_page(&module)?;
     std::fs::write(&target, &page).map_err(|e| format!("{}: {e}", target.display()))?;
     let size = std::fs::metadata(&module).map_or(0, |module| module.len());
     Ok(format!(

@@ -2,19 +2,19 @@
 
 use std::collections::BTreeMap;
 
-use crate::build::Places;
+use crate::build::MechanismSpans;
 use crate::build::bodies::check_unique;
-use crate::build::frames::{Points, Tree, twice};
+use crate::build::frames::{PointTable, FrameTree, duplicate_name};
 use crate::build::free;
-use crate::build::symbols::Symbols;
+use crate::build::symbols::SymbolTable;
 use crate::column;
-use crate::diagnostic::{Diagnostic, Log, Span};
-use crate::exact::{CoordinateIdx, Exact, Symbol};
-use crate::mechanism::{Drive, DriveKind, Loop};
+use crate::diagnostic::{Diagnostic, DiagnosticLog, SourceSpan};
+use crate::exact::{CoordinateIdx, ExactExpression, ModelSymbol};
+use crate::mechanism::{ModelDrive, DriveKind, KinematicLoop};
 use crate::schema::ModelEntry;
-use crate::scope::Sort;
+use crate::scope::SymbolSort;
 use crate::suggest;
-use crate::values::Name;
+use crate::values::SpannedName;
 
 /// Most loops of a mechanism.
 const MOST_LOOPS: usize = 60;
@@ -22,10 +22,10 @@ const MOST_LOOPS: usize = 60;
 /// Reads the loops.
 pub(super) fn loops(
     model: &ModelEntry,
-    points: &Points,
-    places: &mut Places,
-    log: &mut Log,
-) -> Vec<Loop> {
+    points: &PointTable,
+    places: &mut MechanismSpans,
+    log: &mut DiagnosticLog,
+) -> Vec<KinematicLoop> {
     let entries = model
         .loops
         .as_ref()
@@ -66,7 +66,7 @@ pub(super) fn loops(
             continue;
         }
         places.loops.push(joins.span);
-        loops.push(Loop {
+        loops.push(KinematicLoop {
             name: entry.name.as_ref().map_or_else(
                 || format!("{}_{}", first.text, second.text),
                 |name| name.text.clone(),
@@ -78,27 +78,27 @@ pub(super) fn loops(
 }
 
 /// Rows of the equation of motion, and drives that have none of their own because there are more of them.
-pub(super) struct Drives {
-    pub(super) rows: Vec<Drive>,
-    pub(super) shared: Vec<Drive>,
+pub(super) struct DriveRows {
+    pub(super) rows: Vec<ModelDrive>,
+    pub(super) shared: Vec<ModelDrive>,
 }
 
 /// Reads the drives; there must be one per degree of freedom that is driven, or more than there are freedoms in a tree. What is not has a row of its own, called after
 /// its coordinate: those of free bodies come first, those of joints last.
 pub(super) fn drives(
     model: &ModelEntry,
-    symbols: &Symbols,
-    tree: &Tree,
-    points: &Points,
-    places: &mut Places,
-    log: &mut Log,
-) -> Drives {
+    symbols: &SymbolTable,
+    tree: &FrameTree,
+    points: &PointTable,
+    places: &mut MechanismSpans,
+    log: &mut DiagnosticLog,
+) -> DriveRows {
     let entries = model
         .drive
         .as_ref()
         .map_or(&[][..], |list| list.entries.as_slice());
     let before = log.n_errors();
-    let mut drives: Vec<Drive> = Vec::new();
+    let mut drives: Vec<ModelDrive> = Vec::new();
     // Which drives act where their entry says; the others only stand in the list.
     let mut known = Vec::new();
     for entry in entries {
@@ -130,7 +130,7 @@ pub(super) fn drives(
             );
         }
         if let Some(first) = drives.iter().position(|drive| drive.name == name.text) {
-            log.push(twice("drive", name, places.drives[first]));
+            log.push(duplicate_name("drive", name, places.drives[first]));
             continue;
         }
         if let Some(DriveKind::Joint(joint)) = kind
@@ -150,35 +150,35 @@ pub(super) fn drives(
         }
         places.drives.push(name.span);
         known.push(kind.is_some());
-        drives.push(Drive {
+        drives.push(ModelDrive {
             name: name.text.clone(),
             kind: kind.unwrap_or(DriveKind::Joint(CoordinateIdx(0))),
             is_driven: true,
         });
     }
-    let shared = free::take_shared(model, symbols, &mut drives);
-    free::check_apart(tree, &shared, points, &places.drives, log);
+    let shared = free::split_shared_drives(model, symbols, &mut drives);
+    free::check_linear_drives(tree, &shared, points, &places.drives, log);
     if !shared.is_empty() {
         places.drives.clear();
     }
-    let mut drives = Drives {
+    let mut drives = DriveRows {
         rows: drives,
         shared,
     };
     free::add_rows(model, symbols, tree, points, places, &mut drives, log);
     if log.n_errors() == before && !log.syntax_broken {
-        free::check_apart(tree, &drives.rows, points, &places.drives, log);
-        check_number(model, symbols, &drives.rows, places, log);
+        free::check_linear_drives(tree, &drives.rows, points, &places.drives, log);
+        check_drive_count(model, symbols, &drives.rows, places, log);
     }
     drives
 }
 
-fn check_number(
+fn check_drive_count(
     model: &ModelEntry,
-    symbols: &Symbols,
-    drives: &[Drive],
-    places: &Places,
-    log: &mut Log,
+    symbols: &SymbolTable,
+    drives: &[ModelDrive],
+    places: &MechanismSpans,
+    log: &mut DiagnosticLog,
 ) {
     let n_active = symbols
         .coordinates
@@ -234,19 +234,19 @@ fn check_number(
     );
 }
 
-fn coordinate(name: &Name, symbols: &Symbols, log: &mut Log) -> Option<CoordinateIdx> {
+fn coordinate(name: &SpannedName, symbols: &SymbolTable, log: &mut DiagnosticLog) -> Option<CoordinateIdx> {
     let meaning = symbols
         .scope
-        .look_up(&name.text, name.span, &[Sort::Coordinate], log)?;
+        .look_up(&name.text, name.span, &[SymbolSort::Coordinate], log)?;
     match meaning.exact {
-        Exact::Symbol(Symbol::Coordinate(idx)) => Some(idx),
+        ExactExpression::Symbol(ModelSymbol::Coordinate(idx)) => Some(idx),
         _ => None,
     }
 }
 
 /// Drives, coordinates and points are places of effects and columns of recordings: their names must differ.
-pub(super) fn check_place_names(model: &ModelEntry, log: &mut Log) {
-    let mut seen: BTreeMap<&str, (&str, Span)> = BTreeMap::new();
+pub(super) fn check_place_names(model: &ModelEntry, log: &mut DiagnosticLog) {
+    let mut seen: BTreeMap<&str, (&str, SourceSpan)> = BTreeMap::new();
     let coordinates = model
         .coordinates
         .iter()
@@ -264,7 +264,7 @@ pub(super) fn check_place_names(model: &ModelEntry, log: &mut Log) {
         .flat_map(|list| &list.entries)
         .filter_map(|entry| entry.name.as_ref())
         .map(|name| ("point", name.text.as_str(), name.span));
-    let all: Vec<(&str, &str, Span)> = coordinates.chain(drives).chain(points).collect();
+    let all: Vec<(&str, &str, SourceSpan)> = coordinates.chain(drives).chain(points).collect();
     for &(what, name, span) in &all {
         match seen.get(name) {
             Some(&(first, first_span)) if first != what => log.push(
@@ -299,8 +299,8 @@ pub(super) fn check_place_names(model: &ModelEntry, log: &mut Log) {
 }
 
 /// Reads what columns of drives measure: by what they are multiplied to be what acts at the joint.
-pub(super) fn torque(model: &ModelEntry, drives: &Drives, log: &mut Log) -> Vec<(String, f64)> {
-    let drives: Vec<&Drive> = drives.rows.iter().chain(&drives.shared).collect();
+pub(super) fn torque(model: &ModelEntry, drives: &DriveRows, log: &mut DiagnosticLog) -> Vec<(String, f64)> {
+    let drives: Vec<&ModelDrive> = drives.rows.iter().chain(&drives.shared).collect();
     let recording = model.recording.as_ref();
     let torque = recording.and_then(|entry| entry.torque.as_ref());
     let mut factors = Vec::new();
@@ -339,9 +339,9 @@ pub(super) fn torque(model: &ModelEntry, drives: &Drives, log: &mut Log) -> Vec<
 /// Reads how recordings name their columns.
 pub(super) fn recording(
     model: &ModelEntry,
-    symbols: &Symbols,
-    drives: &Drives,
-    log: &mut Log,
+    symbols: &SymbolTable,
+    drives: &DriveRows,
+    log: &mut DiagnosticLog,
 ) -> Vec<(String, String)> {
     let Some(columns) = model
         .recording

@@ -3,28 +3,28 @@
 use num_rational::BigRational;
 use num_traits::One;
 
-use crate::angle::rational;
-use crate::build::frames::{Points, Tree, twice};
-use crate::build::symbols::{LINEAR, Symbols, explicit, shorthand, vector};
-use crate::diagnostic::{Diagnostic, Log, Span};
-use crate::exact::{Exact, Symbol};
-use crate::formula::Formula;
-use crate::mechanism::{FrameIdx, Inertial, LumpedMass, Mechanism, Part};
+use crate::angle::rational_value;
+use crate::build::frames::{PointTable, FrameTree, duplicate_name};
+use crate::build::symbols::{LINEAR, SymbolTable, explicit_entry, shorthand, vector};
+use crate::diagnostic::{Diagnostic, DiagnosticLog, SourceSpan};
+use crate::exact::{ExactExpression, ModelSymbol};
+use crate::formula::SourceFormula;
+use crate::mechanism::{FrameIdx, PartInertia, LumpedMass, Mechanism, ModelPart};
 use crate::schema::{LinearEntry, LumpedMassEntry, ModelEntry, PartEntry};
-use crate::scope::{Sort, Wanted};
-use crate::unit::Dimension;
-use crate::values::Name;
-use crate::values::{Spot, Vector};
+use crate::scope::{SymbolSort, FormulaRequirement};
+use crate::unit::UnitDimension;
+use crate::values::SpannedName;
+use crate::values::{LumpedMassPlace, FormulaVector};
 
-const SORTS: [Sort; 2] = [Sort::Constant, Sort::Parameter];
+const SORTS: [SymbolSort; 2] = [SymbolSort::Constant, SymbolSort::Parameter];
 
 /// Reads the parts.
 pub(super) fn parts(
     model: &ModelEntry,
-    symbols: &Symbols,
-    tree: &Tree,
-    log: &mut Log,
-) -> Vec<Part> {
+    symbols: &SymbolTable,
+    tree: &FrameTree,
+    log: &mut DiagnosticLog,
+) -> Vec<ModelPart> {
     let entries = model.part.iter().flat_map(|list| &list.entries);
     check_unique(
         "part",
@@ -35,7 +35,7 @@ pub(super) fn parts(
         .map(|entry| {
             let frame = entry.on.as_ref().and_then(|on| tree.find(on, log));
             let frame = frame.unwrap_or(FrameIdx(0));
-            Part {
+            ModelPart {
                 name: entry.name.as_ref().map_or_else(
                     || tree.frames[frame.0].name.clone(),
                     |name| name.text.clone(),
@@ -48,16 +48,16 @@ pub(super) fn parts(
 }
 
 /// Reports names that occur twice in a list.
-pub(super) fn check_unique<'a>(what: &str, names: impl Iterator<Item = &'a Name>, log: &mut Log) {
+pub(super) fn check_unique<'a>(what: &str, names: impl Iterator<Item = &'a SpannedName>, log: &mut DiagnosticLog) {
     let mut seen = std::collections::BTreeMap::new();
     for name in names {
         if let Some(first) = seen.insert(&name.text, name.span) {
-            log.push(twice(what, name, first));
+            log.push(duplicate_name(what, name, first));
         }
     }
 }
 
-fn inertial(entry: &PartEntry, symbols: &Symbols, log: &mut Log) -> Inertial {
+fn inertial(entry: &PartEntry, symbols: &SymbolTable, log: &mut DiagnosticLog) -> PartInertia {
     let about_centre = entry.mass.is_some() || entry.centre.is_some() || entry.inertia.is_some();
     if let Some(linear) = &entry.linear {
         if about_centre {
@@ -84,21 +84,21 @@ fn inertial(entry: &PartEntry, symbols: &Symbols, log: &mut Log) -> Inertial {
         inertia.and_then(|inertia| inertia.yz.as_ref()),
         inertia.and_then(|inertia| inertia.zz.as_ref()),
     ];
-    Inertial::AboutCentre {
+    PartInertia::AboutCentre {
         mass: quantity(
             entry.mass.as_ref(),
             symbols,
-            Dimension::MASS,
+            UnitDimension::MASS,
             "the mass",
             log,
         ),
         centre: position(entry.centre.as_ref(), symbols, "the centre of mass", log),
         inertia: entries
-            .map(|entry| quantity(entry, symbols, Dimension::INERTIA, "the inertia", log)),
+            .map(|entry| quantity(entry, symbols, UnitDimension::INERTIA, "the inertia", log)),
     }
 }
 
-fn linear_inertial(linear: &LinearEntry, symbols: &Symbols, log: &mut Log) -> Inertial {
+fn linear_inertial(linear: &LinearEntry, symbols: &SymbolTable, log: &mut DiagnosticLog) -> PartInertia {
     if let (Some(_), Some(planar)) = (&linear.all, &linear.planar) {
         log.push(
             Diagnostic::error(
@@ -109,25 +109,25 @@ fn linear_inertial(linear: &LinearEntry, symbols: &Symbols, log: &mut Log) -> In
         );
     }
     let short = shorthand(linear);
-    let entry = |symbol: &str, dimension: Dimension, log: &mut Log| {
-        if let Some(formula) = explicit(linear, symbol) {
+    let entry = |symbol: &str, dimension: UnitDimension, log: &mut DiagnosticLog| {
+        if let Some(formula) = explicit_entry(linear, symbol) {
             let what = format!("{symbol} of a part");
             return quantity(Some(formula), symbols, dimension, &what, log);
         }
         let Some((suffix, _)) = short.filter(|(_, members)| members.contains(&symbol)) else {
-            return Exact::zero();
+            return ExactExpression::zero();
         };
         let name = format!("{symbol}{}", suffix.text);
         // Declared above; where that failed, the fault is reported already.
         let Some(meaning) = symbols.scope.get(&name) else {
-            return Exact::zero();
+            return ExactExpression::zero();
         };
         meaning.used.set(true);
         meaning.exact.clone()
     };
     let mut values = LINEAR.map(|(symbol, dimension)| entry(symbol, dimension, log));
-    let mut take = |i: usize| std::mem::replace(&mut values[i], Exact::zero());
-    Inertial::Linear {
+    let mut take = |i: usize| std::mem::replace(&mut values[i], ExactExpression::zero());
+    PartInertia::Linear {
         inertia: std::array::from_fn(&mut take),
         first_moment: std::array::from_fn(|i| take(i + 6)),
         mass: take(9),
@@ -136,39 +136,39 @@ fn linear_inertial(linear: &LinearEntry, symbols: &Symbols, log: &mut Log) -> In
 
 /// An expression over constants and parameters, polynomial in the parameters; zero where absent or faulty.
 fn quantity(
-    formula: Option<&Formula>,
-    symbols: &Symbols,
-    dimension: Dimension,
+    formula: Option<&SourceFormula>,
+    symbols: &SymbolTable,
+    dimension: UnitDimension,
     what: &str,
-    log: &mut Log,
-) -> Exact {
+    log: &mut DiagnosticLog,
+) -> ExactExpression {
     let Some(formula) = formula else {
-        return Exact::zero();
+        return ExactExpression::zero();
     };
-    let wanted = Wanted {
+    let wanted = FormulaRequirement {
         sorts: &SORTS,
         dimension,
         what,
     };
     let Some(exact) = symbols.scope.resolve(formula, wanted, log) else {
-        return Exact::zero();
+        return ExactExpression::zero();
     };
     check_polynomial(&exact, formula.ast.span, log);
     exact
 }
 
 fn position(
-    vector_entry: Option<&Vector>,
-    symbols: &Symbols,
+    vector_entry: Option<&FormulaVector>,
+    symbols: &SymbolTable,
     what: &str,
-    log: &mut Log,
-) -> [Exact; 3] {
+    log: &mut DiagnosticLog,
+) -> [ExactExpression; 3] {
     let Some(entry) = vector_entry else {
-        return std::array::from_fn(|_| Exact::zero());
+        return std::array::from_fn(|_| ExactExpression::zero());
     };
-    let wanted = Wanted {
+    let wanted = FormulaRequirement {
         sorts: &SORTS,
-        dimension: Dimension::LENGTH,
+        dimension: UnitDimension::LENGTH,
         what,
     };
     let position = vector(entry, &symbols.scope, wanted, log);
@@ -180,7 +180,7 @@ fn position(
     position
 }
 
-fn check_polynomial(exact: &Exact, span: Span, log: &mut Log) {
+fn check_polynomial(exact: &ExactExpression, span: SourceSpan, log: &mut DiagnosticLog) {
     if !is_polynomial(exact) {
         log.push(
             Diagnostic::error(span, "this is not a polynomial in the parameters")
@@ -190,31 +190,31 @@ fn check_polynomial(exact: &Exact, span: Span, log: &mut Log) {
     }
 }
 
-fn is_polynomial(exact: &Exact) -> bool {
-    let free = |exact: &Exact| !exact.mentions(&|symbol| matches!(symbol, Symbol::Parameter(_)));
+fn is_polynomial(exact: &ExactExpression) -> bool {
+    let free = |exact: &ExactExpression| !exact.mentions(&|symbol| matches!(symbol, ModelSymbol::Parameter(_)));
     match exact {
-        Exact::Rational(_) | Exact::Pi | Exact::Symbol(_) => true,
-        Exact::Sum(inner) | Exact::Product(inner) => inner.iter().all(is_polynomial),
-        Exact::Negative(inner) => is_polynomial(inner),
-        Exact::Quotient(above, below) => is_polynomial(above) && free(below),
-        Exact::Power(base, exponent) => {
+        ExactExpression::Rational(_) | ExactExpression::Pi | ExactExpression::Symbol(_) => true,
+        ExactExpression::Sum(inner) | ExactExpression::Product(inner) => inner.iter().all(is_polynomial),
+        ExactExpression::Negative(inner) => is_polynomial(inner),
+        ExactExpression::Quotient(above, below) => is_polynomial(above) && free(below),
+        ExactExpression::Power(base, exponent) => {
             if *exponent >= 0 {
                 is_polynomial(base)
             } else {
                 free(base)
             }
         }
-        Exact::Apply(_, inner) => free(inner),
+        ExactExpression::Apply(_, inner) => free(inner),
     }
 }
 
 /// Reads the lumped masses.
 pub(super) fn lumped_masses(
     model: &ModelEntry,
-    symbols: &Symbols,
-    tree: &Tree,
-    points: &Points,
-    log: &mut Log,
+    symbols: &SymbolTable,
+    tree: &FrameTree,
+    points: &PointTable,
+    log: &mut DiagnosticLog,
 ) -> Vec<LumpedMass> {
     let entries = model.lumped_mass.iter().flat_map(|list| &list.entries);
     check_unique(
@@ -229,14 +229,14 @@ pub(super) fn lumped_masses(
 
 fn lumped_mass(
     entry: &LumpedMassEntry,
-    symbols: &Symbols,
-    tree: &Tree,
-    points: &Points,
-    log: &mut Log,
+    symbols: &SymbolTable,
+    tree: &FrameTree,
+    points: &PointTable,
+    log: &mut DiagnosticLog,
 ) -> LumpedMass {
     let spots = [&entry.at, &entry.force_at, &entry.moment_at];
     let named = spots.iter().find_map(|spot| match spot {
-        Some(Spot::Point(name)) => points.get(&name.text),
+        Some(LumpedMassPlace::Point(name)) => points.get(&name.text),
         _ => None,
     });
     let frame = match (&entry.on, named) {
@@ -247,7 +247,7 @@ fn lumped_mass(
                 && !entry.faulty
                 && !spots
                     .iter()
-                    .any(|spot| matches!(spot, Some(Spot::Point(_))))
+                    .any(|spot| matches!(spot, Some(LumpedMassPlace::Point(_))))
             {
                 log.push(
                     Diagnostic::error(entry.span, "this lumped mass sits on no frame")
@@ -277,20 +277,20 @@ fn lumped_mass(
         mass: quantity(
             entry.mass.as_ref(),
             symbols,
-            Dimension::MASS,
+            UnitDimension::MASS,
             "the mass",
             log,
         ),
-        share: share(entry.share.as_ref(), log),
+        share: mass_share(entry.share.as_ref(), log),
         frame,
-        force_at: spot(force_at, frame, symbols, tree, points, log),
-        moment_at: spot(moment_at, frame, symbols, tree, points, log),
+        force_at: lumped_mass_position(force_at, frame, symbols, tree, points, log),
+        moment_at: lumped_mass_position(moment_at, frame, symbols, tree, points, log),
     }
 }
 
 /// Warns of masses and moments of inertia whose nominal values are negative.
-pub(super) fn warn_of_negative(model: &ModelEntry, mechanism: &Mechanism, log: &mut Log) {
-    let mut look = |exact: &Exact, what: &str, unit: &str, span: Span| {
+pub(super) fn warn_of_negative(model: &ModelEntry, mechanism: &Mechanism, log: &mut DiagnosticLog) {
+    let mut look = |exact: &ExactExpression, what: &str, unit: &str, span: SourceSpan| {
         let value = exact.evaluate(&|symbol| mechanism.symbol_nominal(symbol));
         if value < 0.0 {
             log.push(
@@ -303,18 +303,18 @@ pub(super) fn warn_of_negative(model: &ModelEntry, mechanism: &Mechanism, log: &
             );
         }
     };
-    let place = |formula: Option<&Formula>, or: Span| formula.map_or(or, |f| f.ast.span);
+    let place = |formula: Option<&SourceFormula>, or: SourceSpan| formula.map_or(or, |f| f.ast.span);
     let parts = model.part.iter().flat_map(|list| &list.entries);
     for (entry, part) in parts.zip(&mechanism.parts) {
         let (mass, inertia, formulas, or) = match (&part.inertial, &entry.linear) {
-            (Inertial::Linear { mass, inertia, .. }, Some(linear)) => {
+            (PartInertia::Linear { mass, inertia, .. }, Some(linear)) => {
                 let nominal = linear.nominal.as_ref().map_or(linear.span, |n| n.span);
-                let formulas = ["M", "XX", "YY", "ZZ"].map(|symbol| explicit(linear, symbol));
+                let formulas = ["M", "XX", "YY", "ZZ"].map(|symbol| explicit_entry(linear, symbol));
                 (mass, inertia, formulas, nominal)
             }
             (
-                Inertial::AboutCentre { mass, inertia, .. }
-                | Inertial::Linear { mass, inertia, .. },
+                PartInertia::AboutCentre { mass, inertia, .. }
+                | PartInertia::Linear { mass, inertia, .. },
                 _,
             ) => {
                 let axes = entry.inertia.as_ref();
@@ -342,11 +342,11 @@ pub(super) fn warn_of_negative(model: &ModelEntry, mechanism: &Mechanism, log: &
     }
 }
 
-fn share(formula: Option<&Formula>, log: &mut Log) -> BigRational {
+fn mass_share(formula: Option<&SourceFormula>, log: &mut DiagnosticLog) -> BigRational {
     let Some(formula) = formula else {
         return BigRational::one();
     };
-    rational(&formula.ast).unwrap_or_else(|| {
+    rational_value(&formula.ast).unwrap_or_else(|| {
         log.push(
             Diagnostic::error(formula.ast.span, "a share must be a rational number")
                 .label("expected for example `1/2`")
@@ -356,21 +356,21 @@ fn share(formula: Option<&Formula>, log: &mut Log) -> BigRational {
     })
 }
 
-fn spot(
-    spot: Option<&Spot>,
+fn lumped_mass_position(
+    spot: Option<&LumpedMassPlace>,
     frame: FrameIdx,
-    symbols: &Symbols,
-    tree: &Tree,
-    points: &Points,
-    log: &mut Log,
-) -> [Exact; 3] {
-    let nowhere = || std::array::from_fn(|_| Exact::zero());
+    symbols: &SymbolTable,
+    tree: &FrameTree,
+    points: &PointTable,
+    log: &mut DiagnosticLog,
+) -> [ExactExpression; 3] {
+    let nowhere = || std::array::from_fn(|_| ExactExpression::zero());
     let Some(spot) = spot else {
         return nowhere();
     };
     match spot {
-        Spot::Vector(vector) => position(Some(vector), symbols, "the place of a lumped mass", log),
-        Spot::Point(name) => {
+        LumpedMassPlace::Vector(vector) => position(Some(vector), symbols, "the place of a lumped mass", log),
+        LumpedMassPlace::Point(name) => {
             let Some(idx) = points.find(name, log) else {
                 return nowhere();
             };

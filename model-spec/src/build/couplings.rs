@@ -2,23 +2,23 @@
 
 use std::collections::BTreeMap;
 
-use crate::build::Places;
-use crate::build::symbols::Symbols;
-use crate::diagnostic::{Diagnostic, Log, Span};
-use crate::exact::{CoordinateIdx, Exact, Symbol};
-use crate::formula::Formula;
-use crate::mechanism::Coupling;
+use crate::build::MechanismSpans;
+use crate::build::symbols::SymbolTable;
+use crate::diagnostic::{Diagnostic, DiagnosticLog, SourceSpan};
+use crate::exact::{CoordinateIdx, ExactExpression, ModelSymbol};
+use crate::formula::SourceFormula;
+use crate::mechanism::CoordinateCoupling;
 use crate::schema::{CoordinateEntry, ModelEntry};
-use crate::scope::{Sort, Wanted};
+use crate::scope::{SymbolSort, FormulaRequirement};
 
 /// Reads the couplings and gives what follows its nominal value.
 pub(super) fn couplings(
     model: &ModelEntry,
-    symbols: &mut Symbols,
-    places: &Places,
-    log: &mut Log,
-) -> Vec<Coupling> {
-    let mut found: Vec<(Coupling, Span)> = Vec::new();
+    symbols: &mut SymbolTable,
+    places: &MechanismSpans,
+    log: &mut DiagnosticLog,
+) -> Vec<CoordinateCoupling> {
+    let mut found: Vec<(CoordinateCoupling, SourceSpan)> = Vec::new();
     for (key, entry) in model.coordinates.iter().flat_map(|table| &table.entries) {
         let Some(follows) = &entry.follows else {
             continue;
@@ -26,7 +26,7 @@ pub(super) fn couplings(
         let Some(i) = symbols.coordinates.iter().position(|c| c.name == key.name) else {
             continue;
         };
-        reject_unused(entry, key.span, log);
+        reject_unused_fields(entry, key.span, log);
         if let Some(coupling) = coupling(follows, CoordinateIdx(i), symbols, log) {
             found.push((coupling, follows.ast.span));
         }
@@ -38,7 +38,7 @@ pub(super) fn couplings(
 }
 
 /// Says what else is given that follows already.
-fn reject_unused(entry: &CoordinateEntry, span: Span, log: &mut Log) {
+fn reject_unused_fields(entry: &CoordinateEntry, span: SourceSpan, log: &mut DiagnosticLog) {
     let given = [
         (entry.nominal.is_some(), "nominal"),
         (entry.passive.is_some(), "passive"),
@@ -58,20 +58,20 @@ fn reject_unused(entry: &CoordinateEntry, span: Span, log: &mut Log) {
 }
 
 fn coupling(
-    follows: &Formula,
+    follows: &SourceFormula,
     coordinate: CoordinateIdx,
-    symbols: &Symbols,
-    log: &mut Log,
-) -> Option<Coupling> {
+    symbols: &SymbolTable,
+    log: &mut DiagnosticLog,
+) -> Option<CoordinateCoupling> {
     let own = &symbols.coordinates[coordinate.0];
-    let wanted = Wanted {
-        sorts: &[Sort::Constant, Sort::Coordinate],
+    let wanted = FormulaRequirement {
+        sorts: &[SymbolSort::Constant, SymbolSort::Coordinate],
         dimension: own.motion.dimension(),
         what: "what this coordinate follows",
     };
     let exact = symbols.scope.resolve(follows, wanted, log)?;
     let span = follows.ast.span;
-    let Some(Linear { terms, offset }) = linear(&exact) else {
+    let Some(CoordinateSum { terms, offset }) = coordinate_sum(&exact) else {
         log.push(
             Diagnostic::error(span, "a coordinate follows others in proportion")
                 .label("expected a sum of coordinates, each times constants, and of constants")
@@ -79,7 +79,7 @@ fn coupling(
         );
         return None;
     };
-    let terms: Vec<(CoordinateIdx, Exact)> = terms.into_iter().collect();
+    let terms: Vec<(CoordinateIdx, ExactExpression)> = terms.into_iter().collect();
     if terms.is_empty() {
         log.push(
             Diagnostic::error(span, "this follows no coordinate")
@@ -100,7 +100,7 @@ fn coupling(
         );
         return None;
     }
-    Some(Coupling {
+    Some(CoordinateCoupling {
         coordinate,
         terms,
         offset,
@@ -108,10 +108,10 @@ fn coupling(
 }
 
 /// Puts what follows at its nominal value; what follows itself is reported.
-fn set_nominal(found: &[(Coupling, Span)], symbols: &mut Symbols, places: &Places, log: &mut Log) {
-    let mut left: Vec<&(Coupling, Span)> = found.iter().collect();
+fn set_nominal(found: &[(CoordinateCoupling, SourceSpan)], symbols: &mut SymbolTable, places: &MechanismSpans, log: &mut DiagnosticLog) {
+    let mut left: Vec<&(CoordinateCoupling, SourceSpan)> = found.iter().collect();
     while !left.is_empty() {
-        let waits = |coupling: &Coupling| {
+        let waits = |coupling: &CoordinateCoupling| {
             let mut terms = coupling.terms.iter();
             terms.any(|(i, _)| left.iter().any(|(other, _)| other.coordinate == *i))
         };
@@ -132,23 +132,23 @@ fn set_nominal(found: &[(Coupling, Span)], symbols: &mut Symbols, places: &Place
             return;
         };
         let (coupling, _) = left.remove(next);
-        let value = |symbol: Symbol| match symbol {
-            Symbol::Coordinate(i) => symbols.coordinates[i.0].nominal,
-            Symbol::Constant(i) => symbols.constants[i.0].value,
-            Symbol::Parameter(_) | Symbol::Place(_) => f64::NAN,
+        let value = |symbol: ModelSymbol| match symbol {
+            ModelSymbol::Coordinate(i) => symbols.coordinates[i.0].nominal,
+            ModelSymbol::Constant(i) => symbols.constants[i.0].value,
+            ModelSymbol::Parameter(_) | ModelSymbol::Place(_) => f64::NAN,
         };
         symbols.coordinates[coupling.coordinate.0].nominal = coupling.value(&value);
     }
 }
 
 /// An expression as a sum of multiples of coordinates, and what is left.
-struct Linear {
-    terms: BTreeMap<CoordinateIdx, Exact>,
-    offset: Exact,
+struct CoordinateSum {
+    terms: BTreeMap<CoordinateIdx, ExactExpression>,
+    offset: ExactExpression,
 }
 
-impl Linear {
-    fn fixed(offset: Exact) -> Self {
+impl CoordinateSum {
+    fn without_coordinates(offset: ExactExpression) -> Self {
         Self {
             terms: BTreeMap::new(),
             offset,
@@ -156,7 +156,7 @@ impl Linear {
     }
 
     /// Does the same to every factor and to the rest.
-    fn map(self, f: impl Fn(Exact) -> Exact) -> Self {
+    fn map(self, f: impl Fn(ExactExpression) -> ExactExpression) -> Self {
         let terms = self.terms.into_iter();
         Self {
             terms: terms.map(|(i, factor)| (i, f(factor))).collect(),
@@ -170,53 +170,53 @@ impl Linear {
 }
 
 /// `None` where a coordinate stands otherwise than in proportion.
-fn linear(exact: &Exact) -> Option<Linear> {
+fn coordinate_sum(exact: &ExactExpression) -> Option<CoordinateSum> {
     let mut moves = false;
-    exact.for_each_symbol(&mut |symbol| moves |= matches!(symbol, Symbol::Coordinate(_)));
+    exact.for_each_symbol(&mut |symbol| moves |= matches!(symbol, ModelSymbol::Coordinate(_)));
     if !moves {
-        return Some(Linear::fixed(exact.clone()));
+        return Some(CoordinateSum::without_coordinates(exact.clone()));
     }
     match exact {
-        Exact::Symbol(Symbol::Coordinate(i)) => Some(Linear {
-            terms: BTreeMap::from([(*i, Exact::one())]),
-            offset: Exact::zero(),
+        ExactExpression::Symbol(ModelSymbol::Coordinate(i)) => Some(CoordinateSum {
+            terms: BTreeMap::from([(*i, ExactExpression::unity())]),
+            offset: ExactExpression::zero(),
         }),
-        Exact::Negative(inner) => Some(linear(inner)?.map(|x| Exact::Negative(Box::new(x)))),
-        Exact::Quotient(above, below) => {
-            let fixed = linear(below).filter(|below| below.terms.is_empty())?;
-            let divided = |x| Exact::Quotient(Box::new(x), Box::new(fixed.offset.clone()));
-            Some(linear(above)?.map(divided))
+        ExactExpression::Negative(inner) => Some(coordinate_sum(inner)?.map(|x| ExactExpression::Negative(Box::new(x)))),
+        ExactExpression::Quotient(above, below) => {
+            let fixed = coordinate_sum(below).filter(|below| below.terms.is_empty())?;
+            let divided = |x| ExactExpression::Quotient(Box::new(x), Box::new(fixed.offset.clone()));
+            Some(coordinate_sum(above)?.map(divided))
         }
-        Exact::Product(factors) => {
-            let mut moving: Option<Linear> = None;
+        ExactExpression::Product(factors) => {
+            let mut moving: Option<CoordinateSum> = None;
             let mut others = Vec::new();
             for factor in factors {
-                let found = linear(factor)?;
+                let found = coordinate_sum(factor)?;
                 if found.terms.is_empty() {
                     others.push(found.offset);
                 } else if moving.replace(found).is_some() {
                     return None;
                 }
             }
-            let times = |x: Exact| {
-                let one = (x != Exact::one()).then_some(x);
-                let mut all: Vec<Exact> = others.iter().cloned().chain(one).collect();
+            let times = |x: ExactExpression| {
+                let one = (x != ExactExpression::unity()).then_some(x);
+                let mut all: Vec<ExactExpression> = others.iter().cloned().chain(one).collect();
                 match all.len() {
-                    0 => Exact::one(),
+                    0 => ExactExpression::unity(),
                     1 => all.remove(0),
-                    _ => Exact::Product(all),
+                    _ => ExactExpression::Product(all),
                 }
             };
             Some(moving?.map(times))
         }
-        Exact::Sum(terms) => {
-            let mut sum = Linear::fixed(Exact::zero());
+        ExactExpression::Sum(terms) => {
+            let mut sum = CoordinateSum::without_coordinates(ExactExpression::zero());
             let mut fixed = Vec::new();
             for term in terms {
-                let found = linear(term)?;
+                let found = coordinate_sum(term)?;
                 for (i, factor) in found.terms {
                     let all = match sum.terms.remove(&i) {
-                        Some(before) => Exact::Sum(vec![before, factor]),
+                        Some(before) => ExactExpression::Sum(vec![before, factor]),
                         None => factor,
                     };
                     sum.terms.insert(i, all);
@@ -226,9 +226,9 @@ fn linear(exact: &Exact) -> Option<Linear> {
                 }
             }
             sum.offset = match fixed.len() {
-                0 => Exact::zero(),
+                0 => ExactExpression::zero(),
                 1 => fixed.remove(0),
-                _ => Exact::Sum(fixed),
+                _ => ExactExpression::Sum(fixed),
             };
             Some(sum)
         }

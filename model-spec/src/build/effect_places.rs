@@ -1,40 +1,40 @@
 //! The places of an effect: what their names mean, and what they carry.
 
-use crate::build::frames::Points;
-use crate::build::symbols::Symbols;
-use crate::diagnostic::{Diagnostic, Log};
+use crate::build::frames::PointTable;
+use crate::build::symbols::SymbolTable;
+use crate::diagnostic::{Diagnostic, DiagnosticLog};
 use crate::exact::CoordinateIdx;
-use crate::kind_terms::lacking_units;
-use crate::kinds::{ActsOn, Carries, OtherMotion, n_places};
-use crate::mechanism::{Drive, DriveIdx, DriveKind, LumpedMass, Part, PartIdx, Place};
+use crate::kind_terms::symbols_without_unit;
+use crate::kinds::{ActsOn, PlaceLoad, OtherMotion, n_places};
+use crate::mechanism::{ModelDrive, DriveIdx, DriveKind, LumpedMass, ModelPart, PartIdx, EffectPlace};
 use crate::record::OneOrMany;
 use crate::schema::EffectKindEntry;
 use crate::suggest;
-use crate::values::Name;
+use crate::values::SpannedName;
 
 /// What an effect may act on, beside the coordinates.
-pub(crate) struct Scene<'a> {
-    pub(crate) drives: &'a [Drive],
-    pub(crate) points: &'a Points,
-    pub(crate) parts: &'a [Part],
+pub(crate) struct EffectTargets<'a> {
+    pub(crate) drives: &'a [ModelDrive],
+    pub(crate) points: &'a PointTable,
+    pub(crate) parts: &'a [ModelPart],
     pub(crate) lumped_masses: &'a [LumpedMass],
 }
 
 /// Finds a place by its name; where several things bear it, the one that the kind may act on.
-pub(super) fn place(
-    name: &Name,
+pub(super) fn find_place(
+    name: &SpannedName,
     allowed: &[ActsOn],
-    symbols: &Symbols,
-    scene: &Scene<'_>,
-    log: &mut Log,
-) -> Option<Place> {
+    symbols: &SymbolTable,
+    scene: &EffectTargets<'_>,
+    log: &mut DiagnosticLog,
+) -> Option<EffectPlace> {
     let part = || {
         let at = scene.parts.iter().position(|part| part.name == name.text)?;
-        Some(Place::Part(PartIdx(at)))
+        Some(EffectPlace::Part(PartIdx(at)))
     };
     let whole = match name.text.as_str() {
-        "base" => Some((ActsOn::Base, Place::Base)),
-        "force" => Some((ActsOn::Force, Place::Force)),
+        "base" => Some((ActsOn::Base, EffectPlace::Base)),
+        "force" => Some((ActsOn::Force, EffectPlace::Force)),
         _ => None,
     };
     // Parts and the whole have names of their own, which a drive or a point may bear as well: the kind tells.
@@ -51,17 +51,17 @@ pub(super) fn place(
         .iter()
         .position(|drive| drive.name == name.text)
     {
-        return Some(Place::Drive(DriveIdx(idx)));
+        return Some(EffectPlace::Drive(DriveIdx(idx)));
     }
     let coordinate = symbols
         .coordinates
         .iter()
         .position(|coordinate| coordinate.name == name.text);
     if let Some(idx) = coordinate {
-        return Some(Place::Coordinate(CoordinateIdx(idx)));
+        return Some(EffectPlace::Coordinate(CoordinateIdx(idx)));
     }
     if let Some(idx) = scene.points.get(&name.text) {
-        return Some(Place::Point(idx));
+        return Some(EffectPlace::Point(idx));
     }
     if let Some(place) = part().or(whole.map(|(_, place)| place)) {
         return Some(place);
@@ -92,7 +92,7 @@ pub(super) fn place(
         log.push(
             Diagnostic::error(name.span, format!("unknown place `{}`", name.text))
                 .label(format!("expected {expected}"))
-                .removed_or(removal, || {
+                .with_removal_or(removal, || {
                     suggest::advice(&name.text, "places", known.iter().copied())
                 }),
         );
@@ -103,21 +103,21 @@ pub(super) fn place(
 /// What the places of an effect carry; they must all carry the same, and the kind must be allowed there.
 pub(super) fn common_load(
     kind: &EffectKindEntry,
-    at: &OneOrMany<Name>,
-    places: &[Place],
-    symbols: &Symbols,
-    drives: &[Drive],
-    log: &mut Log,
-) -> Option<Carries> {
-    let carried = |kind: DriveKind| kind.carries(&symbols.coordinates);
+    at: &OneOrMany<SpannedName>,
+    places: &[EffectPlace],
+    symbols: &SymbolTable,
+    drives: &[ModelDrive],
+    log: &mut DiagnosticLog,
+) -> Option<PlaceLoad> {
+    let carried = |kind: DriveKind| kind.place_load(&symbols.coordinates);
     let names = &at.entries;
     let kind_name = kind.name.as_ref().map_or("", |name| name.text.as_str());
-    let mut common: Option<Carries> = None;
+    let mut common: Option<PlaceLoad> = None;
     let mut fine = true;
     let n_acting = if kind.other.is_some() { 1 } else { names.len() };
     if let (Some(motion), [first, other, ..], Some(place)) = (kind.other, &names[..], places.get(1))
     {
-        fine = moves(motion, other, *place, &carried, drives, log);
+        fine = has_motion(motion, other, *place, &carried, drives, log);
         if first.text == other.text {
             log.push(
                 Diagnostic::error(other.span, format!("`{}` is listed twice", other.text))
@@ -128,32 +128,32 @@ pub(super) fn common_load(
     }
     for (i, (name, place)) in names.iter().zip(places).enumerate().take(n_acting) {
         let (sort, carries) = match place {
-            Place::Drive(idx) => (ActsOn::Drive, carried(drives[idx.0].kind)),
-            Place::Coordinate(idx) => (ActsOn::Coordinate, carried(DriveKind::Joint(*idx))),
-            Place::Point(_) => (ActsOn::Point, Carries::Mass),
-            Place::Part(_) => (ActsOn::Part, Carries::Elsewhere),
-            Place::Base => (ActsOn::Base, Carries::Elsewhere),
-            Place::Force => (ActsOn::Force, Carries::Elsewhere),
+            EffectPlace::Drive(idx) => (ActsOn::Drive, carried(drives[idx.0].kind)),
+            EffectPlace::Coordinate(idx) => (ActsOn::Coordinate, carried(DriveKind::Joint(*idx))),
+            EffectPlace::Point(_) => (ActsOn::Point, PlaceLoad::Mass),
+            EffectPlace::Part(_) => (ActsOn::Part, PlaceLoad::Elsewhere),
+            EffectPlace::Base => (ActsOn::Base, PlaceLoad::Elsewhere),
+            EffectPlace::Force => (ActsOn::Force, PlaceLoad::Elsewhere),
         };
         let allowed: Vec<ActsOn> = kind.on.iter().flat_map(|on| on.entries.clone()).collect();
         if !allowed.contains(&sort) {
-            let list: Vec<&str> = allowed.iter().map(|sort| sort.words()).collect();
+            let list: Vec<&str> = allowed.iter().map(|sort| sort.description()).collect();
             log.push(
                 Diagnostic::error(name.span, format!("`{kind_name}` cannot act here"))
-                    .label(format!("this is {}", sort.words()))
+                    .label(format!("this is {}", sort.description()))
                     .help(format!("`{kind_name}` acts on {}", list.join(" or "))),
             );
             fine = false;
             continue;
         }
         // What mechanics need of their places is checked with them.
-        if kind.mechanics.is_none() && !lacking_units(kind, carries).is_empty() {
+        if kind.mechanics.is_none() && !symbols_without_unit(kind, carries).is_empty() {
             log.push(
                 Diagnostic::error(name.span, format!("`{kind_name}` cannot act here"))
                     .label(match carries {
-                        Carries::Force => "this place carries a force, for which the kind has no units",
-                        Carries::Torque => "this place carries a torque, for which the kind has no units",
-                        Carries::Mass | Carries::Elsewhere => "the kind has no units for this place",
+                        PlaceLoad::Force => "this place carries a force, for which the kind has no units",
+                        PlaceLoad::Torque => "this place carries a torque, for which the kind has no units",
+                        PlaceLoad::Mass | PlaceLoad::Elsewhere => "the kind has no units for this place",
                     })
                     .help("give the kind's parameters and constants units for both, `{ force = ..., torque = ... }`"),
             );
@@ -208,23 +208,23 @@ pub(super) fn common_load(
 }
 
 /// Whether a place moves as a kind asks of its other one.
-fn moves(
+fn has_motion(
     motion: OtherMotion,
-    name: &Name,
-    place: Place,
-    carried: &dyn Fn(DriveKind) -> Carries,
-    drives: &[Drive],
-    log: &mut Log,
+    name: &SpannedName,
+    place: EffectPlace,
+    carried: &dyn Fn(DriveKind) -> PlaceLoad,
+    drives: &[ModelDrive],
+    log: &mut DiagnosticLog,
 ) -> bool {
     let carries = match place {
-        Place::Drive(idx) => Some(carried(drives[idx.0].kind)),
-        Place::Coordinate(idx) => Some(carried(DriveKind::Joint(idx))),
-        Place::Point(_) | Place::Part(_) | Place::Base | Place::Force => None,
+        EffectPlace::Drive(idx) => Some(carried(drives[idx.0].kind)),
+        EffectPlace::Coordinate(idx) => Some(carried(DriveKind::Joint(idx))),
+        EffectPlace::Point(_) | EffectPlace::Part(_) | EffectPlace::Base | EffectPlace::Force => None,
     };
-    if carries == Some(motion.carries()) {
+    if carries == Some(motion.place_load()) {
         return true;
     }
-    let expected = format!("expected a drive or coordinate that {}", motion.words());
+    let expected = format!("expected a drive or coordinate that {}", motion.description());
     log.push(
         Diagnostic::error(
             name.span,

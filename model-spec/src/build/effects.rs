@@ -3,32 +3,32 @@
 use std::collections::BTreeMap;
 
 use crate::build::bodies::check_unique;
-use crate::build::effect_places::{Scene, common_load, place};
-use crate::build::frames::twice;
-use crate::build::symbols::{Shared, Symbols};
-use crate::diagnostic::{Diagnostic, Log, Span};
-use crate::document::Key;
-use crate::exact::{Exact, ParameterIdx};
-use crate::finite::{self, Why};
-use crate::formula::AstKind;
+use crate::build::effect_places::{EffectTargets, common_load, find_place};
+use crate::build::frames::duplicate_name;
+use crate::build::symbols::{ParameterLookup, SymbolTable};
+use crate::diagnostic::{Diagnostic, DiagnosticLog, SourceSpan};
+use crate::document::TomlKey;
+use crate::exact::{ExactExpression, ParameterIdx};
+use crate::finite::{self, ValueFaultCause};
+use crate::formula::FormulaAstKind;
 use crate::kind_terms::{factors, unit_at};
-use crate::kinds::{ActsOn, Carries, Sign, check, library_entries, n_places};
+use crate::kinds::{ActsOn, PlaceLoad, Sign, check_kind, library_entries, n_places};
 use crate::mechanics::Mechanics;
-use crate::mechanism::{Bodies, Effect, EffectTerm, Parameter, Place};
+use crate::mechanism::{EffectBodies, ModelEffect, EffectTerm, DynamicParameter, EffectPlace};
 use crate::schema::{EffectEntry, EffectKindEntry, KindParameterEntry, ModelEntry};
-use crate::scope::{Sort, Wanted};
+use crate::scope::{SymbolSort, FormulaRequirement};
 use crate::suggest;
-use crate::unit::{Dimension, Unit};
-use crate::values::Name;
+use crate::unit::{UnitDimension, ModelUnit};
+use crate::values::SpannedName;
 
 /// Reads the effects; their parameters join those of the file.
 pub(super) fn effects(
     model: &ModelEntry,
     own_kinds: &[&EffectKindEntry],
-    symbols: &mut Symbols,
-    scene: &Scene<'_>,
-    log: &mut Log,
-) -> Vec<Effect> {
+    symbols: &mut SymbolTable,
+    scene: &EffectTargets<'_>,
+    log: &mut DiagnosticLog,
+) -> Vec<ModelEffect> {
     let kinds = kinds(own_kinds, log);
     let entries = model.effect.iter().flat_map(|list| &list.entries);
     check_unique(
@@ -57,15 +57,15 @@ pub(super) fn effects(
 /// Reports what is one property of the whole, such as a tilt, and acts twice.
 fn check_single<'a>(
     entries: impl Iterator<Item = &'a EffectEntry>,
-    kinds: &Kinds<'_>,
-    log: &mut Log,
+    kinds: &KindTable<'_>,
+    log: &mut DiagnosticLog,
 ) {
-    let mut seen: Vec<(Mechanics, Span)> = Vec::new();
+    let mut seen: Vec<(Mechanics, SourceSpan)> = Vec::new();
     for name in entries.filter_map(|entry| entry.kind.as_ref()) {
         let kind = kinds.get(name.text.as_str());
         let Some(way) = kind
             .and_then(|(kind, _)| kind.mechanics)
-            .filter(|way| way.is_of_the_whole())
+            .filter(|way| way.is_global())
         else {
             continue;
         };
@@ -87,9 +87,9 @@ fn check_single<'a>(
 fn warn_of_twins<'a>(
     entries: impl Iterator<Item = &'a EffectEntry>,
     couples: &dyn Fn(&EffectEntry) -> Option<bool>,
-    log: &mut Log,
+    log: &mut DiagnosticLog,
 ) {
-    let mut seen: BTreeMap<(&str, Vec<&str>), (&EffectEntry, &Name)> = BTreeMap::new();
+    let mut seen: BTreeMap<(&str, Vec<&str>), (&EffectEntry, &SpannedName)> = BTreeMap::new();
     for entry in entries.filter(|entry| entry.constants.is_none()) {
         let Some(kind) = &entry.kind else { continue };
         let mut all: Vec<&str> = (entry.at.iter().flat_map(|at| &at.entries))
@@ -130,10 +130,10 @@ fn warn_of_twins<'a>(
 }
 
 /// A kind and whether it is sound.
-type Kinds<'a> = BTreeMap<&'a str, (&'a EffectKindEntry, bool)>;
+type KindTable<'a> = BTreeMap<&'a str, (&'a EffectKindEntry, bool)>;
 
-fn kinds<'a>(own: &[&'a EffectKindEntry], log: &mut Log) -> Kinds<'a> {
-    let mut kinds: Kinds<'a> = BTreeMap::new();
+fn kinds<'a>(own: &[&'a EffectKindEntry], log: &mut DiagnosticLog) -> KindTable<'a> {
+    let mut kinds: KindTable<'a> = BTreeMap::new();
     for entry in library_entries() {
         if let Some(name) = &entry.name {
             kinds.insert(&name.text, (entry, true));
@@ -153,11 +153,11 @@ fn kinds<'a>(own: &[&'a EffectKindEntry], log: &mut Log) -> Kinds<'a> {
                     .label("expected a new name"),
                 );
             } else {
-                log.push(twice("kind of effect", name, first_span));
+                log.push(duplicate_name("kind of effect", name, first_span));
             }
             continue;
         }
-        check(entry, log);
+        check_kind(entry, log);
         let complete = (entry.mechanics.is_some()
             || entry.parameters.is_some() && entry.expression.is_some())
             && entry.on.is_some();
@@ -182,7 +182,7 @@ fn kinds<'a>(own: &[&'a EffectKindEntry], log: &mut Log) -> Kinds<'a> {
     kinds
 }
 
-fn unknown(kind: &Name, kinds: &Kinds<'_>) -> Diagnostic {
+fn unknown_kind(kind: &SpannedName, kinds: &KindTable<'_>) -> Diagnostic {
     let message = format!("unknown kind of effect `{}`", kind.text);
     Diagnostic::error(kind.span, message)
         .label("expected a kind of the library or of this file")
@@ -191,11 +191,11 @@ fn unknown(kind: &Name, kinds: &Kinds<'_>) -> Diagnostic {
 
 fn effect(
     entry: &EffectEntry,
-    kinds: &Kinds<'_>,
-    symbols: &mut Symbols,
-    scene: &Scene<'_>,
-    log: &mut Log,
-) -> Option<Effect> {
+    kinds: &KindTable<'_>,
+    symbols: &mut SymbolTable,
+    scene: &EffectTargets<'_>,
+    log: &mut DiagnosticLog,
+) -> Option<ModelEffect> {
     let at = entry.at.as_ref();
     let known = entry
         .kind
@@ -204,14 +204,14 @@ fn effect(
     let allowed: &[ActsOn] = known
         .and_then(|(kind, _)| kind.on.as_ref())
         .map_or(&[], |on| on.entries.as_slice());
-    let mut places: Vec<Place> = at
+    let mut places: Vec<EffectPlace> = at
         .iter()
         .flat_map(|at| &at.entries)
-        .filter_map(|name| place(name, allowed, symbols, scene, log))
+        .filter_map(|name| find_place(name, allowed, symbols, scene, log))
         .collect();
     let kind_name = entry.kind.as_ref()?;
     let Some(&(kind, is_sound)) = known else {
-        log.push(unknown(kind_name, kinds));
+        log.push(unknown_kind(kind_name, kinds));
         return None;
     };
     check_parameter_names(entry, kind, log);
@@ -268,10 +268,10 @@ fn effect(
         terms.push(EffectTerm {
             symbol: key.name.clone(),
             parameter: term_parameter(entry, key, parameter, unit, &places_name, symbols, log)?,
-            expression: shapes.get(i).cloned().unwrap_or_else(Exact::one),
+            expression: shapes.get(i).cloned().unwrap_or_else(ExactExpression::unity),
         });
     }
-    let mut bodies = Bodies::default();
+    let mut bodies = EffectBodies::default();
     if let Some(way) = kind.mechanics.map(Mechanics::entry) {
         // A file of one's own may list them in another order.
         let listed = way.parameters().iter().map(|(symbol, _)| *symbol);
@@ -282,7 +282,7 @@ fn effect(
     if other.is_some() {
         places.truncate(1);
     }
-    (log.n_errors() == before).then(|| Effect {
+    (log.n_errors() == before).then(|| ModelEffect {
         kind: kind_name.text.clone(),
         places,
         other,
@@ -296,12 +296,12 @@ fn effect(
 /// The parameter of one term of an effect: one that the file knows, or a new one.
 fn term_parameter(
     entry: &EffectEntry,
-    key: &Key,
+    key: &TomlKey,
     parameter: &KindParameterEntry,
-    unit: &Unit,
+    unit: &ModelUnit,
     places_name: &str,
-    symbols: &mut Symbols,
-    log: &mut Log,
+    symbols: &mut SymbolTable,
+    log: &mut DiagnosticLog,
 ) -> Option<ParameterIdx> {
     let said = entry
         .parameters
@@ -319,12 +319,12 @@ fn term_parameter(
     let nominal = said.and_then(|said| said.nominal);
     let shared = symbols.share_parameter(&name, Some(unit.dimension), span, nominal, log);
     let idx = match shared {
-        Shared::Known(idx) => idx,
-        Shared::Faulty => return None,
-        Shared::New => {
+        ParameterLookup::Known(idx) => idx,
+        ParameterLookup::Faulty => return None,
+        ParameterLookup::New => {
             let idx = ParameterIdx(symbols.parameters.len());
             let fine = symbols.declare_parameter(
-                Parameter {
+                DynamicParameter {
                     name,
                     nominal: nominal.map_or(0.0, |number| number.value),
                     unit: unit.text.clone(),
@@ -355,7 +355,7 @@ fn term_parameter(
 }
 
 /// Warns of a nominal value whose sign makes no physical sense.
-fn warn_of_sign(parameter: &Parameter, sign: Option<Sign>, span: Span, log: &mut Log) {
+fn warn_of_sign(parameter: &DynamicParameter, sign: Option<Sign>, span: SourceSpan, log: &mut DiagnosticLog) {
     let value = parameter.nominal;
     let expected = match sign {
         Some(Sign::Positive) if value < 0.0 => "positive",
@@ -379,11 +379,11 @@ fn warn_of_sign(parameter: &Parameter, sign: Option<Sign>, span: Span, log: &mut
 fn constants(
     entry: &EffectEntry,
     kind: &EffectKindEntry,
-    kind_name: &Name,
-    symbols: &Symbols,
-    carries: Carries,
-    log: &mut Log,
-) -> Vec<(String, Exact)> {
+    kind_name: &SpannedName,
+    symbols: &SymbolTable,
+    carries: PlaceLoad,
+    log: &mut DiagnosticLog,
+) -> Vec<(String, ExactExpression)> {
     let known = || kind.constants.iter().flat_map(|table| &table.entries);
     for (key, _) in entry.constants.iter().flat_map(|table| &table.entries) {
         if !known().any(|(name, _)| name.name == key.name) {
@@ -424,10 +424,10 @@ fn constants(
             continue;
         };
         let dimension =
-            unit_at(constant.unit.as_ref(), carries).map_or(Dimension::ONE, |unit| unit.dimension);
+            unit_at(constant.unit.as_ref(), carries).map_or(UnitDimension::ONE, |unit| unit.dimension);
         let what = format!("`{}`", key.name);
-        let wanted = Wanted {
-            sorts: &[Sort::Constant],
+        let wanted = FormulaRequirement {
+            sorts: &[SymbolSort::Constant],
             dimension,
             what: &what,
         };
@@ -442,9 +442,9 @@ fn constants(
 fn check_values(
     entry: &EffectEntry,
     kind: &EffectKindEntry,
-    kind_name: &Name,
-    symbols: &Symbols,
-    log: &mut Log,
+    kind_name: &SpannedName,
+    symbols: &SymbolTable,
+    log: &mut DiagnosticLog,
 ) {
     let given = |name: &str| {
         let own = entry
@@ -488,19 +488,19 @@ fn check_values(
         || format!("`{}`", kind_name.text),
         |name| format!("`{name}`"),
     );
-    let is_name = matches!(&fault.piece.kind, AstKind::Name(_));
-    let message = match fault.why {
-        Why::Divides if is_name => format!("{what} must not be zero"),
-        Why::Root if is_name => format!("{what} must not be negative"),
+    let is_name = matches!(&fault.piece.kind, FormulaAstKind::Name(_));
+    let message = match fault.cause {
+        ValueFaultCause::Divides if is_name => format!("{what} must not be zero"),
+        ValueFaultCause::Root if is_name => format!("{what} must not be negative"),
         _ => format!(
             "with this value of {what} the effect `{}` has no finite value",
             kind_name.text
         ),
     };
-    let label = match fault.why {
-        Why::Divides => format!("`{}` divides by it", kind_name.text),
-        Why::Root => format!("`{}` takes its root", kind_name.text),
-        Why::TooLarge => "too large".to_owned(),
+    let label = match fault.cause {
+        ValueFaultCause::Divides => format!("`{}` divides by it", kind_name.text),
+        ValueFaultCause::Root => format!("`{}` takes its root", kind_name.text),
+        ValueFaultCause::TooLarge => "too large".to_owned(),
     };
     log.push(
         Diagnostic::error(span, message)
@@ -509,7 +509,7 @@ fn check_values(
     );
 }
 
-fn check_parameter_names(entry: &EffectEntry, kind: &EffectKindEntry, log: &mut Log) {
+fn check_parameter_names(entry: &EffectEntry, kind: &EffectKindEntry, log: &mut DiagnosticLog) {
     let names: Vec<&str> = kind
         .parameters
         .iter()

@@ -3,37 +3,37 @@
 use std::collections::BTreeMap;
 
 use crate::angle::{angle, length};
-use crate::build::Places;
+use crate::build::MechanismSpans;
 use crate::build::joints;
-use crate::build::symbols::{Symbols, vector};
-use crate::diagnostic::{Diagnostic, Log, Span};
-use crate::exact::{Angle, Exact, Length};
-use crate::formula::Formula;
-use crate::mechanism::{Axis, Convention, Frame, FrameIdx, Point, PointIdx, Step};
+use crate::build::symbols::{SymbolTable, vector};
+use crate::diagnostic::{Diagnostic, DiagnosticLog, SourceSpan};
+use crate::exact::{ExactAngle, ExactExpression, ExactLength};
+use crate::formula::SourceFormula;
+use crate::mechanism::{FrameAxis, FrameConvention, ModelFrame, FrameIdx, FramePoint, PointIdx, FrameStep};
 use crate::schema::{DhEntry, FrameEntry, ModelEntry, TransformEntry};
-use crate::scope::{Scope, Sort, Wanted};
+use crate::scope::{FormulaScope, SymbolSort, FormulaRequirement};
 use crate::suggest;
-use crate::unit::Dimension;
-use crate::values::Name;
+use crate::unit::UnitDimension;
+use crate::values::SpannedName;
 
 /// The frames with their names.
-pub(super) struct Tree {
-    pub(super) frames: Vec<Frame>,
+pub(super) struct FrameTree {
+    pub(super) frames: Vec<ModelFrame>,
     names: BTreeMap<String, FrameIdx>,
     /// True if two frames have one name: the name that is missed may be meant for one of them.
     any_twice: bool,
 }
 
-impl Tree {
+impl FrameTree {
     /// Looks a frame up; an unknown name is reported.
-    pub(super) fn find(&self, name: &Name, log: &mut Log) -> Option<FrameIdx> {
+    pub(super) fn find(&self, name: &SpannedName, log: &mut DiagnosticLog) -> Option<FrameIdx> {
         let found = self.names.get(&name.text).copied();
         if found.is_none() && !self.any_twice && !log.is_full() {
             let removal = log.removal(&["frame"], &name.text);
             log.push(
                 Diagnostic::error(name.span, format!("unknown frame `{}`", name.text))
                     .label("expected the name of a frame, or `base`")
-                    .removed_or(removal, || {
+                    .with_removal_or(removal, || {
                         suggest::advice(&name.text, "frames", self.names.keys().map(String::as_str))
                     }),
             );
@@ -45,10 +45,10 @@ impl Tree {
 /// Reads the frames and sorts them so that parents come first.
 pub(super) fn frames(
     model: &ModelEntry,
-    symbols: &Symbols,
-    places: &mut Places,
-    log: &mut Log,
-) -> Tree {
+    symbols: &SymbolTable,
+    places: &mut MechanismSpans,
+    log: &mut DiagnosticLog,
+) -> FrameTree {
     let entries: Vec<&FrameEntry> = model.frame.iter().flat_map(|list| &list.entries).collect();
     let mut by_name: BTreeMap<&str, usize> = BTreeMap::new();
     let mut any_twice = false;
@@ -64,18 +64,18 @@ pub(super) fn frames(
                 .name
                 .as_ref()
                 .map_or(name.span, |name| name.span);
-            log.push(twice("frame", name, first_span));
+            log.push(duplicate_name("frame", name, first_span));
             any_twice = true;
         } else {
             by_name.insert(&name.text, i);
         }
     }
-    let mut tree = Tree {
-        frames: vec![Frame {
+    let mut tree = FrameTree {
+        frames: vec![ModelFrame {
             name: "base".to_owned(),
             parent: FrameIdx(0),
             steps: Vec::new(),
-            convention: Convention::Base,
+            convention: FrameConvention::Base,
         }],
         names: BTreeMap::from([("base".to_owned(), FrameIdx(0))]),
         any_twice,
@@ -93,7 +93,7 @@ pub(super) fn frames(
         let (steps, convention) = placement(entry, symbols, log);
         tree.names
             .insert(name.text.clone(), FrameIdx(tree.frames.len()));
-        tree.frames.push(Frame {
+        tree.frames.push(ModelFrame {
             name: name.text.clone(),
             parent,
             steps,
@@ -105,7 +105,7 @@ pub(super) fn frames(
 }
 
 /// `S1` is defined twice.
-pub(super) fn twice(what: &str, name: &Name, first: Span) -> Diagnostic {
+pub(super) fn duplicate_name(what: &str, name: &SpannedName, first: SourceSpan) -> Diagnostic {
     Diagnostic::error(
         name.span,
         format!("the {what} `{}` is defined twice", name.text),
@@ -120,28 +120,28 @@ fn parents_first(
     entries: &[&FrameEntry],
     by_name: &BTreeMap<&str, usize>,
     any_twice: bool,
-    log: &mut Log,
+    log: &mut DiagnosticLog,
 ) -> Vec<usize> {
     #[derive(Clone, Copy, PartialEq)]
-    enum Mark {
+    enum FrameMark {
         New,
         OnPath,
         Done,
     }
-    let mut marks = vec![Mark::New; entries.len()];
+    let mut marks = vec![FrameMark::New; entries.len()];
     let mut order = Vec::new();
     for start in by_name_order(entries, by_name) {
         let mut path = Vec::new();
         let mut at = start;
         loop {
-            if marks[at] == Mark::Done {
+            if marks[at] == FrameMark::Done {
                 break;
             }
-            if marks[at] == Mark::OnPath {
+            if marks[at] == FrameMark::OnPath {
                 report_cycle(entries, &path, at, log);
                 break;
             }
-            marks[at] = Mark::OnPath;
+            marks[at] = FrameMark::OnPath;
             path.push(at);
             let Some(on) = &entries[at].on else { break };
             if on.text == "base" {
@@ -154,7 +154,7 @@ fn parents_first(
                     log.push(
                         Diagnostic::error(on.span, format!("unknown frame `{}`", on.text))
                             .label("expected the name of a frame, or `base`")
-                            .removed_or(removal, || suggest::advice(&on.text, "frames", known)),
+                            .with_removal_or(removal, || suggest::advice(&on.text, "frames", known)),
                     );
                 }
                 break;
@@ -162,7 +162,7 @@ fn parents_first(
             at = parent;
         }
         for done in path.into_iter().rev() {
-            marks[done] = Mark::Done;
+            marks[done] = FrameMark::Done;
             order.push(done);
         }
     }
@@ -181,7 +181,7 @@ fn by_name_order(entries: &[&FrameEntry], by_name: &BTreeMap<&str, usize>) -> Ve
         .collect()
 }
 
-fn report_cycle(entries: &[&FrameEntry], path: &[usize], at: usize, log: &mut Log) {
+fn report_cycle(entries: &[&FrameEntry], path: &[usize], at: usize, log: &mut DiagnosticLog) {
     let from = path.iter().position(|&one| one == at).unwrap_or(0);
     let names: Vec<&str> = path[from..]
         .iter()
@@ -205,7 +205,7 @@ fn report_cycle(entries: &[&FrameEntry], path: &[usize], at: usize, log: &mut Lo
 }
 
 /// The steps of a frame from its parent.
-fn placement(entry: &FrameEntry, symbols: &Symbols, log: &mut Log) -> (Vec<Step>, Convention) {
+fn placement(entry: &FrameEntry, symbols: &SymbolTable, log: &mut DiagnosticLog) -> (Vec<FrameStep>, FrameConvention) {
     let name_span = entry.name.as_ref().map_or(entry.span, |name| name.span);
     let n_ways = usize::from(entry.modified_dh.is_some())
         + usize::from(entry.standard_dh.is_some())
@@ -227,21 +227,21 @@ fn placement(entry: &FrameEntry, symbols: &Symbols, log: &mut Log) -> (Vec<Step>
     if let Some(dh) = &entry.modified_dh {
         let row = dh_row(dh, symbols, log);
         let steps = vec![
-            Step::Rotate(Axis::X, row.alpha),
-            Step::Translate(Axis::X, row.a),
-            Step::Rotate(Axis::Z, row.theta),
-            Step::Translate(Axis::Z, row.d),
+            FrameStep::Rotate(FrameAxis::X, row.alpha),
+            FrameStep::Translate(FrameAxis::X, row.a),
+            FrameStep::Rotate(FrameAxis::Z, row.theta),
+            FrameStep::Translate(FrameAxis::Z, row.d),
         ];
-        (without_zeros(steps), Convention::ModifiedDh(row.texts))
+        (without_zeros(steps), FrameConvention::ModifiedDh(row.texts))
     } else if let Some(dh) = &entry.standard_dh {
         let row = dh_row(dh, symbols, log);
         let steps = vec![
-            Step::Rotate(Axis::Z, row.theta),
-            Step::Translate(Axis::Z, row.d),
-            Step::Translate(Axis::X, row.a),
-            Step::Rotate(Axis::X, row.alpha),
+            FrameStep::Rotate(FrameAxis::Z, row.theta),
+            FrameStep::Translate(FrameAxis::Z, row.d),
+            FrameStep::Translate(FrameAxis::X, row.a),
+            FrameStep::Rotate(FrameAxis::X, row.alpha),
         ];
-        (without_zeros(steps), Convention::StandardDh(row.texts))
+        (without_zeros(steps), FrameConvention::StandardDh(row.texts))
     } else {
         let mut steps = Vec::new();
         let mut text = Vec::new();
@@ -251,20 +251,20 @@ fn placement(entry: &FrameEntry, symbols: &Symbols, log: &mut Log) -> (Vec<Step>
         if let Some(joint) = &entry.joint {
             joints::steps(joint, symbols, &mut steps, &mut text, log);
         }
-        (without_zeros(steps), Convention::Transform(text.join(" ")))
+        (without_zeros(steps), FrameConvention::Transform(text.join(" ")))
     }
 }
 
 struct DhRow {
-    a: Length,
-    alpha: Angle,
-    d: Length,
-    theta: Angle,
+    a: ExactLength,
+    alpha: ExactAngle,
+    d: ExactLength,
+    theta: ExactAngle,
     texts: [String; 4],
 }
 
-fn dh_row(dh: &DhEntry, symbols: &Symbols, log: &mut Log) -> DhRow {
-    let text = |formula: &Option<Formula>| {
+fn dh_row(dh: &DhEntry, symbols: &SymbolTable, log: &mut DiagnosticLog) -> DhRow {
+    let text = |formula: &Option<SourceFormula>| {
         formula
             .as_ref()
             .map_or_else(|| "0".to_owned(), |formula| formula.text.clone())
@@ -279,38 +279,38 @@ fn dh_row(dh: &DhEntry, symbols: &Symbols, log: &mut Log) -> DhRow {
 }
 
 pub(super) fn length_or_zero(
-    formula: Option<&Formula>,
-    symbols: &Symbols,
+    formula: Option<&SourceFormula>,
+    symbols: &SymbolTable,
     what: &str,
-    log: &mut Log,
-) -> Length {
+    log: &mut DiagnosticLog,
+) -> ExactLength {
     formula
         .and_then(|formula| length(formula, &symbols.scope, what, log))
-        .unwrap_or_else(|| Length {
-            offset: Exact::zero(),
+        .unwrap_or_else(|| ExactLength {
+            offset: ExactExpression::zero(),
             coordinates: Vec::new(),
         })
 }
 
-pub(super) fn angle_or_zero(formula: Option<&Formula>, symbols: &Symbols, log: &mut Log) -> Angle {
+pub(super) fn angle_or_zero(formula: Option<&SourceFormula>, symbols: &SymbolTable, log: &mut DiagnosticLog) -> ExactAngle {
     formula
         .and_then(|formula| angle(formula, &symbols.scope, log))
-        .unwrap_or_else(Angle::zero)
+        .unwrap_or_else(ExactAngle::zero)
 }
 
 fn transform_steps(
     transform: &TransformEntry,
-    symbols: &Symbols,
-    steps: &mut Vec<Step>,
+    symbols: &SymbolTable,
+    steps: &mut Vec<FrameStep>,
     text: &mut Vec<String>,
-    log: &mut Log,
+    log: &mut DiagnosticLog,
 ) {
-    let entry = |vector: &Option<crate::values::Vector>, i: usize| {
+    let entry = |vector: &Option<crate::values::FormulaVector>, i: usize| {
         vector
             .as_ref()
             .and_then(|vector| vector.entries.get(i)?.clone())
     };
-    let shown = |vector: &Option<crate::values::Vector>| {
+    let shown = |vector: &Option<crate::values::FormulaVector>| {
         (0..3)
             .map(|i| entry(vector, i).map_or_else(|| "0".to_owned(), |formula| formula.text))
             .collect::<Vec<_>>()
@@ -322,29 +322,29 @@ fn transform_steps(
     if transform.rpy.is_some() {
         text.push(format!("rpy({})", shown(&transform.rpy)));
     }
-    for (i, axis) in [Axis::X, Axis::Y, Axis::Z].into_iter().enumerate() {
+    for (i, axis) in [FrameAxis::X, FrameAxis::Y, FrameAxis::Z].into_iter().enumerate() {
         let along = entry(&transform.xyz, i);
         let along = length_or_zero(along.as_ref(), symbols, "the position of a frame", log);
         if let Some(formula) = entry(&transform.xyz, i).filter(|_| !along.coordinates.is_empty()) {
-            log.push(fixed(&formula, "prismatic"));
+            log.push(moving_transform_error(&formula, "prismatic"));
         }
-        steps.push(Step::Translate(axis, along));
+        steps.push(FrameStep::Translate(axis, along));
     }
-    for (i, axis) in [(2, Axis::Z), (1, Axis::Y), (0, Axis::X)] {
+    for (i, axis) in [(2, FrameAxis::Z), (1, FrameAxis::Y), (0, FrameAxis::X)] {
         let about = entry(&transform.rpy, i);
         let about = angle_or_zero(about.as_ref(), symbols, log);
         let moves = about
             .terms
             .iter()
-            .any(|(symbol, _)| matches!(symbol, crate::Symbol::Coordinate(_)));
+            .any(|(symbol, _)| matches!(symbol, crate::ModelSymbol::Coordinate(_)));
         if let Some(formula) = entry(&transform.rpy, i).filter(|_| moves) {
-            log.push(fixed(&formula, "revolute"));
+            log.push(moving_transform_error(&formula, "revolute"));
         }
-        steps.push(Step::Rotate(axis, about));
+        steps.push(FrameStep::Rotate(axis, about));
     }
 }
 
-fn fixed(formula: &Formula, motion: &str) -> Diagnostic {
+fn moving_transform_error(formula: &SourceFormula, motion: &str) -> Diagnostic {
     Diagnostic::error(
         formula.ast.span,
         "a transform is fixed, this one would move",
@@ -355,33 +355,33 @@ fn fixed(formula: &Formula, motion: &str) -> Diagnostic {
     ))
 }
 
-fn without_zeros(steps: Vec<Step>) -> Vec<Step> {
+fn without_zeros(steps: Vec<FrameStep>) -> Vec<FrameStep> {
     steps
         .into_iter()
         .filter(|step| match step {
-            Step::Rotate(_, angle) => !angle.is_zero(),
-            Step::Translate(_, length) => !length.is_zero(),
-            Step::Free(_) => true,
+            FrameStep::Rotate(_, angle) => !angle.is_zero(),
+            FrameStep::Translate(_, length) => !length.is_zero(),
+            FrameStep::Free(_) => true,
         })
         .collect()
 }
 
 /// The points with their names.
-pub(crate) struct Points {
-    pub(crate) points: Vec<Point>,
+pub(crate) struct PointTable {
+    pub(crate) points: Vec<FramePoint>,
     names: BTreeMap<String, PointIdx>,
 }
 
-impl Points {
+impl PointTable {
     /// Looks a point up; an unknown name is reported.
-    pub(super) fn find(&self, name: &Name, log: &mut Log) -> Option<PointIdx> {
+    pub(super) fn find(&self, name: &SpannedName, log: &mut DiagnosticLog) -> Option<PointIdx> {
         let found = self.get(&name.text);
         if found.is_none() && !log.is_full() {
             let removal = log.removal(&["point"], &name.text);
             log.push(
                 Diagnostic::error(name.span, format!("unknown point `{}`", name.text))
                     .label("expected the name of a point")
-                    .removed_or(removal, || {
+                    .with_removal_or(removal, || {
                         suggest::advice(&name.text, "points", self.names())
                     }),
             );
@@ -403,23 +403,23 @@ impl Points {
 /// Reads the points.
 pub(super) fn points(
     model: &ModelEntry,
-    scope: &Scope,
-    tree: &Tree,
-    places: &mut Places,
-    log: &mut Log,
-) -> Points {
-    let mut points = Points {
+    scope: &FormulaScope,
+    tree: &FrameTree,
+    places: &mut MechanismSpans,
+    log: &mut DiagnosticLog,
+) -> PointTable {
+    let mut points = PointTable {
         points: Vec::new(),
         names: BTreeMap::new(),
     };
     for entry in model.point.iter().flat_map(|list| &list.entries) {
         let frame = entry.on.as_ref().and_then(|on| tree.find(on, log));
         let at = entry.at.as_ref().map_or_else(
-            || std::array::from_fn(|_| Exact::zero()),
+            || std::array::from_fn(|_| ExactExpression::zero()),
             |at| {
-                let wanted = Wanted {
-                    sorts: &[Sort::Constant],
-                    dimension: Dimension::LENGTH,
+                let wanted = FormulaRequirement {
+                    sorts: &[SymbolSort::Constant],
+                    dimension: UnitDimension::LENGTH,
                     what: "the position of a point",
                 };
                 vector(at, scope, wanted, log)
@@ -427,14 +427,14 @@ pub(super) fn points(
         );
         let Some(name) = &entry.name else { continue };
         if let Some(first) = points.names.get(&name.text) {
-            log.push(twice("point", name, places.points[first.0]));
+            log.push(duplicate_name("point", name, places.points[first.0]));
             continue;
         }
         points
             .names
             .insert(name.text.clone(), PointIdx(points.points.len()));
         places.points.push(name.span);
-        points.points.push(Point {
+        points.points.push(FramePoint {
             name: name.text.clone(),
             frame: frame.unwrap_or(FrameIdx(0)),
             at,

@@ -3,33 +3,33 @@
 
 use std::collections::BTreeMap;
 
-use crate::build::Places;
-use crate::build::actuation::Drives;
-use crate::build::frames::{Points, Tree};
-use crate::build::symbols::Symbols;
-use crate::diagnostic::{Diagnostic, Log, Span};
-use crate::exact::{CoordinateIdx, Symbol};
-use crate::mechanism::{Drive, DriveKind, FrameIdx, FreeBody, Loop, PointIdx, Step};
+use crate::build::MechanismSpans;
+use crate::build::actuation::DriveRows;
+use crate::build::frames::{PointTable, FrameTree};
+use crate::build::symbols::SymbolTable;
+use crate::diagnostic::{Diagnostic, DiagnosticLog, SourceSpan};
+use crate::exact::{CoordinateIdx, ModelSymbol};
+use crate::mechanism::{ModelDrive, DriveKind, FrameIdx, FreeBody, KinematicLoop, PointIdx, FrameStep};
 use crate::schema::ModelEntry;
 
 /// The free bodies with the frames that they carry.
-fn free_bodies(tree: &Tree) -> impl Iterator<Item = (usize, &FreeBody)> {
+fn free_bodies(tree: &FrameTree) -> impl Iterator<Item = (usize, &FreeBody)> {
     let steps = tree.frames.iter().enumerate();
     steps.flat_map(|(i, frame)| {
         let of_frame = frame.steps.iter();
         of_frame.filter_map(move |step| match step {
-            Step::Free(body) => Some((i, body)),
+            FrameStep::Free(body) => Some((i, body)),
             _ => None,
         })
     })
 }
 
 /// Takes the drives out of a tree that has more of them than degrees of freedom: they share its rows.
-pub(super) fn take_shared(
+pub(super) fn split_shared_drives(
     model: &ModelEntry,
-    symbols: &Symbols,
-    drives: &mut Vec<Drive>,
-) -> Vec<Drive> {
+    symbols: &SymbolTable,
+    drives: &mut Vec<ModelDrive>,
+) -> Vec<ModelDrive> {
     let coordinates = symbols.coordinates.iter();
     let freedoms = coordinates
         .filter(|c| !c.passive && c.motion.has_rate())
@@ -48,25 +48,25 @@ pub(super) fn take_shared(
 /// Adds a row for every degree of freedom that nothing drives, or that drives share.
 pub(super) fn add_rows(
     model: &ModelEntry,
-    symbols: &Symbols,
-    tree: &Tree,
-    points: &Points,
-    places: &mut Places,
-    drives: &mut Drives,
-    log: &mut Log,
+    symbols: &SymbolTable,
+    tree: &FrameTree,
+    points: &PointTable,
+    places: &mut MechanismSpans,
+    drives: &mut DriveRows,
+    log: &mut DiagnosticLog,
 ) {
-    let Drives {
+    let DriveRows {
         rows: drives,
         shared,
     } = drives;
     let mut of_bodies = Vec::new();
     for (frame, body) in free_bodies(tree) {
-        check_body(symbols, tree, frame, body, places, log);
+        check_free_body(symbols, tree, frame, body, places, log);
         let [_, qx, qy, qz] = body.quaternion;
         of_bodies.extend(body.position);
         of_bodies.extend([qx, qy, qz]);
     }
-    let mut undriven = undriven(model, symbols, places, drives, log);
+    let mut undriven = undriven_coordinates(model, symbols, places, drives, log);
     if !shared.is_empty() {
         let all = (0..symbols.coordinates.len()).map(CoordinateIdx);
         undriven = all
@@ -80,7 +80,7 @@ pub(super) fn add_rows(
             DriveKind::Linear { .. } => None,
         })
         .collect();
-    let row = |i: CoordinateIdx| Drive {
+    let row = |i: CoordinateIdx| ModelDrive {
         name: format!("on_{}", symbols.coordinates[i.0].name),
         kind: DriveKind::Joint(i),
         is_driven: false,
@@ -117,12 +117,12 @@ pub(super) fn add_rows(
 }
 
 /// Coordinates of joints that the file says nothing drives.
-fn undriven(
+fn undriven_coordinates(
     model: &ModelEntry,
-    symbols: &Symbols,
-    places: &Places,
-    drives: &[Drive],
-    log: &mut Log,
+    symbols: &SymbolTable,
+    places: &MechanismSpans,
+    drives: &[ModelDrive],
+    log: &mut DiagnosticLog,
 ) -> Vec<CoordinateIdx> {
     let mut found = Vec::new();
     for (key, entry) in model.coordinates.iter().flat_map(|table| &table.entries) {
@@ -168,13 +168,13 @@ fn undriven(
 }
 
 /// Reports what a free body cannot be.
-fn check_body(
-    symbols: &Symbols,
-    tree: &Tree,
+fn check_free_body(
+    symbols: &SymbolTable,
+    tree: &FrameTree,
     frame: usize,
     body: &FreeBody,
-    places: &Places,
-    log: &mut Log,
+    places: &MechanismSpans,
+    log: &mut DiagnosticLog,
 ) {
     let here = &tree.frames[frame];
     let Some(span) = places.frames.get(frame).copied().flatten() else {
@@ -223,7 +223,7 @@ fn check_body(
             .frames
             .iter()
             .flat_map(|frame| &frame.steps)
-            .filter(|step| uses(step, *i));
+            .filter(|step| is_moved_by(step, *i));
         if uses.count() > 1 {
             log.push(
                 Diagnostic::error(
@@ -237,14 +237,14 @@ fn check_body(
     }
 }
 
-fn uses(step: &Step, coordinate: CoordinateIdx) -> bool {
+fn is_moved_by(step: &FrameStep, coordinate: CoordinateIdx) -> bool {
     match step {
-        Step::Rotate(_, angle) => angle
+        FrameStep::Rotate(_, angle) => angle
             .terms
             .iter()
-            .any(|(s, _)| *s == Symbol::Coordinate(coordinate)),
-        Step::Translate(_, length) => length.coordinates.iter().any(|(i, _)| *i == coordinate),
-        Step::Free(body) => body
+            .any(|(s, _)| *s == ModelSymbol::Coordinate(coordinate)),
+        FrameStep::Translate(_, length) => length.coordinates.iter().any(|(i, _)| *i == coordinate),
+        FrameStep::Free(body) => body
             .position
             .iter()
             .chain(&body.quaternion)
@@ -253,41 +253,41 @@ fn uses(step: &Step, coordinate: CoordinateIdx) -> bool {
 }
 
 /// Reports linear drives that reach from one free body to another, or to what stands on the base.
-pub(super) fn check_apart(
-    tree: &Tree,
-    drives: &[Drive],
-    points: &Points,
-    spans: &[Span],
-    log: &mut Log,
+pub(super) fn check_linear_drives(
+    tree: &FrameTree,
+    drives: &[ModelDrive],
+    points: &PointTable,
+    spans: &[SourceSpan],
+    log: &mut DiagnosticLog,
 ) {
-    let root = roots(tree);
+    let root = free_body_finder(tree);
     for (drive, span) in drives.iter().zip(spans) {
         if let DriveKind::Linear { from, to } = drive.kind
             && root(points, from) != root(points, to)
         {
-            log.push(across(*span, "a drive"));
+            log.push(free_body_crossing(*span, "a drive"));
         }
     }
 }
 
 /// The same for loops.
 pub(super) fn check_loops(
-    tree: &Tree,
-    loops: &[Loop],
-    points: &Points,
-    places: &Places,
-    log: &mut Log,
+    tree: &FrameTree,
+    loops: &[KinematicLoop],
+    points: &PointTable,
+    places: &MechanismSpans,
+    log: &mut DiagnosticLog,
 ) {
-    let root = roots(tree);
+    let root = free_body_finder(tree);
     for (closed, span) in loops.iter().zip(&places.loops) {
         let [one, other] = closed.joins;
         if root(points, one) != root(points, other) {
-            log.push(across(*span, "a loop"));
+            log.push(free_body_crossing(*span, "a loop"));
         }
     }
 }
 
-fn across(span: Span, what: &str) -> Diagnostic {
+fn free_body_crossing(span: SourceSpan, what: &str) -> Diagnostic {
     Diagnostic::error(
         span,
         format!("{what} cannot reach across a free body with a quaternion"),
@@ -297,10 +297,10 @@ fn across(span: Span, what: &str) -> Diagnostic {
 }
 
 /// On which free body, if any, a point moves.
-fn roots(tree: &Tree) -> impl Fn(&Points, PointIdx) -> Option<usize> {
+fn free_body_finder(tree: &FrameTree) -> impl Fn(&PointTable, PointIdx) -> Option<usize> {
     let mut of_frame: BTreeMap<usize, usize> = BTreeMap::new();
     for (i, frame) in tree.frames.iter().enumerate() {
-        let is_free = frame.steps.iter().any(|step| matches!(step, Step::Free(_)));
+        let is_free = frame.steps.iter().any(|step| matches!(step, FrameStep::Free(_)));
         let root = if is_free {
             Some(i)
         } else {

@@ -1,15 +1,15 @@
 //! What was identified: values that take the place of nominal ones.
 
-use crate::build::symbols::Symbols;
-use crate::diagnostic::{Diagnostic, Log};
+use crate::build::symbols::SymbolTable;
+use crate::diagnostic::{Diagnostic, DiagnosticLog};
 use crate::schema::ModelEntry;
 use crate::suggest;
 
 /// Gives parameters their identified values; what comes back are those of base parameters, by their expressions.
-pub(super) fn identified(
+pub(super) fn read_identified(
     model: &ModelEntry,
-    symbols: &mut Symbols,
-    log: &mut Log,
+    symbols: &mut SymbolTable,
+    log: &mut DiagnosticLog,
 ) -> Vec<(String, f64)> {
     let Some(entry) = &model.identified else {
         return Vec::new();

@@ -3,27 +3,27 @@
 use num_traits::One;
 
 use crate::build::frames::{angle_or_zero, length_or_zero};
-use crate::build::symbols::Symbols;
-use crate::diagnostic::{Diagnostic, Log};
-use crate::exact::{CoordinateIdx, Exact, Symbol};
-use crate::formula::{AstKind, Formula};
-use crate::joint_motion::Motion;
-use crate::mechanism::{Axis, FreeBody, Step, TwistAxes};
-use crate::record::List;
+use crate::build::symbols::SymbolTable;
+use crate::diagnostic::{Diagnostic, DiagnosticLog};
+use crate::exact::{CoordinateIdx, ExactExpression, ModelSymbol};
+use crate::formula::{FormulaAstKind, SourceFormula};
+use crate::joint_motion::CoordinateMotion;
+use crate::mechanism::{FrameAxis, FreeBody, FrameStep, TwistAxes};
+use crate::record::EntryList;
 use crate::schema::JointEntry;
-use crate::scope::Sort;
+use crate::scope::SymbolSort;
 use crate::values::{AxisName, QuaternionOrder, TwistName};
 
 /// The coordinates of joints with several, each with how it moves.
-pub(super) fn coordinates(joint: &JointEntry) -> Vec<(&Formula, Motion)> {
+pub(super) fn coordinates(joint: &JointEntry) -> Vec<(&SourceFormula, CoordinateMotion)> {
     let motion = |is_angle| {
         if is_angle {
-            Motion::Revolute
+            CoordinateMotion::Revolute
         } else {
-            Motion::Prismatic
+            CoordinateMotion::Prismatic
         }
     };
-    let mut all: Vec<(&Formula, Motion)> = Vec::new();
+    let mut all: Vec<(&SourceFormula, CoordinateMotion)> = Vec::new();
     if let Some(list) = joint.free.as_ref().filter(|list| list.entries.len() == 7) {
         let scalar = match joint.quaternion {
             Some(QuaternionOrder::Wxyz) => 3,
@@ -32,9 +32,9 @@ pub(super) fn coordinates(joint: &JointEntry) -> Vec<(&Formula, Motion)> {
         let entries = list.entries.iter().enumerate();
         return entries
             .map(|(i, formula)| match i {
-                0..3 => (formula, Motion::Prismatic),
-                _ if i == scalar => (formula, Motion::QuaternionScalar),
-                _ => (formula, Motion::Quaternion),
+                0..3 => (formula, CoordinateMotion::Prismatic),
+                _ if i == scalar => (formula, CoordinateMotion::QuaternionScalar),
+                _ => (formula, CoordinateMotion::Quaternion),
             })
             .collect();
     }
@@ -59,10 +59,10 @@ pub(super) fn coordinates(joint: &JointEntry) -> Vec<(&Formula, Motion)> {
 /// Appends the motions of a joint to `steps`, and what it is for people to `text`.
 pub(super) fn steps(
     joint: &JointEntry,
-    symbols: &Symbols,
-    steps: &mut Vec<Step>,
+    symbols: &SymbolTable,
+    steps: &mut Vec<FrameStep>,
     text: &mut Vec<String>,
-    log: &mut Log,
+    log: &mut DiagnosticLog,
 ) {
     let n_kinds = [joint.revolute.is_some(), joint.prismatic.is_some()]
         .into_iter()
@@ -109,9 +109,9 @@ pub(super) fn steps(
         builder.rotate(axis, minus, &angle);
         builder.translate(axis, minus, &length);
     } else if let Some(angles) = builder.entries::<2>(joint.universal.as_ref(), "two angles") {
-        builder.turns("universal", joint, &angles, text);
+        builder.rotations("universal", joint, &angles, text);
     } else if let Some(angles) = builder.entries::<3>(joint.spherical.as_ref(), "three angles") {
-        builder.turns("spherical", joint, &angles, text);
+        builder.rotations("spherical", joint, &angles, text);
     } else if joint
         .free
         .as_ref()
@@ -123,16 +123,16 @@ pub(super) fn steps(
         "three coordinates of its position and three angles, or seven with a quaternion",
     ) {
         text.push(format!("translation({}, {}, {})", x.text, y.text, z.text));
-        for (axis, formula) in [(Axis::X, x), (Axis::Y, y), (Axis::Z, z)] {
+        for (axis, formula) in [(FrameAxis::X, x), (FrameAxis::Y, y), (FrameAxis::Z, z)] {
             builder.translate(axis, false, &formula);
         }
-        builder.turns("spherical", joint, &[a, b, c], text);
+        builder.rotations("spherical", joint, &[a, b, c], text);
     }
-    reject_unused(joint, log);
+    reject_unused_axes(joint, log);
 }
 
 /// Says where an axis or axes are given that the joint has no use for.
-fn reject_unused(joint: &JointEntry, log: &mut Log) {
+fn reject_unused_axes(joint: &JointEntry, log: &mut DiagnosticLog) {
     let has_quaternion = joint
         .free
         .as_ref()
@@ -181,32 +181,32 @@ fn reject_unused(joint: &JointEntry, log: &mut Log) {
     }
 }
 
-fn axis_of(joint: &JointEntry) -> (Axis, bool, &'static str) {
+fn axis_of(joint: &JointEntry) -> (FrameAxis, bool, &'static str) {
     match joint.axis.unwrap_or(AxisName::Z) {
-        AxisName::X => (Axis::X, false, "x"),
-        AxisName::Y => (Axis::Y, false, "y"),
-        AxisName::Z => (Axis::Z, false, "z"),
-        AxisName::MinusX => (Axis::X, true, "-x"),
-        AxisName::MinusY => (Axis::Y, true, "-y"),
-        AxisName::MinusZ => (Axis::Z, true, "-z"),
+        AxisName::X => (FrameAxis::X, false, "x"),
+        AxisName::Y => (FrameAxis::Y, false, "y"),
+        AxisName::Z => (FrameAxis::Z, false, "z"),
+        AxisName::MinusX => (FrameAxis::X, true, "-x"),
+        AxisName::MinusY => (FrameAxis::Y, true, "-y"),
+        AxisName::MinusZ => (FrameAxis::Z, true, "-z"),
     }
 }
 
 struct Builder<'a> {
-    symbols: &'a Symbols,
-    steps: &'a mut Vec<Step>,
-    log: &'a mut Log,
+    symbols: &'a SymbolTable,
+    steps: &'a mut Vec<FrameStep>,
+    log: &'a mut DiagnosticLog,
 }
 
 impl Builder<'_> {
     /// The coordinates of a joint with `N` of them; another number is reported.
     fn entries<const N: usize>(
         &mut self,
-        list: Option<&List<Formula>>,
+        list: Option<&EntryList<SourceFormula>>,
         expected: &str,
-    ) -> Option<[Formula; N]> {
+    ) -> Option<[SourceFormula; N]> {
         let list = list?;
-        let found: Option<[Formula; N]> = list.entries.clone().try_into().ok();
+        let found: Option<[SourceFormula; N]> = list.entries.clone().try_into().ok();
         if found.is_none() && !list.faulty {
             self.log.push(
                 Diagnostic::error(
@@ -268,7 +268,7 @@ impl Builder<'_> {
             QuaternionOrder::Wxyz => "wxyz",
         };
         text.push(format!("free({}, {order}, twist {axes})", names.join(", ")));
-        self.steps.push(Step::Free(FreeBody {
+        self.steps.push(FrameStep::Free(FreeBody {
             position: [x, y, z],
             quaternion,
             linear,
@@ -277,8 +277,8 @@ impl Builder<'_> {
     }
 
     /// The coordinate that a formula is.
-    fn coordinate(&mut self, formula: &Formula) -> Option<CoordinateIdx> {
-        let AstKind::Name(name) = &formula.ast.kind else {
+    fn coordinate(&mut self, formula: &SourceFormula) -> Option<CoordinateIdx> {
+        let FormulaAstKind::Name(name) = &formula.ast.kind else {
             self.log.push(
                 Diagnostic::error(formula.ast.span, "a free body moves by coordinates alone")
                     .label("expected the name of a coordinate"),
@@ -287,14 +287,14 @@ impl Builder<'_> {
         };
         let span = formula.ast.span;
         let scope = &self.symbols.scope;
-        let meaning = scope.look_up(name, span, &[Sort::Coordinate], self.log)?;
+        let meaning = scope.look_up(name, span, &[SymbolSort::Coordinate], self.log)?;
         match meaning.exact {
-            Exact::Symbol(Symbol::Coordinate(idx)) => Some(idx),
+            ExactExpression::Symbol(ModelSymbol::Coordinate(idx)) => Some(idx),
             _ => None,
         }
     }
 
-    fn rotate(&mut self, axis: Axis, minus: bool, formula: &Formula) {
+    fn rotate(&mut self, axis: FrameAxis, minus: bool, formula: &SourceFormula) {
         let mut about = angle_or_zero(Some(formula), self.symbols, self.log);
         if minus {
             if !about.pi.is_one() {
@@ -304,10 +304,10 @@ impl Builder<'_> {
                 term.1 = -term.1;
             }
         }
-        self.steps.push(Step::Rotate(axis, about));
+        self.steps.push(FrameStep::Rotate(axis, about));
     }
 
-    fn translate(&mut self, axis: Axis, minus: bool, formula: &Formula) {
+    fn translate(&mut self, axis: FrameAxis, minus: bool, formula: &SourceFormula) {
         let mut along = length_or_zero(
             Some(formula),
             self.symbols,
@@ -316,33 +316,33 @@ impl Builder<'_> {
         );
         if minus {
             along.offset = match along.offset {
-                Exact::Rational(value) => Exact::Rational(-value),
-                other => Exact::Negative(Box::new(other)),
+                ExactExpression::Rational(value) => ExactExpression::Rational(-value),
+                other => ExactExpression::Negative(Box::new(other)),
             };
             for term in &mut along.coordinates {
                 term.1 = -term.1.clone();
             }
         }
-        self.steps.push(Step::Translate(axis, along));
+        self.steps.push(FrameStep::Translate(axis, along));
     }
 
     /// Rotations about several axes, one after the other.
-    fn turns(
+    fn rotations(
         &mut self,
         kind: &str,
         joint: &JointEntry,
-        angles: &[Formula],
+        angles: &[SourceFormula],
         text: &mut Vec<String>,
     ) {
         let given = joint.axes.as_ref();
         let usual = if angles.len() == 2 { "xy" } else { "zyx" };
         let written = given.map_or(usual, |axes| axes.text.as_str());
-        let axes: Vec<Option<Axis>> = written
+        let axes: Vec<Option<FrameAxis>> = written
             .chars()
             .map(|letter| match letter {
-                'x' => Some(Axis::X),
-                'y' => Some(Axis::Y),
-                'z' => Some(Axis::Z),
+                'x' => Some(FrameAxis::X),
+                'y' => Some(FrameAxis::Y),
+                'z' => Some(FrameAxis::Z),
                 _ => None,
             })
             .collect();
@@ -363,7 +363,7 @@ impl Builder<'_> {
         let names: Vec<&str> = angles.iter().map(|angle| angle.text.as_str()).collect();
         text.push(format!("{kind}({}, {written})", names.join(", ")));
         for (axis, angle) in axes.into_iter().zip(angles) {
-            self.rotate(axis.unwrap_or(Axis::Z), false, angle);
+            self.rotate(axis.unwrap_or(FrameAxis::Z), false, angle);
         }
     }
 }

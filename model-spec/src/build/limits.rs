@@ -1,27 +1,27 @@
 //! What planned motion must keep: ranges of coordinates, forces and points, and the distance from singular poses.
 
-use crate::diagnostic::{Diagnostic, Log, Span};
+use crate::diagnostic::{Diagnostic, DiagnosticLog, SourceSpan};
 use crate::exact::CoordinateIdx;
-use crate::mechanism::{Coordinate, CoordinateLimits, Drive, DriveIdx, Limits, Point, PointIdx};
-use crate::range::Range;
+use crate::mechanism::{JointCoordinate, CoordinateBounds, ModelDrive, DriveIdx, MotionLimits, FramePoint, PointIdx};
+use crate::range::ValueRange;
 use crate::schema::ModelEntry;
 use crate::suggest;
 
 /// Reads the limits; names must be those of the file.
 pub(super) fn limits(
     model: &ModelEntry,
-    coordinates: &[Coordinate],
-    drives: &[Drive],
-    points: &[Point],
-    log: &mut Log,
-) -> Limits {
-    let mut limits = Limits::default();
+    coordinates: &[JointCoordinate],
+    drives: &[ModelDrive],
+    points: &[FramePoint],
+    log: &mut DiagnosticLog,
+) -> MotionLimits {
+    let mut limits = MotionLimits::default();
     let Some(entry) = &model.limits else {
         return limits;
     };
     // What a faulty entry would define is not reported as unknown.
     let is_sound = log.n_errors() == 0;
-    let ends = |range: &Option<Range>| range.as_ref().map(|range| range.ends);
+    let ends = |range: &Option<ValueRange>| range.as_ref().map(|range| range.ends);
     for (key, one) in entry.coordinates.iter().flat_map(|named| &named.entries) {
         let names = coordinates.iter().map(|c| c.name.as_str());
         let Some(i) = position(&key.name, key.span, "coordinate", names, is_sound, log) else {
@@ -70,7 +70,7 @@ pub(super) fn limits(
         }
         limits.coordinates.push((
             CoordinateIdx(i),
-            CoordinateLimits {
+            CoordinateBounds {
                 position: ends(&one.position),
                 rate: ends(&one.rate),
                 acceleration: ends(&one.acceleration),
@@ -107,11 +107,11 @@ pub(super) fn limits(
 /// The position of a name in a list; reports a name that is not there.
 fn position<'a>(
     name: &str,
-    span: Span,
+    span: SourceSpan,
     what: &str,
     names: impl Iterator<Item = &'a str> + Clone,
     is_sound: bool,
-    log: &mut Log,
+    log: &mut DiagnosticLog,
 ) -> Option<usize> {
     let found = names.clone().position(|other| other == name);
     if found.is_none() && is_sound && !log.is_full() {

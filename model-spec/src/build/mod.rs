@@ -16,23 +16,23 @@ mod limits;
 mod retain;
 pub(crate) mod symbols;
 
-use crate::build::effect_places::Scene;
-use crate::diagnostic::{Log, Span};
+use crate::build::effect_places::EffectTargets;
+use crate::diagnostic::{DiagnosticLog, SourceSpan};
 use crate::kinds::{EffectKind, describe, library_entries};
 use crate::mechanics;
-use crate::mechanism::{Mechanism, Recording};
+use crate::mechanism::{Mechanism, RecordingColumns};
 use crate::pose;
 use crate::schema::{EffectKindEntry, ModelEntry};
 
 /// The places of what a mechanism holds, by index, for findings about its pose.
 #[derive(Debug, Default)]
-pub(crate) struct Places {
-    pub(crate) whole: Option<Span>,
-    pub(crate) frames: Vec<Option<Span>>,
-    pub(crate) points: Vec<Span>,
-    pub(crate) loops: Vec<Span>,
-    pub(crate) drives: Vec<Span>,
-    pub(crate) coordinates: Vec<Span>,
+pub(crate) struct MechanismSpans {
+    pub(crate) whole: Option<SourceSpan>,
+    pub(crate) frames: Vec<Option<SourceSpan>>,
+    pub(crate) points: Vec<SourceSpan>,
+    pub(crate) loops: Vec<SourceSpan>,
+    pub(crate) drives: Vec<SourceSpan>,
+    pub(crate) coordinates: Vec<SourceSpan>,
 }
 
 /// Builds the mechanism, if there are no errors, and the kinds of effects that its file may use.
@@ -41,11 +41,11 @@ pub(crate) struct Places {
 pub(crate) fn build(
     model: &ModelEntry,
     libraries: &[EffectKindEntry],
-    log: &mut Log,
+    log: &mut DiagnosticLog,
 ) -> (Option<Mechanism>, Vec<EffectKind>) {
-    let mut places = Places {
+    let mut places = MechanismSpans {
         whole: Some(model.span),
-        ..Places::default()
+        ..MechanismSpans::default()
     };
     let mut symbols = symbols::declare(model, &mut places, log);
     let gravity = symbols::gravity(model, &symbols.scope, log);
@@ -63,14 +63,14 @@ pub(crate) fn build(
     let drives = actuation::drives(model, &symbols, &tree, &points, &mut places, log);
     let own_kinds = model.effect_kind.iter().flat_map(|list| &list.entries);
     let own_kinds: Vec<&EffectKindEntry> = libraries.iter().chain(own_kinds).collect();
-    let scene = Scene {
+    let scene = EffectTargets {
         drives: &drives.rows,
         points: &points,
         parts: &parts,
         lumped_masses: &lumped_masses,
     };
     let effects = effects::effects(model, &own_kinds, &mut symbols, &scene, log);
-    let (gravity, force_delay) = mechanics::whole(&effects, gravity, &symbols.constants);
+    let (gravity, force_delay) = mechanics::gravity_and_delay(&effects, gravity, &symbols.constants);
     let retain = retain::retain(model, &symbols, log);
     let limits = limits::limits(
         model,
@@ -79,7 +79,7 @@ pub(crate) fn build(
         &points.points,
         log,
     );
-    let identified_base = identified::identified(model, &mut symbols, log);
+    let identified_base = identified::read_identified(model, &mut symbols, log);
     let columns = actuation::recording(model, &symbols, &drives, log);
     let torque = actuation::torque(model, &drives, log);
     actuation::check_place_names(model, log);
@@ -114,10 +114,10 @@ pub(crate) fn build(
         identified_base,
         retain,
         limits,
-        recording: Recording { columns, torque },
+        recording: RecordingColumns { columns, torque },
         is_at_values: false,
     };
     bodies::warn_of_negative(model, &mechanism, log);
-    pose::check(&mut mechanism, &places, log);
+    pose::check_pose(&mut mechanism, &places, log);
     ((log.n_errors() == 0).then_some(mechanism), kinds)
 }

@@ -2,18 +2,18 @@
 
 use std::collections::BTreeMap;
 
-use crate::build::symbols::Symbols;
-use crate::diagnostic::{Diagnostic, Log};
-use crate::exact::{Exact, ParameterIdx, Symbol};
-use crate::formula::{Ast, AstKind};
+use crate::build::symbols::SymbolTable;
+use crate::diagnostic::{Diagnostic, DiagnosticLog};
+use crate::exact::{ExactExpression, ParameterIdx, ModelSymbol};
+use crate::formula::{FormulaAst, FormulaAstKind};
 use crate::schema::ModelEntry;
-use crate::scope::Sort;
+use crate::scope::SymbolSort;
 
 /// Reads the products of parameters to retain.
 pub(super) fn retain(
     model: &ModelEntry,
-    symbols: &Symbols,
-    log: &mut Log,
+    symbols: &SymbolTable,
+    log: &mut DiagnosticLog,
 ) -> Vec<Vec<(ParameterIdx, u32)>> {
     let mut products = Vec::new();
     for formula in model.retain.iter().flat_map(|list| &list.entries) {
@@ -26,14 +26,14 @@ pub(super) fn retain(
 }
 
 fn product(
-    ast: &Ast,
+    ast: &FormulaAst,
     exponent: u32,
-    symbols: &Symbols,
+    symbols: &SymbolTable,
     powers: &mut BTreeMap<ParameterIdx, u32>,
-    log: &mut Log,
+    log: &mut DiagnosticLog,
 ) -> bool {
     match &ast.kind {
-        AstKind::Name(name) => {
+        FormulaAstKind::Name(name) => {
             // Naming a parameter here uses nothing: it only orders what the mechanism holds.
             let was_used = symbols
                 .scope
@@ -41,24 +41,24 @@ fn product(
                 .is_some_and(|meaning| meaning.used.get());
             let Some(meaning) = symbols
                 .scope
-                .look_up(name, ast.span, &[Sort::Parameter], log)
+                .look_up(name, ast.span, &[SymbolSort::Parameter], log)
             else {
                 return false;
             };
             meaning.used.set(was_used);
-            if let Exact::Symbol(Symbol::Parameter(idx)) = meaning.exact {
+            if let ExactExpression::Symbol(ModelSymbol::Parameter(idx)) = meaning.exact {
                 *powers.entry(idx).or_default() += exponent;
             }
             true
         }
-        AstKind::Product(factors) => {
+        FormulaAstKind::Product(factors) => {
             let mut fine = true;
             for factor in factors {
                 fine &= product(factor, exponent, symbols, powers, log);
             }
             fine
         }
-        AstKind::Power(base, power) if *power > 0 => product(
+        FormulaAstKind::Power(base, power) if *power > 0 => product(
             base,
             exponent.saturating_mul(power.unsigned_abs()),
             symbols,

@@ -2,16 +2,16 @@
 
 use std::cell::Cell;
 
-use crate::build::Places;
-use crate::diagnostic::{Diagnostic, Log, Span};
-use crate::exact::{ConstantIdx, CoordinateIdx, Exact, ParameterIdx, Symbol};
-use crate::formula::{Ast, AstKind, Formula};
-use crate::joint_motion::Motion;
-use crate::mechanism::{Constant, Coordinate, Parameter};
+use crate::build::MechanismSpans;
+use crate::diagnostic::{Diagnostic, DiagnosticLog, SourceSpan};
+use crate::exact::{ConstantIdx, CoordinateIdx, ExactExpression, ParameterIdx, ModelSymbol};
+use crate::formula::{FormulaAst, FormulaAstKind, SourceFormula};
+use crate::joint_motion::CoordinateMotion;
+use crate::mechanism::{ModelConstant, JointCoordinate, DynamicParameter};
 use crate::schema::{LinearEntry, LinearNominalEntry, ModelEntry};
-use crate::scope::{Meaning, Scope, Sort, Wanted, meaning};
-use crate::unit::Dimension;
-use crate::values::Vector;
+use crate::scope::{SymbolMeaning, FormulaScope, SymbolSort, FormulaRequirement, symbol_meaning};
+use crate::unit::UnitDimension;
+use crate::values::FormulaVector;
 
 /// Most coordinates of a mechanism.
 const MOST_COORDINATES: usize = 100;
@@ -19,19 +19,19 @@ const MOST_COORDINATES: usize = 100;
 const DECLARED_AT_MOST: usize = 1000;
 
 /// What the names of a file stand for.
-pub(crate) struct Symbols {
-    pub(crate) scope: Scope,
-    pub(crate) constants: Vec<Constant>,
-    pub(super) parameters: Vec<Parameter>,
+pub(crate) struct SymbolTable {
+    pub(crate) scope: FormulaScope,
+    pub(crate) constants: Vec<ModelConstant>,
+    pub(super) parameters: Vec<DynamicParameter>,
     /// Where each parameter got its nominal value; those of effects and shorthands may get one later.
-    pub(super) nominal_given: Vec<Option<Span>>,
-    pub(super) coordinates: Vec<Coordinate>,
+    pub(super) nominal_given: Vec<Option<SourceSpan>>,
+    pub(super) coordinates: Vec<JointCoordinate>,
     /// Coordinates that no frame mentions.
     still: Vec<CoordinateIdx>,
 }
 
 /// What became of a parameter's name that may be declared already.
-pub(super) enum Shared {
+pub(super) enum ParameterLookup {
     /// No one has declared it yet.
     New,
     /// It is this parameter.
@@ -41,25 +41,25 @@ pub(super) enum Shared {
 }
 
 /// The linear parameters in the order in which a shorthand declares them, with their dimensions.
-pub(super) const LINEAR: [(&str, Dimension); 10] = [
-    ("XX", Dimension::INERTIA),
-    ("XY", Dimension::INERTIA),
-    ("XZ", Dimension::INERTIA),
-    ("YY", Dimension::INERTIA),
-    ("YZ", Dimension::INERTIA),
-    ("ZZ", Dimension::INERTIA),
-    ("MX", Dimension::FIRST_MOMENT),
-    ("MY", Dimension::FIRST_MOMENT),
-    ("MZ", Dimension::FIRST_MOMENT),
-    ("M", Dimension::MASS),
+pub(super) const LINEAR: [(&str, UnitDimension); 10] = [
+    ("XX", UnitDimension::INERTIA),
+    ("XY", UnitDimension::INERTIA),
+    ("XZ", UnitDimension::INERTIA),
+    ("YY", UnitDimension::INERTIA),
+    ("YZ", UnitDimension::INERTIA),
+    ("ZZ", UnitDimension::INERTIA),
+    ("MX", UnitDimension::FIRST_MOMENT),
+    ("MY", UnitDimension::FIRST_MOMENT),
+    ("MZ", UnitDimension::FIRST_MOMENT),
+    ("M", UnitDimension::MASS),
 ];
 /// Those of a body in the x-y plane.
 const PLANAR: [&str; 4] = ["ZZ", "MX", "MY", "M"];
 
 /// Declares all names of a file.
-pub(super) fn declare(model: &ModelEntry, places: &mut Places, log: &mut Log) -> Symbols {
-    let mut symbols = Symbols {
-        scope: Scope::default(),
+pub(super) fn declare(model: &ModelEntry, places: &mut MechanismSpans, log: &mut DiagnosticLog) -> SymbolTable {
+    let mut symbols = SymbolTable {
+        scope: FormulaScope::default(),
         constants: Vec::new(),
         parameters: Vec::new(),
         nominal_given: Vec::new(),
@@ -67,20 +67,20 @@ pub(super) fn declare(model: &ModelEntry, places: &mut Places, log: &mut Log) ->
         still: Vec::new(),
     };
     for (key, entry) in model.constants.iter().flat_map(|table| &table.entries) {
-        let symbol = Symbol::Constant(ConstantIdx(symbols.constants.len()));
+        let symbol = ModelSymbol::Constant(ConstantIdx(symbols.constants.len()));
         let unit = entry.unit.as_ref();
         let unit_text = unit.map_or("?", |unit| unit.text.as_str());
         let dimension = unit.map(|unit| unit.dimension);
-        let meaning = Meaning {
+        let meaning = SymbolMeaning {
             value: entry.value.map(|number| number.value),
-            ..meaning(Sort::Constant, symbol, dimension, unit_text, Some(key.span))
+            ..symbol_meaning(SymbolSort::Constant, symbol, dimension, unit_text, Some(key.span))
         };
         if symbols.scope.declare(&key.name, meaning, log) {
-            symbols.constants.push(Constant {
+            symbols.constants.push(ModelConstant {
                 name: key.name.clone(),
                 value: entry.value.map_or(1.0, |number| number.value),
                 unit: unit_text.to_owned(),
-                is_angle: unit.is_some_and(crate::unit::Unit::is_angle),
+                is_angle: unit.is_some_and(crate::unit::ModelUnit::is_angle),
                 note: entry.note.as_ref().map(|note| note.text.clone()),
             });
         }
@@ -88,7 +88,7 @@ pub(super) fn declare(model: &ModelEntry, places: &mut Places, log: &mut Log) ->
     for (key, entry) in model.parameters.iter().flat_map(|table| &table.entries) {
         let unit = entry.unit.as_ref();
         symbols.declare_parameter(
-            Parameter {
+            DynamicParameter {
                 name: key.name.clone(),
                 nominal: entry.nominal.map_or(0.0, |number| number.value),
                 unit: unit.map_or_else(|| "?".to_owned(), |unit| unit.text.clone()),
@@ -108,18 +108,18 @@ pub(super) fn declare(model: &ModelEntry, places: &mut Places, log: &mut Log) ->
 
 /// Declares the names whose entries could not be read, with a meaning that fits anything:
 /// what is wrong with them is reported, and they are not unknown.
-fn declare_faulty(model: &ModelEntry, symbols: &mut Symbols, log: &mut Log) {
+fn declare_faulty(model: &ModelEntry, symbols: &mut SymbolTable, log: &mut DiagnosticLog) {
     let constants = model.constants.iter().flat_map(|table| &table.faulty);
     let parameters = model.parameters.iter().flat_map(|table| &table.faulty);
     let coordinates = model.coordinates.iter().flat_map(|table| &table.faulty);
     let all = constants
-        .map(|key| (key, Sort::Constant))
-        .chain(parameters.map(|key| (key, Sort::Parameter)))
-        .chain(coordinates.map(|key| (key, Sort::Coordinate)));
+        .map(|key| (key, SymbolSort::Constant))
+        .chain(parameters.map(|key| (key, SymbolSort::Parameter)))
+        .chain(coordinates.map(|key| (key, SymbolSort::Coordinate)));
     for (key, sort) in all {
-        let meaning = Meaning {
+        let meaning = SymbolMeaning {
             sort,
-            exact: Exact::zero(),
+            exact: ExactExpression::zero(),
             dimension: None,
             unit: "?".to_owned(),
             value: None,
@@ -133,9 +133,9 @@ fn declare_faulty(model: &ModelEntry, symbols: &mut Symbols, log: &mut Log) {
 /// Reports coordinates that no joint moves by, and a mechanism without any.
 pub(super) fn check_coordinates_move(
     model: &ModelEntry,
-    symbols: &Symbols,
-    places: &Places,
-    log: &mut Log,
+    symbols: &SymbolTable,
+    places: &MechanismSpans,
+    log: &mut DiagnosticLog,
 ) {
     if log.syntax_broken || model.frame.as_ref().is_some_and(|list| list.faulty) {
         return; // A faulty frame may be the one that moves.
@@ -163,19 +163,19 @@ pub(super) fn check_coordinates_move(
     }
 }
 
-impl Symbols {
+impl SymbolTable {
     /// Adds a parameter; false if its name is taken.
     pub(super) fn declare_parameter(
         &mut self,
-        parameter: Parameter,
-        dimension: Option<Dimension>,
-        declared: Span,
-        nominal_given: Option<Span>,
-        log: &mut Log,
+        parameter: DynamicParameter,
+        dimension: Option<UnitDimension>,
+        declared: SourceSpan,
+        nominal_given: Option<SourceSpan>,
+        log: &mut DiagnosticLog,
     ) -> bool {
-        let symbol = Symbol::Parameter(ParameterIdx(self.parameters.len()));
-        let meaning = meaning(
-            Sort::Parameter,
+        let symbol = ModelSymbol::Parameter(ParameterIdx(self.parameters.len()));
+        let meaning = symbol_meaning(
+            SymbolSort::Parameter,
             symbol,
             dimension,
             &parameter.unit,
@@ -193,22 +193,22 @@ impl Symbols {
     pub(super) fn share_parameter(
         &mut self,
         name: &str,
-        dimension: Option<Dimension>,
-        span: Span,
-        nominal: Option<crate::values::Number>,
-        log: &mut Log,
-    ) -> Shared {
+        dimension: Option<UnitDimension>,
+        span: SourceSpan,
+        nominal: Option<crate::values::SpannedNumber>,
+        log: &mut DiagnosticLog,
+    ) -> ParameterLookup {
         let Some(meaning) = self.scope.get(name) else {
-            return Shared::New;
+            return ParameterLookup::New;
         };
-        let Exact::Symbol(Symbol::Parameter(idx)) = meaning.exact else {
+        let ExactExpression::Symbol(ModelSymbol::Parameter(idx)) = meaning.exact else {
             let diagnostic = Diagnostic::error(span, format!("`{name}` is not a parameter"))
                 .label("expected the name of a parameter, or a new name");
             log.push(match meaning.declared {
                 Some(declared) => diagnostic.related(declared, "defined here"),
                 None => diagnostic,
             });
-            return Shared::Faulty;
+            return ParameterLookup::Faulty;
         };
         if let (Some(wanted), Some(found)) = (dimension, meaning.dimension)
             && wanted != found
@@ -223,7 +223,7 @@ impl Symbols {
                 Some(declared) => diagnostic.related(declared, "defined here"),
                 None => diagnostic,
             });
-            return Shared::Faulty;
+            return ParameterLookup::Faulty;
         }
         if let Some(nominal) = nominal {
             match self.nominal_given[idx.0] {
@@ -246,12 +246,12 @@ impl Symbols {
                 }
             }
         }
-        Shared::Known(idx)
+        ParameterLookup::Known(idx)
     }
 }
 
 /// Declares the parameters that `linear = { all = "1" }` stands for.
-fn declare_shorthands(model: &ModelEntry, symbols: &mut Symbols, log: &mut Log) {
+fn declare_shorthands(model: &ModelEntry, symbols: &mut SymbolTable, log: &mut DiagnosticLog) {
     for part in model.part.iter().flat_map(|list| &list.entries) {
         let Some(linear) = &part.linear else {
             continue;
@@ -264,7 +264,7 @@ fn declare_shorthands(model: &ModelEntry, symbols: &mut Symbols, log: &mut Log) 
                 .nominal
                 .as_ref()
                 .and_then(|nominal| nominal_of(nominal, symbol));
-            let own = explicit(linear, symbol);
+            let own = explicit_entry(linear, symbol);
             if !members.contains(&symbol) || own.is_some() {
                 if let Some(nominal) = nominal {
                     log.push(
@@ -286,9 +286,9 @@ fn declare_shorthands(model: &ModelEntry, symbols: &mut Symbols, log: &mut Log) 
             }
             let name = format!("{symbol}{}", suffix.text);
             let shared = symbols.share_parameter(&name, Some(dimension), suffix.span, nominal, log);
-            if matches!(shared, Shared::New) {
+            if matches!(shared, ParameterLookup::New) {
                 symbols.declare_parameter(
-                    Parameter {
+                    DynamicParameter {
                         name,
                         nominal: nominal.map_or(0.0, |number| number.value),
                         unit: dimension.to_string(),
@@ -307,7 +307,7 @@ fn declare_shorthands(model: &ModelEntry, symbols: &mut Symbols, log: &mut Log) 
 /// The suffix of a shorthand and the symbols that it stands for.
 pub(super) fn shorthand(
     linear: &LinearEntry,
-) -> Option<(&crate::values::Suffix, &'static [&'static str])> {
+) -> Option<(&crate::values::NameSuffix, &'static [&'static str])> {
     const ALL: [&str; 10] = ["XX", "XY", "XZ", "YY", "YZ", "ZZ", "MX", "MY", "MZ", "M"];
     match (&linear.all, &linear.planar) {
         (Some(suffix), _) => Some((suffix, &ALL)),
@@ -317,7 +317,7 @@ pub(super) fn shorthand(
 }
 
 /// The entry that a body gives for one of the linear parameters.
-pub(super) fn explicit<'a>(linear: &'a LinearEntry, symbol: &str) -> Option<&'a Formula> {
+pub(super) fn explicit_entry<'a>(linear: &'a LinearEntry, symbol: &str) -> Option<&'a SourceFormula> {
     match symbol {
         "XX" => linear.xx.as_ref(),
         "XY" => linear.xy.as_ref(),
@@ -332,7 +332,7 @@ pub(super) fn explicit<'a>(linear: &'a LinearEntry, symbol: &str) -> Option<&'a 
     }
 }
 
-fn nominal_of(nominal: &LinearNominalEntry, symbol: &str) -> Option<crate::values::Number> {
+fn nominal_of(nominal: &LinearNominalEntry, symbol: &str) -> Option<crate::values::SpannedNumber> {
     match symbol {
         "XX" => nominal.xx,
         "XY" => nominal.xy,
@@ -350,11 +350,11 @@ fn nominal_of(nominal: &LinearNominalEntry, symbol: &str) -> Option<crate::value
 /// Declares the coordinates; whether one is an angle or a length follows from the frames.
 fn declare_coordinates(
     model: &ModelEntry,
-    symbols: &mut Symbols,
-    places: &mut Places,
-    log: &mut Log,
+    symbols: &mut SymbolTable,
+    places: &mut MechanismSpans,
+    log: &mut DiagnosticLog,
 ) {
-    let Formulas {
+    let FrameFormulas {
         angles,
         lengths,
         quaternions,
@@ -372,11 +372,11 @@ fn declare_coordinates(
     }
     // Some of those above are known as well, so that few other places of the file have a fault by them.
     for (key, entry) in entries.iter().take(DECLARED_AT_MOST) {
-        let turns = angles.iter().find_map(|ast| find(ast, &key.name));
-        let slides = lengths.iter().find_map(|ast| find(ast, &key.name));
+        let turns = angles.iter().find_map(|ast| find_name(ast, &key.name));
+        let slides = lengths.iter().find_map(|ast| find_name(ast, &key.name));
         let of_quaternion = quaternions
             .iter()
-            .find_map(|(ast, motion)| find(ast, &key.name).map(|span| (span, *motion)));
+            .find_map(|(ast, motion)| find_name(ast, &key.name).map(|span| (span, *motion)));
         if let (Some((span, _)), Some(other)) = (of_quaternion, turns.or(slides)) {
             log.push(
                 Diagnostic::error(
@@ -403,8 +403,8 @@ fn declare_coordinates(
                 None
             }
             (None, None) if of_quaternion.is_some() => of_quaternion,
-            (None, Some(_)) => Some(Motion::Prismatic),
-            (Some(_), None) => Some(Motion::Revolute),
+            (None, Some(_)) => Some(CoordinateMotion::Prismatic),
+            (Some(_), None) => Some(CoordinateMotion::Revolute),
             (None, None) => {
                 let next = CoordinateIdx(symbols.coordinates.len());
                 symbols.still.push(next);
@@ -412,12 +412,12 @@ fn declare_coordinates(
             }
         };
         // Without values a quaternion turns nothing.
-        let at_rest = f64::from(u8::from(motion == Some(Motion::QuaternionScalar)));
-        let dimension = motion.map(Motion::dimension);
-        let motion = motion.unwrap_or(Motion::Revolute);
-        let symbol = Symbol::Coordinate(CoordinateIdx(symbols.coordinates.len()));
-        let meaning = meaning(
-            Sort::Coordinate,
+        let at_rest = f64::from(u8::from(motion == Some(CoordinateMotion::QuaternionScalar)));
+        let dimension = motion.map(CoordinateMotion::dimension);
+        let motion = motion.unwrap_or(CoordinateMotion::Revolute);
+        let symbol = ModelSymbol::Coordinate(CoordinateIdx(symbols.coordinates.len()));
+        let meaning = symbol_meaning(
+            SymbolSort::Coordinate,
             symbol,
             dimension,
             motion.unit(),
@@ -425,7 +425,7 @@ fn declare_coordinates(
         );
         if symbols.scope.declare(&key.name, meaning, log) {
             places.coordinates.push(key.span);
-            symbols.coordinates.push(Coordinate {
+            symbols.coordinates.push(JointCoordinate {
                 name: key.name.clone(),
                 motion,
                 passive: entry.passive.is_some_and(|flag| flag.0) || entry.follows.is_some(),
@@ -439,15 +439,15 @@ fn declare_coordinates(
 }
 
 /// The expressions of all frames by what they are.
-struct Formulas<'a> {
-    angles: Vec<&'a Ast>,
-    lengths: Vec<&'a Ast>,
-    quaternions: Vec<(&'a Ast, Motion)>,
+struct FrameFormulas<'a> {
+    angles: Vec<&'a FormulaAst>,
+    lengths: Vec<&'a FormulaAst>,
+    quaternions: Vec<(&'a FormulaAst, CoordinateMotion)>,
 }
 
-fn joint_formulas(model: &ModelEntry) -> Formulas<'_> {
-    let mut angles: Vec<&Ast> = Vec::new();
-    let mut lengths: Vec<&Ast> = Vec::new();
+fn joint_formulas(model: &ModelEntry) -> FrameFormulas<'_> {
+    let mut angles: Vec<&FormulaAst> = Vec::new();
+    let mut lengths: Vec<&FormulaAst> = Vec::new();
     let mut quaternions = Vec::new();
     for frame in model.frame.iter().flat_map(|list| &list.entries) {
         for dh in frame.modified_dh.iter().chain(&frame.standard_dh) {
@@ -459,16 +459,16 @@ fn joint_formulas(model: &ModelEntry) -> Formulas<'_> {
             lengths.extend(joint.prismatic.iter().map(|formula| &formula.ast));
             for (formula, motion) in crate::build::joints::coordinates(joint) {
                 match motion {
-                    Motion::Revolute => angles.push(&formula.ast),
-                    Motion::Prismatic => lengths.push(&formula.ast),
-                    Motion::Quaternion | Motion::QuaternionScalar => {
+                    CoordinateMotion::Revolute => angles.push(&formula.ast),
+                    CoordinateMotion::Prismatic => lengths.push(&formula.ast),
+                    CoordinateMotion::Quaternion | CoordinateMotion::QuaternionScalar => {
                         quaternions.push((&formula.ast, motion));
                     }
                 }
             }
         }
     }
-    Formulas {
+    FrameFormulas {
         angles,
         lengths,
         quaternions,
@@ -476,31 +476,31 @@ fn joint_formulas(model: &ModelEntry) -> Formulas<'_> {
 }
 
 /// The place of a name in an expression.
-fn find(ast: &Ast, name: &str) -> Option<Span> {
+fn find_name(ast: &FormulaAst, name: &str) -> Option<SourceSpan> {
     match &ast.kind {
-        AstKind::Name(found) => (found == name).then_some(ast.span),
-        AstKind::Sum(inner) | AstKind::Product(inner) => {
-            inner.iter().find_map(|one| find(one, name))
+        FormulaAstKind::Name(found) => (found == name).then_some(ast.span),
+        FormulaAstKind::Sum(inner) | FormulaAstKind::Product(inner) => {
+            inner.iter().find_map(|one| find_name(one, name))
         }
-        AstKind::Quotient(above, below) => find(above, name).or_else(|| find(below, name)),
-        AstKind::Negative(inner) | AstKind::Power(inner, _) | AstKind::Apply(_, inner) => {
-            find(inner, name)
+        FormulaAstKind::Quotient(above, below) => find_name(above, name).or_else(|| find_name(below, name)),
+        FormulaAstKind::Negative(inner) | FormulaAstKind::Power(inner, _) | FormulaAstKind::Apply(_, inner) => {
+            find_name(inner, name)
         }
-        AstKind::Rational(_) | AstKind::Pi => None,
+        FormulaAstKind::Rational(_) | FormulaAstKind::Pi => None,
     }
 }
 
 /// Gravity in the base frame; zero if the file gives none.
-pub(super) fn gravity(model: &ModelEntry, scope: &Scope, log: &mut Log) -> [Exact; 3] {
+pub(super) fn gravity(model: &ModelEntry, scope: &FormulaScope, log: &mut DiagnosticLog) -> [ExactExpression; 3] {
     model.gravity.as_ref().map_or_else(
-        || std::array::from_fn(|_| Exact::zero()),
+        || std::array::from_fn(|_| ExactExpression::zero()),
         |gravity| {
             vector(
                 gravity,
                 scope,
-                Wanted {
-                    sorts: &[Sort::Constant],
-                    dimension: Dimension::ACCELERATION,
+                FormulaRequirement {
+                    sorts: &[SymbolSort::Constant],
+                    dimension: UnitDimension::ACCELERATION,
                     what: "gravity",
                 },
                 log,
@@ -511,31 +511,31 @@ pub(super) fn gravity(model: &ModelEntry, scope: &Scope, log: &mut Log) -> [Exac
 
 /// The entries of a vector; zero where one is absent or faulty.
 pub(super) fn vector(
-    vector: &Vector,
-    scope: &Scope,
-    wanted: Wanted<'_>,
-    log: &mut Log,
-) -> [Exact; 3] {
+    vector: &FormulaVector,
+    scope: &FormulaScope,
+    wanted: FormulaRequirement<'_>,
+    log: &mut DiagnosticLog,
+) -> [ExactExpression; 3] {
     std::array::from_fn(|i| {
         vector
             .entries
             .get(i)
             .and_then(Option::as_ref)
             .and_then(|formula| scope.resolve(formula, wanted, log))
-            .unwrap_or_else(Exact::zero)
+            .unwrap_or_else(ExactExpression::zero)
     })
 }
 
 /// Warns of constants and parameters that nothing uses.
-pub(super) fn warn_of_unused(symbols: &Symbols, log: &mut Log) {
+pub(super) fn warn_of_unused(symbols: &SymbolTable, log: &mut DiagnosticLog) {
     for (name, meaning) in symbols.scope.iter() {
         let Some(declared) = meaning.declared.filter(|_| !meaning.used.get()) else {
             continue;
         };
         let what = match meaning.sort {
-            Sort::Constant => "constant",
-            Sort::Parameter => "parameter",
-            Sort::Coordinate | Sort::Place => continue,
+            SymbolSort::Constant => "constant",
+            SymbolSort::Parameter => "parameter",
+            SymbolSort::Coordinate | SymbolSort::Place => continue,
         };
         log.push(
             Diagnostic::warning(declared, format!("nothing uses the {what} `{name}`"))

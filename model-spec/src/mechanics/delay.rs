@@ -1,33 +1,33 @@
 //! Forces that are read later than they act.
 
-use crate::exact::Symbol;
+use crate::exact::ModelSymbol;
 use crate::kinds::ActsOn;
-use crate::mechanics::{Entry, Symbols};
-use crate::mechanism::{Constant, Effect};
-use crate::unit::Dimension;
+use crate::mechanics::{MechanicsEntry, MechanicsSymbols};
+use crate::mechanism::{ModelConstant, ModelEffect};
+use crate::unit::UnitDimension;
 
-pub(crate) struct Delay;
+pub(crate) struct DelayMechanics;
 
-impl Entry for Delay {
-    fn words(&self) -> &'static str {
+impl MechanicsEntry for DelayMechanics {
+    fn description(&self) -> &'static str {
         "forces of recordings are those of T before"
     }
 
-    fn lead(&self) -> &'static str {
+    fn introduction(&self) -> &'static str {
         "lets forces be read later than they act, s: "
     }
 
-    fn on(&self) -> ActsOn {
+    fn acts_on(&self) -> ActsOn {
         ActsOn::Force
     }
 
-    fn constants(&self) -> Symbols {
-        &[("T", Dimension::TIME)]
+    fn constants(&self) -> MechanicsSymbols {
+        &[("T", UnitDimension::TIME)]
     }
 
-    fn force_delay(&self, effect: &Effect, constants: &[Constant]) -> f64 {
+    fn force_delay(&self, effect: &ModelEffect, constants: &[ModelConstant]) -> f64 {
         let value = |symbol| match symbol {
-            Symbol::Constant(idx) => constants[idx.0].value,
+            ModelSymbol::Constant(idx) => constants[idx.0].value,
             _ => f64::NAN,
         };
         let time = effect.constants.iter().find(|(name, _)| name == "T");

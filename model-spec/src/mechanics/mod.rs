@@ -10,15 +10,15 @@ mod rod;
 mod strut;
 mod tilt;
 
-use crate::build::effect_places::Scene;
-use crate::build::symbols::Symbols as Names;
-use crate::diagnostic::Log;
-use crate::exact::Exact;
+use crate::build::effect_places::EffectTargets;
+use crate::build::symbols::SymbolTable as Names;
+use crate::diagnostic::DiagnosticLog;
+use crate::exact::ExactExpression;
 use crate::kinds::ActsOn;
-use crate::mechanism::{Bodies, Constant, Effect, EffectTerm, Mechanism, Part, Place, PointIdx};
+use crate::mechanism::{EffectBodies, ModelConstant, ModelEffect, EffectTerm, Mechanism, ModelPart, EffectPlace, PointIdx};
 use crate::schema::EffectEntry;
-use crate::unit::Dimension;
-use crate::values::Name;
+use crate::unit::UnitDimension;
+use crate::values::SpannedName;
 use crate::words::words;
 
 words! {
@@ -45,26 +45,26 @@ words! {
 
 impl Mechanics {
     /// What the variant is and does.
-    pub(crate) fn entry(self) -> &'static dyn Entry {
+    pub(crate) fn entry(self) -> &'static dyn MechanicsEntry {
         match self {
-            Self::Rod => &rod::Rod,
-            Self::Strut => &strut::Strut,
-            Self::Placement => &placement::Placement,
-            Self::Part => &part::Difference,
-            Self::Tilt => &tilt::Tilt,
-            Self::Delay => &delay::Delay,
+            Self::Rod => &rod::RodMechanics,
+            Self::Strut => &strut::StrutMechanics,
+            Self::Placement => &placement::PlacementMechanics,
+            Self::Part => &part::PartMechanics,
+            Self::Tilt => &tilt::TiltMechanics,
+            Self::Delay => &delay::DelayMechanics,
         }
     }
 
     /// What it does, for people, where other kinds have an expression.
-    pub fn words(self) -> &'static str {
-        self.entry().words()
+    pub fn description(self) -> &'static str {
+        self.entry().description()
     }
 
     /// What it does in a model, for people: what stands before its parameters, or before its constants if it has no
     /// parameters.
-    pub fn lead(self) -> &'static str {
-        self.entry().lead()
+    pub fn introduction(self) -> &'static str {
+        self.entry().introduction()
     }
 
     /// What stands before the value of a constant where constants are listed; empty where there is only one.
@@ -78,17 +78,17 @@ impl Mechanics {
     }
 
     /// Whether it could say anything at a place of a model that the model does not say by itself.
-    pub fn has_effect_at(self, mechanism: &Mechanism, place: Place) -> bool {
+    pub fn has_effect_at(self, mechanism: &Mechanism, place: EffectPlace) -> bool {
         self.entry().has_effect_at(mechanism, place)
     }
 
     /// The symbols of the parameters that it has at a place, if these depend on the place.
-    pub fn parameters_at(self, mechanism: &Mechanism, place: Place) -> Option<Vec<&'static str>> {
+    pub fn parameters_at(self, mechanism: &Mechanism, place: EffectPlace) -> Option<Vec<&'static str>> {
         self.entry().parameters_at(place, &mechanism.parts)
     }
 
     /// Which of some places it acts on as one, by their positions in the list; `None` if on each by itself.
-    pub fn groups(self, mechanism: &Mechanism, places: &[Place]) -> Option<Vec<Vec<usize>>> {
+    pub fn groups(self, mechanism: &Mechanism, places: &[EffectPlace]) -> Option<Vec<Vec<usize>>> {
         self.entry().groups(mechanism, places)
     }
 
@@ -98,21 +98,21 @@ impl Mechanics {
     }
 
     /// Whether it is one property of the whole mechanism, which it can have only once.
-    pub(crate) fn is_of_the_whole(self) -> bool {
-        matches!(self.entry().on(), ActsOn::Base | ActsOn::Force)
+    pub(crate) fn is_global(self) -> bool {
+        matches!(self.entry().acts_on(), ActsOn::Base | ActsOn::Force)
     }
 }
 
 /// Symbols with their dimensions.
-pub(crate) type Symbols = &'static [(&'static str, Dimension)];
+pub(crate) type MechanicsSymbols = &'static [(&'static str, UnitDimension)];
 
 /// What one of the [`Mechanics`] is and does.
-pub(crate) trait Entry: Sync {
+pub(crate) trait MechanicsEntry: Sync {
     /// See [`Mechanics::words`].
-    fn words(&self) -> &'static str;
+    fn description(&self) -> &'static str;
 
     /// See [`Mechanics::lead`].
-    fn lead(&self) -> &'static str;
+    fn introduction(&self) -> &'static str;
 
     /// See [`Mechanics::constant_label`].
     fn constant_label(&self, _symbol: &str) -> &'static str {
@@ -120,15 +120,15 @@ pub(crate) trait Entry: Sync {
     }
 
     /// The one sort of place on which it acts.
-    fn on(&self) -> ActsOn;
+    fn acts_on(&self) -> ActsOn;
 
     /// Its parameters, in the order of an effect's terms.
-    fn parameters(&self) -> Symbols {
+    fn parameters(&self) -> MechanicsSymbols {
         &[]
     }
 
     /// Its constants.
-    fn constants(&self) -> Symbols {
+    fn constants(&self) -> MechanicsSymbols {
         &[]
     }
 
@@ -138,14 +138,14 @@ pub(crate) trait Entry: Sync {
     }
 
     /// Reports a place of an effect where there is nothing to act on.
-    fn check_place(&self, _name: &Name, _place: Place, _scene: &Scene<'_>, _log: &mut Log) {}
+    fn check_place(&self, _name: &SpannedName, _place: EffectPlace, _scene: &EffectTargets<'_>, _log: &mut DiagnosticLog) {}
 
     /// Reports places of an effect that do not go together.
-    fn check_places(&self, _names: &[Name], _places: &[Place], _scene: &Scene<'_>, _log: &mut Log) {
+    fn check_places(&self, _names: &[SpannedName], _places: &[EffectPlace], _scene: &EffectTargets<'_>, _log: &mut DiagnosticLog) {
     }
 
     /// See [`Mechanics::parameters_at`].
-    fn parameters_at(&self, _place: Place, _parts: &[Part]) -> Option<Vec<&'static str>> {
+    fn parameters_at(&self, _place: EffectPlace, _parts: &[ModelPart]) -> Option<Vec<&'static str>> {
         None
     }
 
@@ -155,7 +155,7 @@ pub(crate) trait Entry: Sync {
         _entry: &EffectEntry,
         _symbol: &str,
         _those: &[&str],
-        _log: &mut Log,
+        _log: &mut DiagnosticLog,
     ) {
     }
 
@@ -163,26 +163,26 @@ pub(crate) trait Entry: Sync {
     /// if that fails, which is reported.
     fn named_constants(
         &self,
-        values: Vec<(String, Exact)>,
-        _kind: &Name,
+        values: Vec<(String, ExactExpression)>,
+        _kind: &SpannedName,
         _names: &mut Names,
-        _log: &mut Log,
-    ) -> Option<Vec<(String, Exact)>> {
+        _log: &mut DiagnosticLog,
+    ) -> Option<Vec<(String, ExactExpression)>> {
         Some(values)
     }
 
     /// Bodies of an effect.
-    fn bodies(&self, _terms: &[EffectTerm], _places: &[Place], _scene: &Scene<'_>) -> Bodies {
-        Bodies::default()
+    fn bodies(&self, _terms: &[EffectTerm], _places: &[EffectPlace], _scene: &EffectTargets<'_>) -> EffectBodies {
+        EffectBodies::default()
     }
 
     /// Gravity of the mechanism with an effect, for that without it.
-    fn gravity(&self, _effect: &Effect, gravity: [Exact; 3]) -> [Exact; 3] {
+    fn gravity(&self, _effect: &ModelEffect, gravity: [ExactExpression; 3]) -> [ExactExpression; 3] {
         gravity
     }
 
     /// How much later than they act an effect lets forces be read, s.
-    fn force_delay(&self, _effect: &Effect, _constants: &[Constant]) -> f64 {
+    fn force_delay(&self, _effect: &ModelEffect, _constants: &[ModelConstant]) -> f64 {
         0.0
     }
 
@@ -192,7 +192,7 @@ pub(crate) trait Entry: Sync {
     }
 
     /// See [`Mechanics::has_effect_at`].
-    fn has_effect_at(&self, _mechanism: &Mechanism, _place: Place) -> bool {
+    fn has_effect_at(&self, _mechanism: &Mechanism, _place: EffectPlace) -> bool {
         true
     }
 
@@ -202,17 +202,17 @@ pub(crate) trait Entry: Sync {
     }
 
     /// See [`Mechanics::groups`].
-    fn groups(&self, _mechanism: &Mechanism, _places: &[Place]) -> Option<Vec<Vec<usize>>> {
+    fn groups(&self, _mechanism: &Mechanism, _places: &[EffectPlace]) -> Option<Vec<Vec<usize>>> {
         None
     }
 }
 
 /// Gravity of the mechanism with its effects, and how much later than they act its forces are read.
-pub(crate) fn whole(
-    effects: &[Effect],
-    mut gravity: [Exact; 3],
-    constants: &[Constant],
-) -> ([Exact; 3], f64) {
+pub(crate) fn gravity_and_delay(
+    effects: &[ModelEffect],
+    mut gravity: [ExactExpression; 3],
+    constants: &[ModelConstant],
+) -> ([ExactExpression; 3], f64) {
     let mut delay = 0.0;
     for effect in effects {
         if let Some(mechanics) = effect.mechanics {

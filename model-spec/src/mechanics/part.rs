@@ -1,50 +1,50 @@
 //! Differences of one part from what the model file says of it.
 
-use crate::build::effect_places::Scene;
-use crate::diagnostic::{Diagnostic, Log};
-use crate::exact::{Exact, Symbol};
+use crate::build::effect_places::EffectTargets;
+use crate::diagnostic::{Diagnostic, DiagnosticLog};
+use crate::exact::{ExactExpression, ModelSymbol};
 use crate::kinds::ActsOn;
-use crate::mechanics::{Entry, Symbols};
-use crate::mechanism::{Bodies, EffectTerm, Inertial, Mechanism, Part, Place};
+use crate::mechanics::{MechanicsEntry, MechanicsSymbols};
+use crate::mechanism::{EffectBodies, EffectTerm, PartInertia, Mechanism, ModelPart, EffectPlace};
 use crate::schema::EffectEntry;
-use crate::unit::Dimension;
-use crate::values::Name;
+use crate::unit::UnitDimension;
+use crate::values::SpannedName;
 
 /// Differences of mass, first moment and inertia about the origin of the part's frame.
-const DIFFERENCES: Symbols = &[
-    ("dm", Dimension::MASS),
-    ("dmx", Dimension::FIRST_MOMENT),
-    ("dmy", Dimension::FIRST_MOMENT),
-    ("dmz", Dimension::FIRST_MOMENT),
-    ("dJxx", Dimension::INERTIA),
-    ("dJxy", Dimension::INERTIA),
-    ("dJxz", Dimension::INERTIA),
-    ("dJyy", Dimension::INERTIA),
-    ("dJyz", Dimension::INERTIA),
-    ("dJzz", Dimension::INERTIA),
+const DIFFERENCES: MechanicsSymbols = &[
+    ("dm", UnitDimension::MASS),
+    ("dmx", UnitDimension::FIRST_MOMENT),
+    ("dmy", UnitDimension::FIRST_MOMENT),
+    ("dmz", UnitDimension::FIRST_MOMENT),
+    ("dJxx", UnitDimension::INERTIA),
+    ("dJxy", UnitDimension::INERTIA),
+    ("dJxz", UnitDimension::INERTIA),
+    ("dJyy", UnitDimension::INERTIA),
+    ("dJyz", UnitDimension::INERTIA),
+    ("dJzz", UnitDimension::INERTIA),
 ];
 
-pub(crate) struct Difference;
+pub(crate) struct PartMechanics;
 
-impl Entry for Difference {
-    fn words(&self) -> &'static str {
+impl MechanicsEntry for PartMechanics {
+    fn description(&self) -> &'static str {
         "mass, first moments and inertia of this part alone"
     }
 
-    fn lead(&self) -> &'static str {
+    fn introduction(&self) -> &'static str {
         "differences of this part: "
     }
 
-    fn on(&self) -> ActsOn {
+    fn acts_on(&self) -> ActsOn {
         ActsOn::Part
     }
 
-    fn parameters(&self) -> Symbols {
+    fn parameters(&self) -> MechanicsSymbols {
         DIFFERENCES
     }
 
-    fn check_place(&self, name: &Name, place: Place, scene: &Scene<'_>, log: &mut Log) {
-        let Place::Part(part) = place else { return };
+    fn check_place(&self, name: &SpannedName, place: EffectPlace, scene: &EffectTargets<'_>, log: &mut DiagnosticLog) {
+        let EffectPlace::Part(part) = place else { return };
         if !is_only_one(scene.parts, part.0) {
             log.push(
                 Diagnostic::error(
@@ -62,14 +62,14 @@ impl Entry for Difference {
         }
     }
 
-    fn parameters_at(&self, place: Place, parts: &[Part]) -> Option<Vec<&'static str>> {
-        let Place::Part(part) = place else {
+    fn parameters_at(&self, place: EffectPlace, parts: &[ModelPart]) -> Option<Vec<&'static str>> {
+        let EffectPlace::Part(part) = place else {
             return None;
         };
         Some(components(&parts[part.0].inertial))
     }
 
-    fn refuse_parameter(&self, entry: &EffectEntry, symbol: &str, those: &[&str], log: &mut Log) {
+    fn refuse_parameter(&self, entry: &EffectEntry, symbol: &str, those: &[&str], log: &mut DiagnosticLog) {
         let named = entry.parameters.iter().flat_map(|table| &table.entries);
         if let Some((key, _)) = named.into_iter().find(|(key, _)| key.name == symbol) {
             log.push(
@@ -81,37 +81,37 @@ impl Entry for Difference {
     }
 
     /// The differences of each part as a further part of its frame.
-    fn bodies(&self, terms: &[EffectTerm], places: &[Place], scene: &Scene<'_>) -> Bodies {
+    fn bodies(&self, terms: &[EffectTerm], places: &[EffectPlace], scene: &EffectTargets<'_>) -> EffectBodies {
         let value = |i: usize| {
             let term = terms.iter().find(|term| term.symbol == DIFFERENCES[i].0);
-            term.map_or_else(Exact::zero, |term| {
-                Exact::Symbol(Symbol::Parameter(term.parameter))
+            term.map_or_else(ExactExpression::zero, |term| {
+                ExactExpression::Symbol(ModelSymbol::Parameter(term.parameter))
             })
         };
-        let further = |place: &Place| {
-            let Place::Part(part) = place else {
+        let further = |place: &EffectPlace| {
+            let EffectPlace::Part(part) = place else {
                 return None;
             };
             let part = &scene.parts[part.0];
-            Some(Part {
+            Some(ModelPart {
                 name: part.name.clone(),
                 frame: part.frame,
-                inertial: Inertial::Linear {
+                inertial: PartInertia::Linear {
                     mass: value(0),
                     first_moment: std::array::from_fn(|i| value(1 + i)),
                     inertia: std::array::from_fn(|i| value(4 + i)),
                 },
             })
         };
-        Bodies {
+        EffectBodies {
             parts: places.iter().filter_map(further).collect(),
-            ..Bodies::default()
+            ..EffectBodies::default()
         }
     }
 
     /// Where the part shares its parameters with another one.
-    fn has_effect_at(&self, mechanism: &Mechanism, place: Place) -> bool {
-        let Place::Part(part) = place else {
+    fn has_effect_at(&self, mechanism: &Mechanism, place: EffectPlace) -> bool {
+        let EffectPlace::Part(part) = place else {
             return false;
         };
         let parts = &mechanism.parts;
@@ -126,20 +126,20 @@ impl Entry for Difference {
 }
 
 /// Whether no other part has the same name.
-fn is_only_one(parts: &[Part], part: usize) -> bool {
+fn is_only_one(parts: &[ModelPart], part: usize) -> bool {
     let same = parts.iter().filter(|other| other.name == parts[part].name);
     same.count() == 1
 }
 
 /// The quantities that a part has, by the symbols of their differences.
-fn components(inertial: &Inertial) -> Vec<&'static str> {
+fn components(inertial: &PartInertia) -> Vec<&'static str> {
     let (mass, moments, inertia) = match inertial {
-        Inertial::AboutCentre {
+        PartInertia::AboutCentre {
             mass,
             centre,
             inertia,
         } => (mass, centre, inertia),
-        Inertial::Linear {
+        PartInertia::Linear {
             mass,
             first_moment,
             inertia,
@@ -155,13 +155,13 @@ fn components(inertial: &Inertial) -> Vec<&'static str> {
 }
 
 /// The parameters of mass and inertia that another part may have too.
-fn shared_parameters(inertial: &Inertial) -> Vec<crate::ParameterIdx> {
-    let (Inertial::AboutCentre { mass, inertia, .. } | Inertial::Linear { mass, inertia, .. }) =
+fn shared_parameters(inertial: &PartInertia) -> Vec<crate::ParameterIdx> {
+    let (PartInertia::AboutCentre { mass, inertia, .. } | PartInertia::Linear { mass, inertia, .. }) =
         inertial;
     let mut found = Vec::new();
     for exact in std::iter::once(mass).chain(inertia) {
         exact.for_each_symbol(&mut |symbol| {
-            if let Symbol::Parameter(p) = symbol {
+            if let ModelSymbol::Parameter(p) = symbol {
                 found.push(p);
             }
         });

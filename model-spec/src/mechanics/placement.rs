@@ -1,39 +1,39 @@
 //! The moments of lumped masses, taken where their forces are.
 
-use crate::build::effect_places::Scene;
-use crate::diagnostic::{Diagnostic, Log};
-use crate::exact::{Exact, Symbol};
+use crate::build::effect_places::EffectTargets;
+use crate::diagnostic::{Diagnostic, DiagnosticLog};
+use crate::exact::{ExactExpression, ModelSymbol};
 use crate::kinds::ActsOn;
-use crate::mechanics::{Entry, Symbols};
-use crate::mechanism::{Bodies, EffectTerm, LumpedMass, Mechanism, Place, Point};
-use crate::unit::Dimension;
-use crate::values::Name;
+use crate::mechanics::{MechanicsEntry, MechanicsSymbols};
+use crate::mechanism::{EffectBodies, EffectTerm, LumpedMass, Mechanism, EffectPlace, FramePoint};
+use crate::unit::UnitDimension;
+use crate::values::SpannedName;
 
-pub(crate) struct Placement;
+pub(crate) struct PlacementMechanics;
 
-impl Entry for Placement {
-    fn words(&self) -> &'static str {
+impl MechanicsEntry for PlacementMechanics {
+    fn description(&self) -> &'static str {
         "m times the moments at the point, less those at `moment_at`"
     }
 
-    fn lead(&self) -> &'static str {
+    fn introduction(&self) -> &'static str {
         "the moments of lumped masses at the point where their forces act; the mass: "
     }
 
-    fn on(&self) -> ActsOn {
+    fn acts_on(&self) -> ActsOn {
         ActsOn::Point
     }
 
-    fn parameters(&self) -> Symbols {
-        &[("m", Dimension::MASS)]
+    fn parameters(&self) -> MechanicsSymbols {
+        &[("m", UnitDimension::MASS)]
     }
 
     fn n_places(&self) -> Option<usize> {
         None
     }
 
-    fn check_place(&self, name: &Name, place: Place, scene: &Scene<'_>, log: &mut Log) {
-        if displaced(place, &scene.points.points, scene.lumped_masses).is_empty() {
+    fn check_place(&self, name: &SpannedName, place: EffectPlace, scene: &EffectTargets<'_>, log: &mut DiagnosticLog) {
+        if displaced_masses(place, &scene.points.points, scene.lumped_masses).is_empty() {
             log.push(
                 Diagnostic::error(
                     name.span,
@@ -46,13 +46,13 @@ impl Entry for Placement {
     }
 
     /// Masses where forces are taken, less such whose moments are taken elsewhere: what is left are moments.
-    fn bodies(&self, terms: &[EffectTerm], places: &[Place], scene: &Scene<'_>) -> Bodies {
-        let mut bodies = Bodies::default();
+    fn bodies(&self, terms: &[EffectTerm], places: &[EffectPlace], scene: &EffectTargets<'_>) -> EffectBodies {
+        let mut bodies = EffectBodies::default();
         for term in terms {
-            let mass = Exact::Symbol(Symbol::Parameter(term.parameter));
+            let mass = ExactExpression::Symbol(ModelSymbol::Parameter(term.parameter));
             let all = places
                 .iter()
-                .flat_map(|place| displaced(*place, &scene.points.points, scene.lumped_masses));
+                .flat_map(|place| displaced_masses(*place, &scene.points.points, scene.lumped_masses));
             for lump in all {
                 bodies.lumped_masses.push(LumpedMass {
                     mass: mass.clone(),
@@ -69,16 +69,16 @@ impl Entry for Placement {
         bodies
     }
 
-    fn has_effect_at(&self, mechanism: &Mechanism, place: Place) -> bool {
-        !displaced(place, &mechanism.points, &mechanism.lumped_masses).is_empty()
+    fn has_effect_at(&self, mechanism: &Mechanism, place: EffectPlace) -> bool {
+        !displaced_masses(place, &mechanism.points, &mechanism.lumped_masses).is_empty()
     }
 
     /// Shares of one mass are misplaced together.
-    fn groups(&self, mechanism: &Mechanism, places: &[Place]) -> Option<Vec<Vec<usize>>> {
-        let mut groups: Vec<(Vec<&Exact>, Vec<usize>)> = Vec::new();
+    fn groups(&self, mechanism: &Mechanism, places: &[EffectPlace]) -> Option<Vec<Vec<usize>>> {
+        let mut groups: Vec<(Vec<&ExactExpression>, Vec<usize>)> = Vec::new();
         for (i, place) in places.iter().enumerate() {
-            let lumps = displaced(*place, &mechanism.points, &mechanism.lumped_masses);
-            let masses: Vec<&Exact> = lumps.into_iter().map(|lump| &lump.mass).collect();
+            let lumps = displaced_masses(*place, &mechanism.points, &mechanism.lumped_masses);
+            let masses: Vec<&ExactExpression> = lumps.into_iter().map(|lump| &lump.mass).collect();
             match groups.iter_mut().find(|(known, _)| *known == masses) {
                 Some((_, group)) => group.push(i),
                 None => groups.push((masses, vec![i])),
@@ -89,8 +89,8 @@ impl Entry for Placement {
 }
 
 /// Lumped masses whose forces are taken at a point, but whose moments elsewhere.
-fn displaced<'a>(place: Place, points: &[Point], all: &'a [LumpedMass]) -> Vec<&'a LumpedMass> {
-    let Place::Point(point) = place else {
+fn displaced_masses<'a>(place: EffectPlace, points: &[FramePoint], all: &'a [LumpedMass]) -> Vec<&'a LumpedMass> {
+    let EffectPlace::Point(point) = place else {
         return Vec::new();
     };
     let point = &points[point.0];

@@ -1,34 +1,34 @@
 //! A passive element along the line between two points, such as a gas strut, a spring or a damper.
 
-use crate::build::effect_places::Scene;
-use crate::diagnostic::{Diagnostic, Log};
+use crate::build::effect_places::EffectTargets;
+use crate::diagnostic::{Diagnostic, DiagnosticLog};
 use crate::kinds::ActsOn;
-use crate::mechanics::{Entry, Symbols};
-use crate::mechanism::{Drive, DriveKind, Loop, Mechanism, Place, PointIdx};
-use crate::unit::Dimension;
-use crate::values::Name;
+use crate::mechanics::{MechanicsEntry, MechanicsSymbols};
+use crate::mechanism::{ModelDrive, DriveKind, KinematicLoop, Mechanism, EffectPlace, PointIdx};
+use crate::unit::UnitDimension;
+use crate::values::SpannedName;
 
-pub(crate) struct Strut;
+pub(crate) struct StrutMechanics;
 
-impl Entry for Strut {
-    fn words(&self) -> &'static str {
+impl MechanicsEntry for StrutMechanics {
+    fn description(&self) -> &'static str {
         "F0 + k*l + Fv*l' that pull the points together, l their distance"
     }
 
-    fn lead(&self) -> &'static str {
+    fn introduction(&self) -> &'static str {
         "an element between the points that pulls them together, by a constant, by their distance and by its rate: "
     }
 
-    fn on(&self) -> ActsOn {
+    fn acts_on(&self) -> ActsOn {
         ActsOn::Point
     }
 
     /// Of no order in the distance, of first order, and of first order in its rate.
-    fn parameters(&self) -> Symbols {
+    fn parameters(&self) -> MechanicsSymbols {
         &[
-            ("F0", Dimension::FORCE),
-            ("k", Dimension::STIFFNESS),
-            ("Fv", Dimension::DAMPING),
+            ("F0", UnitDimension::FORCE),
+            ("k", UnitDimension::STIFFNESS),
+            ("Fv", UnitDimension::DAMPING),
         ]
     }
 
@@ -36,9 +36,9 @@ impl Entry for Strut {
         Some(2)
     }
 
-    fn check_places(&self, names: &[Name], places: &[Place], scene: &Scene<'_>, log: &mut Log) {
-        let frame = |place: &Place| match place {
-            Place::Point(point) => Some(scene.points.points[point.0].frame),
+    fn check_places(&self, names: &[SpannedName], places: &[EffectPlace], scene: &EffectTargets<'_>, log: &mut DiagnosticLog) {
+        let frame = |place: &EffectPlace| match place {
+            EffectPlace::Point(point) => Some(scene.points.points[point.0].frame),
             _ => None,
         };
         let frames: Vec<_> = places.iter().map(frame).collect();
@@ -61,7 +61,7 @@ impl Entry for Strut {
     fn pairs(&self, mechanism: &Mechanism) -> Option<Vec<[PointIdx; 2]>> {
         let points = &mechanism.points;
         let is_free =
-            |p: &PointIdx| !is_joined(&mechanism.loops, *p) && !is_end(&mechanism.drives, *p);
+            |p: &PointIdx| !is_loop_end(&mechanism.loops, *p) && !is_drive_end(&mechanism.drives, *p);
         let free: Vec<PointIdx> = (0..points.len()).map(PointIdx).filter(is_free).collect();
         let mut pairs = Vec::new();
         for (i, one) in free.iter().enumerate() {
@@ -75,11 +75,11 @@ impl Entry for Strut {
     }
 }
 
-fn is_joined(loops: &[Loop], point: PointIdx) -> bool {
+fn is_loop_end(loops: &[KinematicLoop], point: PointIdx) -> bool {
     loops.iter().any(|one| one.joins.contains(&point))
 }
 
-fn is_end(drives: &[Drive], point: PointIdx) -> bool {
+fn is_drive_end(drives: &[ModelDrive], point: PointIdx) -> bool {
     drives.iter().any(|drive| match drive.kind {
         DriveKind::Linear { from, to } => from == point || to == point,
         DriveKind::Joint(_) => false,

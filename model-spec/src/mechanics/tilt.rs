@@ -1,23 +1,23 @@
 //! A base that stands turned by Rz(tz) Ry(ty) Rx(tx) against the one in which gravity was given.
 
-use crate::build::symbols::Symbols as Names;
-use crate::diagnostic::Log;
-use crate::exact::{ConstantIdx, Exact, Function, Symbol};
+use crate::build::symbols::SymbolTable as Names;
+use crate::diagnostic::DiagnosticLog;
+use crate::exact::{ConstantIdx, ExactExpression, ExactFunction, ModelSymbol};
 use crate::kinds::ActsOn;
-use crate::mechanics::{Entry, Symbols};
-use crate::mechanism::{Constant, Effect};
-use crate::scope::{Sort, meaning};
-use crate::unit::Dimension;
-use crate::values::Name;
+use crate::mechanics::{MechanicsEntry, MechanicsSymbols};
+use crate::mechanism::{ModelConstant, ModelEffect};
+use crate::scope::{SymbolSort, symbol_meaning};
+use crate::unit::UnitDimension;
+use crate::values::SpannedName;
 
-pub(crate) struct Tilt;
+pub(crate) struct TiltMechanics;
 
-impl Entry for Tilt {
-    fn words(&self) -> &'static str {
+impl MechanicsEntry for TiltMechanics {
+    fn description(&self) -> &'static str {
         "gravity turned back by Rz(tz) Ry(ty) Rx(tx)"
     }
 
-    fn lead(&self) -> &'static str {
+    fn introduction(&self) -> &'static str {
         "turns the base by "
     }
 
@@ -29,15 +29,15 @@ impl Entry for Tilt {
         }
     }
 
-    fn on(&self) -> ActsOn {
+    fn acts_on(&self) -> ActsOn {
         ActsOn::Base
     }
 
-    fn constants(&self) -> Symbols {
+    fn constants(&self) -> MechanicsSymbols {
         &[
-            ("tx", Dimension::ONE),
-            ("ty", Dimension::ONE),
-            ("tz", Dimension::ONE),
+            ("tx", UnitDimension::ONE),
+            ("ty", UnitDimension::ONE),
+            ("tz", UnitDimension::ONE),
         ]
     }
 
@@ -45,11 +45,11 @@ impl Entry for Tilt {
     /// ones. Zeros are left out.
     fn named_constants(
         &self,
-        values: Vec<(String, Exact)>,
-        kind: &Name,
+        values: Vec<(String, ExactExpression)>,
+        kind: &SpannedName,
         names: &mut Names,
-        log: &mut Log,
-    ) -> Option<Vec<(String, Exact)>> {
+        log: &mut DiagnosticLog,
+    ) -> Option<Vec<(String, ExactExpression)>> {
         let mut named = Vec::new();
         for (symbol, angle) in values {
             if angle.is_zero() {
@@ -62,10 +62,10 @@ impl Entry for Tilt {
             let name = format!("{symbol}_base");
             let idx = ConstantIdx(names.constants.len());
             let value = angle.evaluate(&|_| 0.0);
-            let mut meaning = meaning(
-                Sort::Constant,
-                Symbol::Constant(idx),
-                Some(Dimension::ONE),
+            let mut meaning = symbol_meaning(
+                SymbolSort::Constant,
+                ModelSymbol::Constant(idx),
+                Some(UnitDimension::ONE),
                 "rad",
                 Some(kind.span),
             );
@@ -74,27 +74,27 @@ impl Entry for Tilt {
             if !names.scope.declare(&name, meaning, log) {
                 return None;
             }
-            names.constants.push(Constant {
+            names.constants.push(ModelConstant {
                 name,
                 value,
                 unit: "rad".to_owned(),
                 is_angle: true,
                 note: Some("tilt of the base".to_owned()),
             });
-            named.push((symbol, Exact::Symbol(Symbol::Constant(idx))));
+            named.push((symbol, ExactExpression::Symbol(ModelSymbol::Constant(idx))));
         }
         Some(named)
     }
 
     /// The transposed rotations, the outermost first.
-    fn gravity(&self, effect: &Effect, mut gravity: [Exact; 3]) -> [Exact; 3] {
+    fn gravity(&self, effect: &ModelEffect, mut gravity: [ExactExpression; 3]) -> [ExactExpression; 3] {
         for (symbol, [from, to]) in [("tz", [0, 1]), ("ty", [2, 0]), ("tx", [1, 2])] {
             let Some((_, angle)) = effect.constants.iter().find(|(name, _)| name == symbol) else {
                 continue;
             };
             let [a, b] = [from, to].map(|i| gravity[i].clone());
-            let cos = Exact::Apply(Function::Cos, Box::new(angle.clone()));
-            let sin = Exact::Apply(Function::Sin, Box::new(angle.clone()));
+            let cos = ExactExpression::Apply(ExactFunction::Cos, Box::new(angle.clone()));
+            let sin = ExactExpression::Apply(ExactFunction::Sin, Box::new(angle.clone()));
             gravity[from] = sum([times(&cos, &a), times(&sin, &b)]);
             gravity[to] = sum([times(&cos, &b), negative(times(&sin, &a))]);
         }
@@ -102,24 +102,24 @@ impl Entry for Tilt {
     }
 }
 
-fn times(a: &Exact, b: &Exact) -> Exact {
+fn times(a: &ExactExpression, b: &ExactExpression) -> ExactExpression {
     if b.is_zero() {
-        return Exact::zero();
+        return ExactExpression::zero();
     }
-    Exact::Product(vec![a.clone(), b.clone()])
+    ExactExpression::Product(vec![a.clone(), b.clone()])
 }
 
-fn negative(a: Exact) -> Exact {
+fn negative(a: ExactExpression) -> ExactExpression {
     if a.is_zero() {
         return a;
     }
-    Exact::Negative(Box::new(a))
+    ExactExpression::Negative(Box::new(a))
 }
 
-fn sum([a, b]: [Exact; 2]) -> Exact {
+fn sum([a, b]: [ExactExpression; 2]) -> ExactExpression {
     match (a.is_zero(), b.is_zero()) {
         (true, _) => b,
         (_, true) => a,
-        _ => Exact::Sum(vec![a, b]),
+        _ => ExactExpression::Sum(vec![a, b]),
     }
 }

@@ -2,17 +2,17 @@
 
 use std::path::Path;
 
-use modelmill_boundary::files::Disk;
-use modelmill_spec::{AddedEffect, Constant, ConstantValue, Loaded, load, load_file};
+use modelmill_boundary::files::DiskFiles;
+use modelmill_spec::{AddedEffect, ModelConstant, ConstantValue, LoadedModel, load, load_file};
 
 const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/models");
 
-fn paper() -> Loaded {
+fn paper() -> LoadedModel {
     load_file(&Path::new(FOLDER).join("spidermill-paper.toml")).unwrap()
 }
 
-fn constant(name: &str, value: f64, unit: &str) -> Constant {
-    Constant {
+fn constant(name: &str, value: f64, unit: &str) -> ModelConstant {
+    ModelConstant {
         name: name.to_owned(),
         value,
         unit: unit.to_owned(),
@@ -92,7 +92,7 @@ fn mean_what_a_file_means() {
     variant.extend(effects.iter().map(text));
     variant.push_str("[constants]\n");
     variant.extend(constants.iter().map(|one| {
-        let Constant {
+        let ModelConstant {
             name,
             value,
             unit,
@@ -107,10 +107,10 @@ fn mean_what_a_file_means() {
     let written = load(
         &format!("{FOLDER}/variant.toml"),
         &variant,
-        &Disk::default(),
+        &DiskFiles::default(),
     )
     .unwrap();
-    let mut joined = paper().with(&constants, &effects).unwrap();
+    let mut joined = paper().with_additions(&constants, &effects).unwrap();
     assert_eq!(
         joined.effects.len(),
         paper().mechanism.effects.len() + effects.len()
@@ -121,8 +121,8 @@ fn mean_what_a_file_means() {
 
 #[test]
 fn what_cannot_be_is_said() {
-    let refused = |constants: &[Constant], effect: AddedEffect| {
-        let failure = paper().with(constants, &[effect]).unwrap_err();
+    let refused = |constants: &[ModelConstant], effect: AddedEffect| {
+        let failure = paper().with_additions(constants, &[effect]).unwrap_err();
         failure.render(false)
     };
     let friction = || effect("coulomb_friction", &["spindle_left"], &[]);

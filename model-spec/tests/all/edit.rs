@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use modelmill_boundary::files::{Disk, Memory};
+use modelmill_boundary::files::{DiskFiles, MemoryFiles};
 use modelmill_spec::edit::{EditFailure, NewEffect, NewParameter, add_effect, add_to_model};
-use modelmill_spec::{Loaded, Mechanics, library, load};
+use modelmill_spec::{LoadedModel, Mechanics, library, load};
 use proptest::prelude::*;
 
 fn folder(path: &str) -> PathBuf {
@@ -24,9 +24,9 @@ fn effect(kind: &str, at: &[&str]) -> NewEffect {
 }
 
 /// Adds an effect to a text that stands beside the bundled models.
-fn add(text: &str, effect: &NewEffect) -> Result<(String, Loaded), String> {
+fn add(text: &str, effect: &NewEffect) -> Result<(String, LoadedModel), String> {
     let path = folder("models/here.toml");
-    add_to_model(&path.to_string_lossy(), text, effect, &[], &Disk::default())
+    add_to_model(&path.to_string_lossy(), text, effect, &[], &DiskFiles::default())
         .map(|edited| (edited.text, edited.loaded))
         .map_err(|failure| failure.to_string())
 }
@@ -347,7 +347,7 @@ fn libraries_of_ones_own() {
     let text = with_effects(
         "library = \"kinds/mine.toml\"\neffect = [{ kind = \"lip_seal\", at = \"motor\" }]",
     );
-    let library = |text: &str| Memory::default().with("some/kinds/mine.toml", text);
+    let library = |text: &str| MemoryFiles::default().with_file("some/kinds/mine.toml", text);
     let loaded = load("some/arm.toml", &text, &library(seal)).unwrap();
     assert!(
         loaded
@@ -368,7 +368,7 @@ fn libraries_of_ones_own() {
         says.contains("some/kinds/mine.toml:4") && says.contains("did you mean `rate`?"),
         "{says}"
     );
-    let failure = load("some/arm.toml", &text, &Memory::default());
+    let failure = load("some/arm.toml", &text, &MemoryFiles::default());
     let says = failure.unwrap_err().render(false);
     assert!(
         says.contains("cannot read `some/kinds/mine.toml`") && !says.contains("unknown kind"),

@@ -4,8 +4,8 @@ use std::fmt::Write as _;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use modelmill_boundary::files::{Disk, Files, Memory};
-use modelmill_spec::{Failure, Severity, load};
+use modelmill_boundary::files::{DiskFiles, FileSource, MemoryFiles};
+use modelmill_spec::{LoadFailure, DiagnosticSeverity, load};
 
 /// Reads a fixture under the path that messages should show.
 fn render(name: &str) -> String {
@@ -18,17 +18,17 @@ fn render(name: &str) -> String {
 }
 
 /// The fixtures under their names alone.
-fn beside(folder: &Path) -> Memory {
-    let paths = Disk::default().list(folder).unwrap();
+fn beside(folder: &Path) -> MemoryFiles {
+    let paths = DiskFiles::default().list(folder).unwrap();
     let files = paths.iter().filter(|path| path.is_file());
-    files.fold(Memory::default(), |files, path| {
-        files.with(path.file_name().unwrap(), std::fs::read(path).unwrap())
+    files.fold(MemoryFiles::default(), |files, path| {
+        files.with_file(path.file_name().unwrap(), std::fs::read(path).unwrap())
     })
 }
 
-fn failure(text: &str) -> Failure {
+fn failure(text: &str) -> LoadFailure {
     let start = Instant::now();
-    let result = load("model.toml", text, &Memory::default());
+    let result = load("model.toml", text, &MemoryFiles::default());
     let took = start.elapsed();
     assert!(took < Duration::from_secs(5), "took {took:?}");
     result.map(|_| ()).expect_err("the file is faulty")
@@ -264,7 +264,7 @@ fn every_error_says_where() {
     );
     let mut places = Vec::new();
     for diagnostic in &found.diagnostics {
-        assert_eq!(diagnostic.severity, Severity::Error);
+        assert_eq!(diagnostic.severity, DiagnosticSeverity::Error);
         let span = diagnostic.span.expect("a place");
         places.push(found.sources.line_and_column(span));
     }
@@ -285,7 +285,7 @@ fn a_file_that_cannot_be_read() {
 fn line_ends_and_marks_of_other_systems() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("models/two_link.toml");
     let text = std::fs::read_to_string(path).unwrap().replace('\n', "\r\n");
-    let none = Memory::default();
+    let none = MemoryFiles::default();
     assert!(load("model.toml", &text, &none).is_ok());
     assert!(load("model.toml", &format!("\u{feff}{text}"), &none).is_ok());
 }

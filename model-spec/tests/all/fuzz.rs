@@ -7,8 +7,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use modelmill_boundary::files::Memory;
-use modelmill_spec::{Severity, load};
+use modelmill_boundary::files::MemoryFiles;
+use modelmill_spec::{DiagnosticSeverity, load};
 
 /// Cases without `MODELMILL_FUZZ_SECONDS`.
 const CASES: u64 = 2000;
@@ -215,7 +215,7 @@ fn mutate(text: &mut String, others: &[(String, String)], random: &mut Random) {
 }
 
 /// What must hold for any text.
-fn check(name: &str, text: &str, others: &Memory) -> bool {
+fn check(name: &str, text: &str, others: &MemoryFiles) -> bool {
     match load(name, text, others) {
         Ok(loaded) => {
             let _ = loaded.render(true);
@@ -223,7 +223,7 @@ fn check(name: &str, text: &str, others: &Memory) -> bool {
                 loaded
                     .warnings
                     .iter()
-                    .all(|found| found.severity == Severity::Warning)
+                    .all(|found| found.severity == DiagnosticSeverity::Warning)
             );
             let mechanism = &loaded.mechanism;
             assert!(
@@ -251,7 +251,7 @@ fn check(name: &str, text: &str, others: &Memory) -> bool {
                 failure
                     .diagnostics
                     .iter()
-                    .any(|found| found.severity == Severity::Error)
+                    .any(|found| found.severity == DiagnosticSeverity::Error)
             );
             assert!(failure.render(false).contains("error"));
             let _ = failure.render(true);
@@ -272,8 +272,8 @@ fn no_text_makes_it_panic_or_hang() {
     let others = corpus();
     let files = others
         .iter()
-        .fold(Memory::default(), |files, (name, text)| {
-            files.with(name, text.as_str())
+        .fold(MemoryFiles::default(), |files, (name, text)| {
+            files.with_file(name, text.as_str())
         });
     let start = Instant::now();
     let (mut cases, mut sound, mut slowest) = (0_u64, 0_u64, Duration::ZERO);

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use modelmill_spec::{Loaded, load_file};
+use modelmill_spec::{LoadedModel, load_file};
 
 fn folder(path: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join(path)
@@ -18,7 +18,7 @@ fn files(path: &str) -> Vec<PathBuf> {
     files
 }
 
-fn model(name: &str) -> Loaded {
+fn model(name: &str) -> LoadedModel {
     load_file(&folder("models").join(name)).unwrap_or_else(|failure| panic!("{failure}"))
 }
 

@@ -1,11 +1,11 @@
 //! Forces that were read later than they act, or earlier: all drives together where their clock is another, some of them where
 //! theirs is.
 
-use modelmill_identify::{Delay, DelayAudit, Delays, Note};
+use modelmill_identify::{DelayEstimate, DelayAudit, ForceDelays, RecordingNote};
 
-use super::rows::Rows;
+use super::rows::AuditRows;
 use crate::model::Model;
-use crate::stretch::Stretch;
+use crate::stretch::RecordingSegment;
 use crate::text::table::{percent, significant};
 
 /// Samples of all drives that are looked at, spread over the recording, and the fewest of each.
@@ -33,13 +33,13 @@ const GAIN_ALONE: f64 = 0.03;
 const GRAVE: f64 = 0.1;
 
 /// What the forces come later or earlier than the motion by.
-pub(super) struct Late {
-    delays: Delays,
+pub(super) struct ForceDelayAudit {
+    delays: ForceDelays,
     step: f64,
 }
 
-impl Late {
-    pub(super) fn of(model: &Model, data: &Stretch) -> Option<Self> {
+impl ForceDelayAudit {
+    pub(super) fn from_segment(model: &Model, data: &RecordingSegment) -> Option<Self> {
         let run = &data.run;
         let forces = run.force.as_deref()?;
         let n = run.time.len();
@@ -55,7 +55,7 @@ impl Late {
         let most = (LOOKED_AT / forces.len().max(1)).max(FEWEST);
         let every = ((to - from) / most).max(1);
         let samples: Vec<usize> = (from..to).step_by(every).collect();
-        let rows = Rows::new(model, data, &samples)?;
+        let rows = AuditRows::new(model, data, &samples)?;
         let drives = forces.len();
         let mut counts = vec![false; samples.len() * drives];
         for (d, rates) in rows.motion[1].iter().enumerate() {
@@ -64,15 +64,15 @@ impl Late {
                 counts[i * drives + d] = rate.abs() > SLOW * fastest;
             }
         }
-        let delays = Delays::of(&DelayAudit {
+        let delays = ForceDelays::from_audit(&DelayAudit {
             regressor: rows.regressor,
-            slope: Rows::slope(model, data, &samples)?,
+            slope: AuditRows::slope(model, data, &samples)?,
             time: rows.time,
-            counts,
-            recorded: &run.time,
+            used_rows: counts,
+            recording_time: &run.time,
             forces,
-            left_out: &run.left_out,
-            longest,
+            excluded_forces: &run.left_out,
+            max_delay: longest,
         })?;
         Some(Self { delays, step })
     }
@@ -80,16 +80,16 @@ impl Late {
     /// What is left with what is found to be late taken into account, relative to what is left without; the geometric mean over
     /// the drives.
     fn gain(&self, with: usize) -> f64 {
-        let [before, after] = [0, with].map(|which| mean(&self.delays.left[which]));
+        let [before, after] = [0, with].map(|which| geometric_mean(&self.delays.residuals[which]));
         1.0 - after / before.max(f64::MIN_POSITIVE)
     }
 
     /// The delay that all drives have, if that is how it is.
-    fn together(&self) -> Option<Delay> {
-        let all = self.delays.together;
-        let alone = &self.delays.alone;
+    fn common_delay(&self) -> Option<DelayEstimate> {
+        let all = self.delays.common;
+        let alone = &self.delays.by_channel;
         // A clock delays all forces alike; where drives differ, it is a law that the model lacks.
-        let differ = |one: &Delay, other: &Delay| {
+        let differ = |one: &DelayEstimate, other: &DelayEstimate| {
             let apart = (one.seconds - other.seconds).abs();
             apart > CLEAR * one.half_width.hypot(other.half_width) + ALIKE * self.step
         };
@@ -97,15 +97,15 @@ impl Late {
             .all(|(d, one)| !alone[..d].iter().any(|other| differ(one, other)));
         // Two drives at least must tell of themselves.
         let telling =
-            |one: &&Delay| one.seconds.abs() > one.half_width && one.seconds * all.seconds > 0.0;
+            |one: &&DelayEstimate| one.seconds.abs() > one.half_width && one.seconds * all.seconds > 0.0;
         let agree = agree && alone.iter().filter(telling).count() >= alone.len().min(2);
         let is_there = self.is_clear(all, CLEAR, LEAST) && self.gain(1) > GAIN;
         (agree && is_there).then_some(all)
     }
 
     /// Drives whose forces are late where others tell that they are not.
-    fn alone(&self) -> Vec<usize> {
-        let Delays { alone, left, .. } = &self.delays;
+    fn delayed_drives(&self) -> Vec<usize> {
+        let ForceDelays { by_channel: alone, residuals: left, .. } = &self.delays;
         let late: Vec<usize> = (0..alone.len())
             .filter(|d| self.is_clear(alone[*d], CLEAR_ALONE, LEAST_ALONE))
             .filter(|d| left[2][*d] < (1.0 - GAIN_ALONE) * left[0][*d])
@@ -128,38 +128,38 @@ impl Late {
         }
     }
 
-    fn is_clear(&self, delay: Delay, clear: f64, least: f64) -> bool {
+    fn is_clear(&self, delay: DelayEstimate, clear: f64, least: f64) -> bool {
         delay.seconds.abs() > (clear * delay.half_width).max(least * self.step)
     }
 
     /// What is left with the delay, as the geometric mean over the drives of their relative errors, where one is told.
-    pub(super) fn left(&self) -> Option<f64> {
-        if self.together().is_some() {
-            Some(mean(&self.delays.left[1]))
+    pub(super) fn residual_with_delay(&self) -> Option<f64> {
+        if self.common_delay().is_some() {
+            Some(geometric_mean(&self.delays.residuals[1]))
         } else {
-            (!self.alone().is_empty()).then(|| mean(&self.delays.left[2]))
+            (!self.delayed_drives().is_empty()).then(|| geometric_mean(&self.delays.residuals[2]))
         }
     }
 
     /// What is to be said.
-    pub(super) fn note(&self, model: &Model, file: &str) -> Option<Note> {
+    pub(super) fn delay_note(&self, model: &Model, file: &str) -> Option<RecordingNote> {
         let names = model.drives();
-        if let Some(all) = self.together() {
-            return Some(self.together_note(all, &names, file));
+        if let Some(all) = self.common_delay() {
+            return Some(self.common_delay_note(all, &names, file));
         }
-        let late = self.alone();
+        let late = self.delayed_drives();
         if late.is_empty() {
             return None;
         }
         let each: Vec<String> = late
             .iter()
             .map(|d| {
-                let one = self.delays.alone[*d];
+                let one = self.delays.by_channel[*d];
                 format!(
                     "The force of `{}` comes {} than the motion that the model explains it by: {}.",
                     names[*d],
-                    side(one),
-                    self.amount(one)
+                    direction_word(one),
+                    self.delay_text(one)
                 )
             })
             .collect();
@@ -167,29 +167,29 @@ impl Late {
             "{} That is so in {file}; forces of the other drives are in time.{} Look at how its samples are stamped, and shift \
              its column.",
             each.join(" "),
-            self.worth(2)
+            self.gain_text(2)
         );
-        Some(self.graded(2, says))
+        Some(self.graded_note(2, says))
     }
 
     /// The note of a delay that all drives have.
-    fn together_note(&self, all: Delay, names: &[String], file: &str) -> Note {
-        let amount = self.amount(all);
+    fn common_delay_note(&self, all: DelayEstimate, names: &[String], file: &str) -> RecordingNote {
+        let amount = self.delay_text(all);
         let mut each = String::new();
         if names.len() > 1 {
-            let of = names.iter().zip(&self.delays.alone).map(|(name, one)| {
+            let of = names.iter().zip(&self.delays.by_channel).map(|(name, one)| {
                 format!(
                     "`{name}` {} +- {}",
-                    rounded(one.seconds / self.step),
+                    rounded_text(one.seconds / self.step),
                     significant(one.half_width / self.step, 2)
                 )
             });
             let of: Vec<String> = of.collect();
             each = format!(" Each drive by itself, in samples: {}.", of.join(", "));
         }
-        let worth = self.worth(1);
+        let worth = self.gain_text(1);
         if all.seconds < 0.0 && -all.seconds < self.step + all.half_width {
-            return Note::info(format!(
+            return RecordingNote::info(format!(
                 "The forces in {file} lead the motion by {amount}, as where a controller sets them after it has read the \
                  positions.{each}{worth}"
             ));
@@ -204,38 +204,38 @@ impl Late {
         };
         let says = format!(
             "The forces in {file} come {} than the motion that the model explains them by: {amount}.{each}{worth}{mend}",
-            side(all)
+            direction_word(all)
         );
-        self.graded(1, says)
+        self.graded_note(1, says)
     }
 
-    fn amount(&self, delay: Delay) -> String {
+    fn delay_text(&self, delay: DelayEstimate) -> String {
         format!(
             "{} samples or {} ms (+- {} ms, 99 %)",
-            rounded(delay.seconds.abs() / self.step),
-            rounded(1e3 * delay.seconds.abs()),
+            rounded_text(delay.seconds.abs() / self.step),
+            rounded_text(1e3 * delay.seconds.abs()),
             significant(1e3 * delay.half_width, 2)
         )
     }
 
     /// What taking a delay out gains.
-    fn worth(&self, with: usize) -> String {
-        let [before, after] = [0, with].map(|which| percent(Some(mean(&self.delays.left[which]))));
+    fn gain_text(&self, with: usize) -> String {
+        let [before, after] = [0, with].map(|which| percent(Some(geometric_mean(&self.delays.residuals[which]))));
         format!(
             " With that the best fit is off by {after} rather than {before} (geometric mean over the drives, away from reversals)."
         )
     }
 
-    fn graded(&self, with: usize, says: String) -> Note {
+    fn graded_note(&self, with: usize, says: String) -> RecordingNote {
         if self.gain(with) > GRAVE {
-            Note::warning(says)
+            RecordingNote::warning(says)
         } else {
-            Note::info(says)
+            RecordingNote::info(says)
         }
     }
 }
 
-fn side(delay: Delay) -> &'static str {
+fn direction_word(delay: DelayEstimate) -> &'static str {
     if delay.seconds > 0.0 {
         "later"
     } else {
@@ -244,13 +244,13 @@ fn side(delay: Delay) -> &'static str {
 }
 
 /// The geometric mean.
-fn mean(parts: &[f64]) -> f64 {
+fn geometric_mean(parts: &[f64]) -> f64 {
     let logarithms = parts.iter().map(|part| part.max(f64::MIN_POSITIVE).ln());
     (logarithms.sum::<f64>() / parts.len().max(1) as f64).exp()
 }
 
 /// Two decimals where they say something.
-fn rounded(value: f64) -> String {
+fn rounded_text(value: f64) -> String {
     if value.abs() < 10.0 {
         format!("{value:.2}")
     } else {

@@ -5,13 +5,13 @@
 //! not pull the fit to itself. A law that the model lacks leaves errors that come again with the motion; an event is rare, lasts,
 //! and stands far above all that the rest of the run leaves.
 
-use modelmill_identify::diagnose::{Disturbance, Quantity};
-use modelmill_identify::{Note, robust_fit};
+use modelmill_identify::diagnose::{Disturbance, EstimatedQuantity};
+use modelmill_identify::{RecordingNote, robust_fit};
 use nalgebra::DVector;
 
-use super::rows::Rows;
+use super::rows::AuditRows;
 use crate::model::Model;
-use crate::stretch::Stretch;
+use crate::stretch::RecordingSegment;
 use crate::text::table::significant;
 
 /// Samples that are looked at.
@@ -42,7 +42,7 @@ const SLOW: f64 = 0.1;
 
 /// An interval in which forces act that no parameters explain.
 #[derive(Clone, Debug)]
-pub(crate) struct Event {
+pub(crate) struct ContactEvent {
     /// When it begins and ends, s.
     pub(crate) from: f64,
     pub(crate) to: f64,
@@ -51,7 +51,7 @@ pub(crate) struct Event {
 }
 
 /// Remarks on the events of a stretch; their forces count no more where they are to be left out.
-pub(super) fn found(model: &Model, data: &mut Stretch, leave_out: bool) -> Vec<Note> {
+pub(super) fn event_notes(model: &Model, data: &mut RecordingSegment, leave_out: bool) -> Vec<RecordingNote> {
     let events = events(model, data).unwrap_or_default();
     let names = model.drives();
     let mut notes = Vec::new();
@@ -69,7 +69,7 @@ pub(super) fn found(model: &Model, data: &mut Stretch, leave_out: bool) -> Vec<N
                 )
             })
             .collect();
-        notes.push(Note::warning(format!(
+        notes.push(RecordingNote::warning(format!(
             "From {} to {} s of {} forces differ from all that parameters explain, {}, as in a contact or a push. {}",
             significant(event.from, 5),
             significant(event.to, 5),
@@ -88,11 +88,11 @@ pub(super) fn found(model: &Model, data: &mut Stretch, leave_out: bool) -> Vec<N
             kind: "contact_event".to_owned(),
             at: drives.clone().map(|(d, _, _)| names[*d].clone()).collect(),
             estimates: drives
-                .map(|(d, largest, _)| Quantity::new("largest", *largest, model.force_unit(*d)))
+                .map(|(d, largest, _)| EstimatedQuantity::new("largest", *largest, model.force_unit(*d)))
                 .collect(),
             recordings: vec![data.run.file.clone()],
             interval: Some([event.from, event.to]),
-            says: None,
+            description: None,
         });
     }
     if leave_out {
@@ -102,7 +102,7 @@ pub(super) fn found(model: &Model, data: &mut Stretch, leave_out: bool) -> Vec<N
 }
 
 /// Forces within events count no more.
-pub(crate) fn leave_out_events(data: &mut Stretch, events: &[Event]) {
+pub(crate) fn leave_out_events(data: &mut RecordingSegment, events: &[ContactEvent]) {
     if events.is_empty() {
         return;
     }
@@ -112,7 +112,7 @@ pub(crate) fn leave_out_events(data: &mut Stretch, events: &[Event]) {
         run.left_out = vec![vec![false; run.time.len()]; drives];
     }
     for (i, time) in run.time.iter().enumerate() {
-        let is_in = |event: &Event| (event.from..=event.to).contains(time);
+        let is_in = |event: &ContactEvent| (event.from..=event.to).contains(time);
         if events.iter().any(is_in) {
             run.left_out.iter_mut().for_each(|out| out[i] = true);
         }
@@ -120,20 +120,20 @@ pub(crate) fn leave_out_events(data: &mut Stretch, events: &[Event]) {
 }
 
 /// The events of a stretch; `None` where too little is there to tell.
-pub(crate) fn events(model: &Model, data: &Stretch) -> Option<Vec<Event>> {
+pub(crate) fn events(model: &Model, data: &RecordingSegment) -> Option<Vec<ContactEvent>> {
     let run = &data.run;
     let forces = run.force.as_deref()?;
     let n = run.time.len();
     let duration = run.time.last()? - run.time.first()?;
-    let wanted = LOOKED_AT.max(whole(FINE * duration));
+    let wanted = LOOKED_AT.max(floor_to_count(FINE * duration));
     let samples: Vec<usize> = (0..n).step_by((n / wanted).max(1)).collect();
     let rate = samples.len() as f64 / duration;
-    let together = whole(SHORTEST * rate).clamp(FEWEST_TOGETHER, MOST_TOGETHER);
+    let together = floor_to_count(SHORTEST * rate).clamp(FEWEST_TOGETHER, MOST_TOGETHER);
     if samples.len() < 40 * MOST_TOGETHER {
         return None;
     }
-    let rest = Unexplained::of(model, data, forces, &samples)?;
-    let levels: Vec<Level> = (0..forces.len()).map(|d| rest.level(d, together)).collect();
+    let rest = UnexplainedForces::new(model, data, forces, &samples)?;
+    let levels: Vec<ResidualLevel> = (0..forces.len()).map(|d| rest.level(d, together)).collect();
     let flagged: Vec<bool> = (0..samples.len())
         .map(|i| levels.iter().any(|level| level.values[i] > level.bound))
         .collect();
@@ -167,13 +167,13 @@ pub(crate) fn events(model: &Model, data: &Stretch) -> Option<Vec<Event>> {
                 let is_in = |i: &usize| level.values[*i] > level.bound;
                 let within: Vec<usize> = (start..end).filter(is_in).collect();
                 let largest = within.iter().map(|i| level.values[*i]).reduce(f64::max)?;
-                let comes_again = rest.comes_again(d, &within, &around, &level.reverses);
+                let comes_again = rest.is_repeatable(d, &within, &around, &level.reverses);
                 (!comes_again).then_some((d, largest, level.usual))
             });
             let drives: Vec<(usize, f64, f64)> = concerned.collect();
             lasted += end - start;
             if !drives.is_empty() {
-                events.push(Event { from, to, drives });
+                events.push(ContactEvent { from, to, drives });
             }
         }
         i = i.max(start + 1);
@@ -183,32 +183,32 @@ pub(crate) fn events(model: &Model, data: &Stretch) -> Option<Vec<Event>> {
 }
 
 /// What no parameters explain of the forces.
-struct Unexplained {
+struct UnexplainedForces {
     drives: usize,
     rest: DVector<f64>,
     measured: DVector<f64>,
-    rows: Rows,
+    rows: AuditRows,
     counts: Vec<bool>,
 }
 
 /// What is left of a drive's force along a run: medians of neighbours, what is usual of them, and what is too much.
-struct Level {
+struct ResidualLevel {
     values: Vec<f64>,
     reverses: Vec<bool>,
     usual: f64,
     bound: f64,
 }
 
-impl Unexplained {
-    fn of(model: &Model, data: &Stretch, forces: &[Vec<f64>], samples: &[usize]) -> Option<Self> {
+impl UnexplainedForces {
+    fn new(model: &Model, data: &RecordingSegment, forces: &[Vec<f64>], samples: &[usize]) -> Option<Self> {
         let drives = forces.len();
-        let rows = Rows::new(model, data, samples)?;
+        let rows = AuditRows::new(model, data, samples)?;
         let of_samples = samples
             .iter()
             .flat_map(|k| forces.iter().map(move |force| force[*k]));
         let measured = DVector::from_iterator(samples.len() * drives, of_samples);
         let counts: Vec<bool> = (samples.iter())
-            .flat_map(|k| (0..drives).map(move |d| data.run.counts(d, *k)))
+            .flat_map(|k| (0..drives).map(move |d| data.run.is_force_measured(d, *k)))
             .collect();
         // A long run is fitted on a part of its samples.
         let every = (samples.len() / LOOKED_AT).max(1);
@@ -218,8 +218,8 @@ impl Unexplained {
             .collect();
         let some_count: Vec<bool> = some.iter().map(|row| counts[*row]).collect();
         let some_measured = measured.select_rows(&some);
-        let fit = robust_fit(&rows.regressor.every(every), &some_measured, &some_count)?;
-        let mut rest = &measured - rows.regressor.times(fit.values.as_slice());
+        let fit = robust_fit(&rows.regressor.subsample(every), &some_measured, &some_count)?;
+        let mut rest = &measured - rows.regressor.multiply(fit.values.as_slice());
         for (rest, _) in rest.iter_mut().zip(&counts).filter(|(_, counts)| !**counts) {
             *rest = 0.0;
         }
@@ -236,12 +236,12 @@ impl Unexplained {
         self.counts.len() / self.drives
     }
 
-    fn level(&self, d: usize, together: usize) -> Level {
+    fn level(&self, d: usize, together: usize) -> ResidualLevel {
         let n = self.samples();
         let at = |i: usize| i * self.drives + d;
         let size = (0..n).map(|i| self.measured[at(i)].powi(2)).sum::<f64>();
         let size = (size / n as f64).sqrt();
-        let reverses = reversing(&self.rows.motion[1][d]);
+        let reverses = reversal_mask(&self.rows.motion[1][d]);
         let values: Vec<f64> = (0..n)
             .map(|i| {
                 let start = i.saturating_sub(together / 2);
@@ -253,7 +253,7 @@ impl Unexplained {
             })
             .collect();
         let usual = quantile(values.clone(), USUAL);
-        Level {
+        ResidualLevel {
             bound: (ABOVE * usual).max(LEAST * size),
             values,
             reverses,
@@ -263,7 +263,7 @@ impl Unexplained {
 
     /// Whether what is left of a drive's force at some samples comes again where its position, rate, acceleration and force are
     /// alike, outside of a range: then it is a law that the model lacks. So it is taken to be where they are nowhere alike.
-    fn comes_again(
+    fn is_repeatable(
         &self,
         d: usize,
         within: &[usize],
@@ -321,7 +321,7 @@ impl Unexplained {
 }
 
 /// Samples at which a drive turns round or stands: friction takes values there that no law of the model may say.
-fn reversing(rate: &[f64]) -> Vec<bool> {
+fn reversal_mask(rate: &[f64]) -> Vec<bool> {
     let fastest = rate.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
     rate.iter().map(|v| v.abs() < SLOW * fastest).collect()
 }
@@ -332,7 +332,7 @@ fn quantile(mut values: Vec<f64>, part: f64) -> f64 {
         return 0.0;
     }
     let last = values.len() - 1;
-    let at = whole(part * last as f64);
+    let at = floor_to_count(part * last as f64);
     *values.select_nth_unstable_by(at, f64::total_cmp).1
 }
 
@@ -342,6 +342,6 @@ fn quantile(mut values: Vec<f64>, part: f64) -> f64 {
     clippy::cast_sign_loss,
     reason = "a float becomes the nearest count there is"
 )]
-fn whole(value: f64) -> usize {
+fn floor_to_count(value: f64) -> usize {
     value as usize
 }

@@ -3,31 +3,31 @@
 use modelmill_identify::ForceAudit;
 use nalgebra::DVector;
 
-use super::rows::Rows;
-use super::{BETTER, Finding, GRAVITY};
+use super::rows::AuditRows;
+use super::{BETTER, AuditFinding, GRAVITY};
 use crate::model::Model;
-use crate::stretch::Stretch;
+use crate::stretch::RecordingSegment;
 use crate::text::table::percent;
 
 /// Relative errors, friction and offsets of the drives taken off, below which nothing is wrong with gravity.
 const BEARABLE: f64 = 0.01;
 
 /// Says so where gravity the other way explains the forces far better.
-pub(super) fn upside_down(
+pub(super) fn reversed_gravity_finding(
     model: &Model,
-    data: &Stretch,
+    data: &RecordingSegment,
     samples: &[usize],
     measured: &DVector<f64>,
-) -> Option<Finding> {
+) -> Option<AuditFinding> {
     if model.gravity().iter().all(|g| *g == 0.0) {
         return None;
     }
     let error = |regressor| ForceAudit::new(regressor)?.error(measured);
-    let before = error(Rows::new(model, data, samples)?.regressor)?;
+    let before = error(AuditRows::new(model, data, samples)?.regressor)?;
     if before < BEARABLE {
         return None;
     }
-    let after = error(Rows::upside_down(model, data, samples)?)?;
+    let after = error(AuditRows::with_reversed_gravity(model, data, samples)?)?;
     (after < BETTER * before).then(|| {
         let says = "gravity seems to pull the other way".to_owned();
         let file = &data.run.file;
@@ -38,6 +38,6 @@ pub(super) fn upside_down(
             percent(Some(before)),
             percent(Some(after))
         );
-        Finding::suspicion(GRAVITY, vec!["base".to_owned()], says, file, note)
+        AuditFinding::suspicion(GRAVITY, vec!["base".to_owned()], says, file, note)
     })
 }

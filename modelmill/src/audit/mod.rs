@@ -7,15 +7,15 @@ mod gravity;
 mod nominal_forces;
 mod rows;
 
-use modelmill_codegen::{Evaluator, States};
+use modelmill_codegen::{ModelEvaluator, MotionStates};
 use modelmill_identify::diagnose::Disturbance;
-use modelmill_identify::{ByChannel, ForceAudit, Note, Suspect};
+use modelmill_identify::{ChannelRegressor, ForceAudit, RecordingNote, WiringFault};
 use nalgebra::{DMatrix, DVector};
 
 use crate::model::Model;
-use crate::stretch::Stretch;
+use crate::stretch::RecordingSegment;
 use crate::text::table::percent;
-use delay::Late;
+use delay::ForceDelayAudit;
 
 /// Kinds of suspicions: before one is cleared up, whatever else is found may be part of it.
 const EXCHANGED: &str = "exchanged_columns";
@@ -47,25 +47,25 @@ const AFFORDABLE: u64 = 20_000_000_000;
 
 /// Looks at every recording that has forces, and adds what it finds to their notes; the forces of contacts and pushes count no
 /// more where `leave_out_events`.
-pub fn examine(model: &Model, data: &mut [Stretch], leave_out_events: bool) {
+pub fn examine(model: &Model, data: &mut [RecordingSegment], leave_out_events: bool) {
     for one in data {
-        for Finding { note, fault } in findings(model, one) {
+        for AuditFinding { note, fault } in findings(model, one) {
             one.note(model, note);
             one.faults.extend(fault);
         }
-        for note in events::found(model, one, leave_out_events) {
+        for note in events::event_notes(model, one, leave_out_events) {
             one.note(model, note);
         }
     }
 }
 
 /// What is told of a recording, and the disturbance that the verdict of a diagnosis begins with.
-struct Finding {
-    note: Note,
+struct AuditFinding {
+    note: RecordingNote,
     fault: Option<Disturbance>,
 }
 
-impl Finding {
+impl AuditFinding {
     /// A suspicion of a kind in [`SUSPICIONS`], as a clause and as the whole note.
     fn suspicion(kind: &str, at: Vec<String>, says: String, file: &str, note: String) -> Self {
         let fault = Disturbance {
@@ -74,16 +74,16 @@ impl Finding {
             estimates: Vec::new(),
             recordings: vec![file.to_owned()],
             interval: None,
-            says: Some(says),
+            description: Some(says),
         };
         Self {
-            note: Note::warning(note),
+            note: RecordingNote::warning(note),
             fault: Some(fault),
         }
     }
 }
 
-fn findings(model: &Model, data: &Stretch) -> Vec<Finding> {
+fn findings(model: &Model, data: &RecordingSegment) -> Vec<AuditFinding> {
     let run = &data.run;
     let n = data.samples();
     let Some(forces) = run.force.as_deref().filter(|_| n > FEWEST) else {
@@ -93,27 +93,27 @@ fn findings(model: &Model, data: &Stretch) -> Vec<Finding> {
     let wanted = (ROWS_LOOKED_AT / n_drives.max(1)).clamp(FEWEST_LOOKED_AT, LOOKED_AT);
     let samples: Vec<usize> = (0..n).step_by((n / wanted).max(1)).collect();
     // Poses without answer are reported with their place when the whole recording is evaluated.
-    let Some(as_it_is) = explained(model, data, &samples, &|_| {}) else {
-        return suspects_of_motion(model, data, &samples);
+    let Some(as_it_is) = force_audit(model, data, &samples, &|_| {}) else {
+        return motion_findings(model, data, &samples);
     };
-    let measured = interleaved(forces, &samples);
+    let measured = interleave_forces(forces, &samples);
     let Some(error) = as_it_is.error(&measured) else {
         return Vec::new();
     };
-    let beside = beside_nominal(model, data, &samples);
-    let late = Late::of(model, data);
-    let with_delay = late.as_ref().and_then(Late::left);
+    let beside = nominal_force_findings(model, data, &samples);
+    let late = ForceDelayAudit::from_segment(model, data);
+    let with_delay = late.as_ref().and_then(ForceDelayAudit::residual_with_delay);
     let mut notes = Vec::new();
     // Forces that are late by a good part of a period look like those of another drive.
     if error > BEARABLE && with_delay.is_none_or(|left| left > BETTER * error) {
         let drives = model.drives();
-        if let Some((suspect, [before, after])) = as_it_is.suspect(&measured)
+        if let Some((suspect, [before, after])) = as_it_is.find_wiring_fault(&measured)
             && after < BETTER * before
             // Nominal values know which drive it is.
-            && (beside.is_empty() || !matches!(suspect, Suspect::Turned(_)))
+            && (beside.is_empty() || !matches!(suspect, WiringFault::Reversed(_)))
         {
             let (kind, at, says) = match suspect {
-                Suspect::Swapped(a, b) => (
+                WiringFault::Swapped(a, b) => (
                     EXCHANGED,
                     vec![a, b],
                     format!(
@@ -121,7 +121,7 @@ fn findings(model: &Model, data: &Stretch) -> Vec<Finding> {
                         drives[a], drives[b]
                     ),
                 ),
-                Suspect::Turned(_) if drives.len() == 2 => (
+                WiringFault::Reversed(_) if drives.len() == 2 => (
                     WRONG_SIGN,
                     vec![0, 1],
                     format!(
@@ -129,7 +129,7 @@ fn findings(model: &Model, data: &Stretch) -> Vec<Finding> {
                         drives[0], drives[1]
                     ),
                 ),
-                Suspect::Turned(a) => (
+                WiringFault::Reversed(a) => (
                     WRONG_SIGN,
                     vec![a],
                     format!("the force of `{}` seems to have the wrong sign", drives[a]),
@@ -143,28 +143,28 @@ fn findings(model: &Model, data: &Stretch) -> Vec<Finding> {
                 percent(Some(after))
             );
             let at = at.into_iter().map(|d| drives[d].clone()).collect();
-            notes.push(Finding::suspicion(kind, at, says, &run.file, note));
+            notes.push(AuditFinding::suspicion(kind, at, says, &run.file, note));
         }
         if notes.is_empty() {
-            notes = suspects_of_motion(model, data, &samples);
+            notes = motion_findings(model, data, &samples);
         }
     }
     // A change of the motion may look like it.
     if notes.is_empty() {
-        notes.extend(gravity::upside_down(model, data, &samples, &measured));
+        notes.extend(gravity::reversed_gravity_finding(model, data, &samples, &measured));
     }
     if notes.is_empty() {
         notes = beside;
     }
     if notes.is_empty() {
-        let late = late.and_then(|late| late.note(model, &run.file));
-        notes.extend(late.map(|note| Finding { note, fault: None }));
+        let late = late.and_then(|late| late.delay_note(model, &run.file));
+        notes.extend(late.map(|note| AuditFinding { note, fault: None }));
     }
     notes
 }
 
 /// Signs and units of the forces, held against those that the nominal values give.
-fn beside_nominal(model: &Model, data: &Stretch, samples: &[usize]) -> Vec<Finding> {
+fn nominal_force_findings(model: &Model, data: &RecordingSegment, samples: &[usize]) -> Vec<AuditFinding> {
     let Some(regressor) = regressor(model, data, samples, &|_| {}) else {
         return Vec::new();
     };
@@ -176,7 +176,7 @@ fn beside_nominal(model: &Model, data: &Stretch, samples: &[usize]) -> Vec<Findi
         (0..n).map(of).collect()
     };
     let expected = by_drive(regressor * &nominal);
-    let upside_down = rows::upside_down(model, data, samples);
+    let upside_down = rows::regressor_with_reversed_gravity(model, data, samples);
     let upside_down = upside_down.map(|rows| by_drive(rows * &nominal));
     let measured: Vec<Vec<f64>> = forces
         .iter()
@@ -188,11 +188,11 @@ fn beside_nominal(model: &Model, data: &Stretch, samples: &[usize]) -> Vec<Findi
 }
 
 /// Positions, rates and accelerations, `[order][coordinate][sample]`.
-type Motion = [Vec<Vec<f64>>; 3];
+type MotionColumns = [Vec<Vec<f64>>; 3];
 /// What could be done to a recording's motion to make sense of it.
-type Change<'a> = dyn Fn(&mut Motion) + 'a;
+type MotionChange<'a> = dyn Fn(&mut MotionColumns) + 'a;
 /// Forces at some samples, those of all drives one after the other.
-fn interleaved(forces: &[Vec<f64>], samples: &[usize]) -> DVector<f64> {
+fn interleave_forces(forces: &[Vec<f64>], samples: &[usize]) -> DVector<f64> {
     let rows = samples
         .iter()
         .flat_map(|k| forces.iter().map(move |force| force[*k]));
@@ -200,18 +200,18 @@ fn interleaved(forces: &[Vec<f64>], samples: &[usize]) -> DVector<f64> {
 }
 
 /// How well the model explains the forces once the motion is changed.
-fn explained(
+fn force_audit(
     model: &Model,
-    data: &Stretch,
+    data: &RecordingSegment,
     samples: &[usize],
-    change: &Change<'_>,
+    change: &MotionChange<'_>,
 ) -> Option<ForceAudit> {
     let regressor = regressor(model, data, samples, change)?;
-    ForceAudit::new(ByChannel::new(&regressor, model.drives().len()))
+    ForceAudit::new(ChannelRegressor::new(&regressor, model.drives().len()))
 }
 
 /// Coordinates that are exchanged or turned round, or angles in degrees.
-fn suspects_of_motion(model: &Model, data: &Stretch, samples: &[usize]) -> Vec<Finding> {
+fn motion_findings(model: &Model, data: &RecordingSegment, samples: &[usize]) -> Vec<AuditFinding> {
     let Some(forces) = data.run.force.as_deref() else {
         return Vec::new();
     };
@@ -231,13 +231,13 @@ fn suspects_of_motion(model: &Model, data: &Stretch, samples: &[usize]) -> Vec<F
     }
     let thinned = thinned(hypotheses.len()).min(most);
     let samples: Vec<usize> = samples.iter().copied().step_by(thinned).collect();
-    let measured = interleaved(forces, &samples);
-    let now = explained(model, data, &samples, &|_| {}).and_then(|audit| audit.error(&measured));
+    let measured = interleave_forces(forces, &samples);
+    let now = force_audit(model, data, &samples, &|_| {}).and_then(|audit| audit.error(&measured));
     let limit = now.map_or(CONVINCING, |error| BETTER * error);
-    let mut tried: Vec<(&Hypothesis, f64)> = hypotheses
+    let mut tried: Vec<(&ColumnHypothesis, f64)> = hypotheses
         .iter()
         .filter_map(|one| {
-            let audit = explained(model, data, &samples, one.change.as_ref())?;
+            let audit = force_audit(model, data, &samples, one.change.as_ref())?;
             Some((one, audit.error(&measured)?))
         })
         .filter(|(_, error)| *error < limit)
@@ -270,11 +270,11 @@ fn suspects_of_motion(model: &Model, data: &Stretch, samples: &[usize]) -> Vec<F
         first.advice,
         percent(Some(*error))
     );
-    vec![Finding::suspicion(first.kind, at, says, file, note)]
+    vec![AuditFinding::suspicion(first.kind, at, says, file, note)]
 }
 
 /// What may have happened to the columns of a motion.
-struct Hypothesis {
+struct ColumnHypothesis {
     /// One of [`SUSPICIONS`].
     kind: &'static str,
     /// Coordinates that it changes.
@@ -283,14 +283,14 @@ struct Hypothesis {
     says: String,
     /// What to do about it.
     advice: String,
-    change: Box<Change<'static>>,
+    change: Box<MotionChange<'static>>,
 }
 
 /// Angles in degrees, coordinates with the wrong sign, and pairs that are exchanged.
-fn hypotheses(model: &Model, maps_from_degrees: &str) -> Vec<Hypothesis> {
+fn hypotheses(model: &Model, maps_from_degrees: &str) -> Vec<ColumnHypothesis> {
     let motions = model.motions();
     let mut hypotheses = Vec::new();
-    let scaled = |coordinates: Vec<usize>, factor: f64| -> Box<Change<'static>> {
+    let scaled = |coordinates: Vec<usize>, factor: f64| -> Box<MotionChange<'static>> {
         Box::new(move |states| {
             for order in states.iter_mut() {
                 for i in &coordinates {
@@ -303,7 +303,7 @@ fn hypotheses(model: &Model, maps_from_degrees: &str) -> Vec<Hypothesis> {
     };
     let angles: Vec<usize> = (0..motions.len()).filter(|i| motions[*i].1).collect();
     if !angles.is_empty() {
-        hypotheses.push(Hypothesis {
+        hypotheses.push(ColumnHypothesis {
             kind: UNITS,
             at: angles.iter().map(|i| motions[*i].0.clone()).collect(),
             says: "the angles seem to be in degrees".to_owned(),
@@ -312,7 +312,7 @@ fn hypotheses(model: &Model, maps_from_degrees: &str) -> Vec<Hypothesis> {
         });
     }
     for (a, (name, _)) in motions.iter().enumerate() {
-        hypotheses.push(Hypothesis {
+        hypotheses.push(ColumnHypothesis {
             kind: WRONG_SIGN,
             at: vec![name.clone()],
             says: format!("the coordinate `{name}` seems to have the wrong sign"),
@@ -323,7 +323,7 @@ fn hypotheses(model: &Model, maps_from_degrees: &str) -> Vec<Hypothesis> {
     for a in 0..motions.len() {
         for b in a + 1..motions.len() {
             if motions[a].1 == motions[b].1 {
-                hypotheses.push(Hypothesis {
+                hypotheses.push(ColumnHypothesis {
                     kind: EXCHANGED,
                     at: [a, b].map(|i| motions[i].0.clone()).to_vec(),
                     says: format!(
@@ -346,9 +346,9 @@ fn hypotheses(model: &Model, maps_from_degrees: &str) -> Vec<Hypothesis> {
 /// The regressor at some samples, with the states changed.
 fn regressor(
     model: &Model,
-    data: &Stretch,
+    data: &RecordingSegment,
     samples: &[usize],
-    change: &Change<'_>,
+    change: &MotionChange<'_>,
 ) -> Option<DMatrix<f64>> {
     let pick = |columns: &[Vec<f64>]| -> Vec<Vec<f64>> {
         let pick = |column: &Vec<f64>| samples.iter().map(|k| column[*k]).collect();
@@ -358,11 +358,11 @@ fn regressor(
     let mut states = [&run.q, &run.qd, &run.qdd].map(|columns| pick(columns));
     change(&mut states);
     let load = pick(run.force.as_deref().unwrap_or(&[]));
-    let states = States {
+    let states = MotionStates {
         q: states[0].iter().map(Vec::as_slice).collect(),
         qd: states[1].iter().map(Vec::as_slice).collect(),
         qdd: states[2].iter().map(Vec::as_slice).collect(),
         load: load.iter().map(Vec::as_slice).collect(),
     };
-    Evaluator::new(&model.derivation).regressor(&states).ok()
+    ModelEvaluator::new(&model.derivation).regressor(&states).ok()
 }

@@ -2,10 +2,10 @@
 //! forces point the other way or are in another unit come out, with the option that mends it. A fit alone does not show
 //! either, since parameters may take any sign and size.
 
-use modelmill_identify::Note;
-use modelmill_spec::{Drive, Mechanism};
+use modelmill_identify::RecordingNote;
+use modelmill_spec::{ModelDrive, Mechanism};
 
-use super::{Finding, UNITS, WRONG_SIGN};
+use super::{AuditFinding, UNITS, WRONG_SIGN};
 
 /// Below this correlation with the nominal forces nothing is said: friction and wrong nominal values may be behind it.
 const CLEAR: f64 = 0.8;
@@ -21,7 +21,7 @@ const HANGS: &str = " Gravity that pulls the other way would turn them, too: che
 
 /// How a column of forces may have been misread.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Misread {
+enum ForceMisreading {
     /// It points the other way.
     Turned,
     /// Measured in thousands of the unit.
@@ -32,35 +32,35 @@ enum Misread {
 
 /// What is odd about the force of a drive.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Oddity {
+enum ForceOddity {
     /// Sign or unit is another one.
-    Misread(Misread),
+    Misread(ForceMisreading),
     /// As small as that of a motor before its gear, or as its current, by this factor.
     BeforeGear(f64),
 }
 
 /// How much two forces resemble each other, -1 to 1, and by how much the first is larger.
-fn compared(one: &[f64], other: &[f64]) -> (f64, f64) {
+fn correlation_and_ratio(one: &[f64], other: &[f64]) -> (f64, f64) {
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let sizes = [one, other].map(|force| dot(force, force).sqrt());
     (dot(one, other) / (sizes[0] * sizes[1]), sizes[0] / sizes[1])
 }
 
 /// How a measured force is related to the nominal one.
-fn oddity(measured: &[f64], nominal: &[f64]) -> Option<Oddity> {
-    let (correlation, ratio) = compared(measured, nominal);
+fn oddity(measured: &[f64], nominal: &[f64]) -> Option<ForceOddity> {
+    let (correlation, ratio) = correlation_and_ratio(measured, nominal);
     if !correlation.is_finite() || correlation.abs() < CLEAR {
         return None;
     }
     let about = |factor: f64| (factor / TOLERANCE..factor * TOLERANCE).contains(&ratio);
     if about(1e-3) {
-        Some(Oddity::Misread(Misread::TooSmall))
+        Some(ForceOddity::Misread(ForceMisreading::TooSmall))
     } else if about(1e3) {
-        Some(Oddity::Misread(Misread::TooLarge))
+        Some(ForceOddity::Misread(ForceMisreading::TooLarge))
     } else if GEARS.contains(&ratio.recip()) {
-        Some(Oddity::BeforeGear(correlation.signum() / ratio))
+        Some(ForceOddity::BeforeGear(correlation.signum() / ratio))
     } else if correlation < 0.0 && about(1.0) {
-        Some(Oddity::Misread(Misread::Turned))
+        Some(ForceOddity::Misread(ForceMisreading::Turned))
     } else {
         None
     }
@@ -74,45 +74,45 @@ pub(crate) fn oddities(
     nominal: &[Vec<f64>],
     upside_down: Option<&[Vec<f64>]>,
     file: &str,
-) -> Vec<Finding> {
-    let found: Vec<(&Drive, Oddity)> = (mechanism.drives.iter().zip(measured).zip(nominal))
+) -> Vec<AuditFinding> {
+    let found: Vec<(&ModelDrive, ForceOddity)> = (mechanism.drives.iter().zip(measured).zip(nominal))
         .filter_map(|((drive, measured), nominal)| Some((drive, oddity(measured, nominal)?)))
         .collect();
-    let mut told: Vec<Finding> = [Misread::Turned, Misread::TooSmall, Misread::TooLarge]
+    let mut told: Vec<AuditFinding> = [ForceMisreading::Turned, ForceMisreading::TooSmall, ForceMisreading::TooLarge]
         .into_iter()
         .filter_map(|which| {
-            let drives: Vec<&Drive> = found
+            let drives: Vec<&ModelDrive> = found
                 .iter()
-                .filter(|(_, oddity)| *oddity == Oddity::Misread(which))
+                .filter(|(_, oddity)| *oddity == ForceOddity::Misread(which))
                 .map(|(drive, _)| *drive)
                 .collect();
-            let may_hang = which == Misread::Turned
-                && upside_down.is_some_and(|forces| explains(forces, measured));
-            (!drives.is_empty()).then(|| misread(mechanism, &drives, which, may_hang, file))
+            let may_hang = which == ForceMisreading::Turned
+                && upside_down.is_some_and(|forces| is_sign_explained(forces, measured));
+            (!drives.is_empty()).then(|| misreading_finding(mechanism, &drives, which, may_hang, file))
         })
         .collect();
     let before_gears = found.iter().filter_map(|(drive, oddity)| match oddity {
-        Oddity::BeforeGear(factor) => Some((*drive, *factor)),
-        Oddity::Misread(_) => None,
+        ForceOddity::BeforeGear(factor) => Some((*drive, *factor)),
+        ForceOddity::Misread(_) => None,
     });
-    let before_gears: Vec<(&Drive, f64)> = before_gears.collect();
+    let before_gears: Vec<(&ModelDrive, f64)> = before_gears.collect();
     if !before_gears.is_empty() {
-        let note = Note::warning(asks_what_they_are(&before_gears, file));
-        told.push(Finding { note, fault: None });
+        let note = RecordingNote::warning(column_query_text(&before_gears, file));
+        told.push(AuditFinding { note, fault: None });
     }
     told
 }
 
 /// Whether forces resemble those of all drives that resemble them at all, by their sign.
-fn explains(forces: &[Vec<f64>], measured: &[Vec<f64>]) -> bool {
+fn is_sign_explained(forces: &[Vec<f64>], measured: &[Vec<f64>]) -> bool {
     let pairs = measured.iter().zip(forces);
-    let alike = pairs.map(|(measured, forces)| compared(measured, forces).0);
+    let alike = pairs.map(|(measured, forces)| correlation_and_ratio(measured, forces).0);
     let clear: Vec<f64> = alike.filter(|alike| alike.abs() > CLEAR).collect();
     !clear.is_empty() && clear.iter().all(|alike| *alike > 0.0)
 }
 
 /// Asks what the columns of drives are whose forces are so many times as small as the nominal ones.
-fn asks_what_they_are(drives: &[(&Drive, f64)], file: &str) -> String {
+fn column_query_text(drives: &[(&ModelDrive, f64)], file: &str) -> String {
     let each: Vec<String> = drives
         .iter()
         .map(|(drive, factor)| format!("`{}` ({:.0} times)", drive.name, factor.abs()))
@@ -132,13 +132,13 @@ fn asks_what_they_are(drives: &[(&Drive, f64)], file: &str) -> String {
 }
 
 /// Forces of drives that were misread; gravity the other way may be behind it.
-fn misread(
+fn misreading_finding(
     mechanism: &Mechanism,
-    drives: &[&Drive],
-    which: Misread,
+    drives: &[&ModelDrive],
+    which: ForceMisreading,
     may_hang: bool,
     file: &str,
-) -> Finding {
+) -> AuditFinding {
     let names: Vec<String> = drives.iter().map(|d| format!("`{}`", d.name)).collect();
     let (forces, are, they_are) = match drives {
         [_] => ("force", "is", "it is"),
@@ -149,21 +149,21 @@ fn misread(
         .map(|drive| {
             let name = &drive.name;
             match which {
-                Misread::Turned => format!("option `columns` = `{name}=-{name}`"),
-                Misread::TooSmall => {
+                ForceMisreading::Turned => format!("option `columns` = `{name}=-{name}`"),
+                ForceMisreading::TooSmall => {
                     format!(
                         "option `columns` = `{name}={name} [k{}]`",
                         drive.kind.force_unit(&mechanism.coordinates)
                     )
                 }
-                Misread::TooLarge => format!("option `columns` = `{name}={name}/1000`"),
+                ForceMisreading::TooLarge => format!("option `columns` = `{name}={name}/1000`"),
             }
         })
         .collect();
     let (kind, what, if_so) = match which {
-        Misread::Turned => (WRONG_SIGN, "of the opposite sign", "counted the other way"),
-        Misread::TooSmall => (UNITS, "about 1000 times as small", "in kN or kN m"),
-        Misread::TooLarge => (UNITS, "about 1000 times as large", "in mN or mN m"),
+        ForceMisreading::Turned => (WRONG_SIGN, "of the opposite sign", "counted the other way"),
+        ForceMisreading::TooSmall => (UNITS, "about 1000 times as small", "in kN or kN m"),
+        ForceMisreading::TooLarge => (UNITS, "about 1000 times as large", "in mN or mN m"),
     };
     let names = names.join(", ");
     let [or, besides] = if may_hang {
@@ -178,7 +178,7 @@ fn misread(
         maps.join(" ")
     );
     let at = drives.iter().map(|drive| drive.name.clone()).collect();
-    Finding::suspicion(kind, at, says, file, note)
+    AuditFinding::suspicion(kind, at, says, file, note)
 }
 
 #[cfg(test)]
@@ -194,17 +194,17 @@ mod tests {
         };
         let [one, other, opposite]: [Vec<f64>; 3] = [0.0, 1.5, std::f64::consts::PI].map(force);
         let measured = [one.clone(), other.clone()];
-        assert!(explains(&measured, &measured));
+        assert!(is_sign_explained(&measured, &measured));
         // What resembles nothing says nothing.
-        assert!(explains(&[one.clone(), one.clone()], &measured));
-        assert!(!explains(&[other.clone(), one.clone()], &measured));
-        assert!(!explains(&[opposite, other], &measured));
+        assert!(is_sign_explained(&[one.clone(), one.clone()], &measured));
+        assert!(!is_sign_explained(&[other.clone(), one.clone()], &measured));
+        assert!(!is_sign_explained(&[opposite, other], &measured));
     }
 
     #[test]
     fn signs_and_units_are_told_where_forces_are_alike() {
         let nominal: Vec<f64> = (0..200).map(|k| (0.1 * f64::from(k)).sin() + 0.3).collect();
-        let of = |scale: f64, other: f64| -> Option<Oddity> {
+        let of = |scale: f64, other: f64| -> Option<ForceOddity> {
             let cosine = (0..200).map(|k| (0.07 * f64::from(k)).cos());
             let measured: Vec<f64> = nominal
                 .iter()
@@ -214,10 +214,10 @@ mod tests {
             oddity(&measured, &nominal)
         };
         assert_eq!(of(1.3, 0.1), None);
-        assert_eq!(of(-0.8, 0.1), Some(Oddity::Misread(Misread::Turned)));
-        assert_eq!(of(1.4e-3, 0.1), Some(Oddity::Misread(Misread::TooSmall)));
-        assert_eq!(of(-7e2, 0.1), Some(Oddity::Misread(Misread::TooLarge)));
-        let Some(Oddity::BeforeGear(ratio)) = of(-1.0 / 101.0, 0.1) else {
+        assert_eq!(of(-0.8, 0.1), Some(ForceOddity::Misread(ForceMisreading::Turned)));
+        assert_eq!(of(1.4e-3, 0.1), Some(ForceOddity::Misread(ForceMisreading::TooSmall)));
+        assert_eq!(of(-7e2, 0.1), Some(ForceOddity::Misread(ForceMisreading::TooLarge)));
+        let Some(ForceOddity::BeforeGear(ratio)) = of(-1.0 / 101.0, 0.1) else {
             panic!("a gear");
         };
         assert!((ratio / -101.0 - 1.0).abs() < 0.05, "{ratio}");

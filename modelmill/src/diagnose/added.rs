@@ -1,30 +1,30 @@
 //! What was found as entries of a model file, and the edit of the file in memory.
 
-use modelmill_identify::diagnose::FoundEffect;
+use modelmill_identify::diagnose::IdentifiedEffect;
 use modelmill_spec::edit::{NewEffect, NewParameter};
-use modelmill_spec::{EffectKind, Loaded};
+use modelmill_spec::{EffectKind, LoadedModel};
 
 use crate::error::{Error, Outcome};
 use crate::model::Model;
 
-use super::places::spots;
-use super::problem::Answer;
+use super::places::candidate_places;
+use super::problem::DiagnosisSolution;
 
 /// Significant digits of estimates that go into a model file.
 const DIGITS: usize = 5;
 
 /// A model file with everything that was found, not yet written.
 #[derive(Clone, Debug)]
-pub struct Added {
+pub struct CompletedModelFile {
     /// Its text.
     pub text: String,
     /// What it means.
-    pub loaded: Loaded,
+    pub loaded: LoadedModel,
 }
 
 /// The effects that were found, as entries with the estimates for nominal values.
-pub(crate) fn entries(model: &Model, answer: &Answer) -> Vec<NewEffect> {
-    let spots = spots(&model.derivation.mechanism);
+pub(crate) fn entries(model: &Model, answer: &DiagnosisSolution) -> Vec<NewEffect> {
+    let spots = candidate_places(&model.derivation.mechanism);
     let found = answer.diagnosis.effects.iter();
     let entries = found.filter_map(|found| {
         let kinds = &answer.candidates.kinds;
@@ -40,14 +40,14 @@ pub(crate) fn entries(model: &Model, answer: &Answer) -> Vec<NewEffect> {
     // What couples two places may couple each with a third, and is no sum at either.
     let (pairs, others): (Vec<_>, Vec<_>) = entries.partition(|(_, couples)| *couples);
     let only = |entries: Vec<(NewEffect, bool)>| entries.into_iter().map(|(entry, _)| entry);
-    let mut made = apart(only(others).collect());
+    let mut made = split_shared_places(only(others).collect());
     made.extend(only(pairs));
     made
 }
 
 /// Entries of one kind that share places, such as friction at both drives and more of it at one, as entries that do not:
 /// a model file has a kind once at a place. Their parameters add up, since their columns are the same there.
-fn apart(entries: Vec<NewEffect>) -> Vec<NewEffect> {
+fn split_shared_places(entries: Vec<NewEffect>) -> Vec<NewEffect> {
     let mut made: Vec<NewEffect> = Vec::new();
     for entry in entries {
         let meets = |one: &NewEffect| {
@@ -81,7 +81,7 @@ fn apart(entries: Vec<NewEffect>) -> Vec<NewEffect> {
 }
 
 /// An estimate may belong to a parameter, to a constant that was found linearly, or to the product of both.
-fn entry(found: &FoundEffect, kind: &EffectKind, answer: &Answer) -> NewEffect {
+fn entry(found: &IdentifiedEffect, kind: &EffectKind, answer: &DiagnosisSolution) -> NewEffect {
     let parameters = &answer.problem.candidates[found.candidate].parameters;
     let mut effect = NewEffect {
         kind: kind.name.clone(),
@@ -99,20 +99,20 @@ fn entry(found: &FoundEffect, kind: &EffectKind, answer: &Answer) -> NewEffect {
             {
                 effect
                     .constants
-                    .push((constant.to_owned(), rounded(value / of)));
+                    .push((constant.to_owned(), round_significant(value / of)));
             }
         } else if kind.constants.iter().any(|c| c.symbol == symbol) {
-            effect.constants.push((symbol.to_owned(), rounded(*value)));
+            effect.constants.push((symbol.to_owned(), round_significant(*value)));
         } else if kind.parameters.iter().any(|p| p.symbol == symbol) {
             effect.parameters.push(NewParameter {
                 symbol: symbol.to_owned(),
-                nominal: Some(rounded(*value)),
+                nominal: Some(round_significant(*value)),
                 ..NewParameter::default()
             });
         }
     }
     for (_, value) in &mut effect.constants {
-        *value = rounded(*value);
+        *value = round_significant(*value);
     }
     effect
 }
@@ -125,7 +125,7 @@ fn sum(one: &NewEffect, other: &NewEffect) -> NewEffect {
         match known {
             Some(p) => {
                 p.nominal = match (p.nominal, more.nominal) {
-                    (Some(a), Some(b)) => Some(rounded(a + b)),
+                    (Some(a), Some(b)) => Some(round_significant(a + b)),
                     (a, b) => a.or(b),
                 }
             }
@@ -135,13 +135,13 @@ fn sum(one: &NewEffect, other: &NewEffect) -> NewEffect {
     both
 }
 
-pub(crate) fn rounded(value: f64) -> f64 {
+pub(crate) fn round_significant(value: f64) -> f64 {
     let text = format!("{value:.*e}", DIGITS - 1);
     text.parse().unwrap_or(value)
 }
 
 /// Adds entries to the text of a model's file, one after the other.
-pub(crate) fn add(model: &Model, effects: &[NewEffect]) -> Outcome<Added> {
+pub(crate) fn add_entries(model: &Model, effects: &[NewEffect]) -> Outcome<CompletedModelFile> {
     let mut text = model.text().to_owned();
     let mut last = None;
     for effect in effects {
@@ -150,7 +150,7 @@ pub(crate) fn add(model: &Model, effects: &[NewEffect]) -> Outcome<Added> {
         last = Some(edited.loaded);
     }
     let loaded = last.ok_or_else(|| Error::input("there is nothing to add"))?;
-    Ok(Added { text, loaded })
+    Ok(CompletedModelFile { text, loaded })
 }
 
 #[cfg(test)]
@@ -172,13 +172,13 @@ mod tests {
 
     #[test]
     fn what_acts_twice_at_a_place_is_added_up_there() {
-        let made = apart(vec![
+        let made = split_shared_places(vec![
             friction(&["a", "b", "c"], 25.0),
             friction(&["c"], 15.0),
         ]);
         assert_eq!(made, [friction(&["a", "b"], 25.0), friction(&["c"], 40.0)]);
         // The force at each place is what it was, whatever the order.
-        let made = apart(vec![
+        let made = split_shared_places(vec![
             friction(&["c"], 15.0),
             friction(&["a", "b"], 1.0),
             friction(&["a", "b", "c"], 25.0),

@@ -1,16 +1,16 @@
 //! Every effect that may be missing, as the entry that `add` would write, in variants of the model: their derivation gives
 //! the columns of all.
 
-use modelmill_codegen::{Derivation, Guard, Monomial};
+use modelmill_codegen::{Derivation, PoseGuard, ParameterMonomial};
 use modelmill_spec::{
-    AddedEffect, Constant, ConstantValue, Effect, EffectKind, Mechanics, Mechanism, Scale, Search,
+    AddedEffect, ModelConstant, ConstantValue, ModelEffect, EffectKind, Mechanics, Mechanism, Scale, ConstantSearch,
     Sign,
 };
 
 use crate::error::{Error, Outcome};
 use crate::model::Model;
 
-use super::places::{Spot, fits, sets, spots};
+use super::places::{CandidatePlace, is_applicable, place_sets, candidate_places};
 
 /// Values of a constant that are tried where the search has no scale of its own.
 const TRIED: usize = 15;
@@ -20,84 +20,84 @@ const RATES: usize = 14;
 const WAVES: usize = 120;
 
 /// An effect as one entry of a model file.
-pub(crate) struct Single {
+pub(crate) struct SingleCandidate {
     pub kind: usize,
-    pub spots: Vec<Spot>,
-    pub sort: Sort,
+    pub spots: Vec<CandidatePlace>,
+    pub sort: EvaluationFrequency,
     /// Symbols of its parameters with their positions among those of its variant.
     pub parameters: Vec<(String, usize)>,
     /// Symbols of constants that are searched for, with their names in the variant and how.
-    pub constants: Vec<(String, String, Search)>,
+    pub constants: Vec<(String, String, ConstantSearch)>,
     /// Symbols of constants whose values are given.
     pub given: Vec<(String, f64)>,
 }
 
-impl Single {
+impl SingleCandidate {
     /// The symbol of the constant whose value is tried.
     pub(crate) fn range(&self) -> Option<&str> {
-        let is_range = |c: &&(String, String, Search)| matches!(c.2, Search::Range { .. });
+        let is_range = |c: &&(String, String, ConstantSearch)| matches!(c.2, ConstantSearch::Range { .. });
         let found = self.constants.iter().find(is_range);
         found.map(|(symbol, _, _)| symbol.as_str())
     }
 }
 
 /// A candidate: entries whose columns add up, since they share their parameters.
-pub(crate) struct Entry {
+pub(crate) struct CandidateEntry {
     pub singles: Vec<usize>,
 }
 
 /// A kind that is a change of the model rather than columns of its own.
-pub(crate) struct Change {
+pub(crate) struct ChangeCandidate {
     pub kind: usize,
-    pub spot: Spot,
+    pub spot: CandidatePlace,
 }
 
 /// All candidates of a model, derived.
-pub(crate) struct Candidates {
+pub(crate) struct DerivedCandidates {
     pub kinds: Vec<EffectKind>,
-    pub singles: Vec<Single>,
-    pub entries: Vec<Entry>,
+    pub singles: Vec<SingleCandidate>,
+    pub entries: Vec<CandidateEntry>,
     /// Effects whose constants are known.
     pub known: Derivation,
     /// Effects with constants that are searched for, whose columns are evaluated again and again.
     pub searched: Derivation,
     /// Effects that depend on what the drives carry.
-    pub carried: Derivation,
+    pub load_dependent: Derivation,
     /// The base columns as functions of a tilt about x, y and z, whose constants are the last three; with its kind.
-    pub tilt: Option<(Change, Derivation)>,
+    pub tilt: Option<(ChangeCandidate, Derivation)>,
     /// A delay of the forces.
-    pub delay: Option<Change>,
+    pub delay: Option<ChangeCandidate>,
 }
 
 /// How often the columns of an effect are evaluated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Sort {
+pub(crate) enum EvaluationFrequency {
     /// Once.
     Known,
     /// For every value of a constant.
     Searched,
     /// Whenever a fit says anew what the drives carry.
-    Carried,
+    LoadDependent,
 }
 
 /// Derives all candidates of a model.
-pub(crate) fn candidates(model: &Model) -> Outcome<Candidates> {
+pub(crate) fn candidates(model: &Model) -> Outcome<DerivedCandidates> {
     let loaded = &model.loaded;
     let mechanism = &loaded.mechanism;
-    let all = spots(mechanism);
-    let mut singles: Vec<Single> = Vec::new();
+    let all = candidate_places(mechanism);
+    let mut singles: Vec<SingleCandidate> = Vec::new();
     let mut entries = Vec::new();
-    let mut variants: [Variant; 3] = Default::default();
+    let mut variants: [CandidateVariant; 3] = Default::default();
     let (mut tilt, mut delay) = (None, None);
     for (k, kind) in loaded.kinds.iter().enumerate() {
-        let fitting: Vec<&Spot> = all
+        let fitting: Vec<&CandidatePlace> = all
             .iter()
-            .filter(|spot| fits(mechanism, kind, spot))
-            .filter(|spot| kind.places == Some(2) || !has(mechanism, kind, &[*spot]))
+            .filter(|spot| is_applicable(mechanism, kind, spot))
+            .filter(|spot| kind.places == Some(2) || !has_effect(mechanism, kind, &[*spot]))
             .collect();
         if let Some(mechanics @ (Mechanics::Tilt | Mechanics::Delay)) = kind.mechanics {
             if let Some(spot) = fitting.first() {
-                let change = Change {
+                let change = ChangeCandidate {
                     kind: k,
                     spot: (*spot).clone(),
                 };
@@ -117,17 +117,17 @@ pub(crate) fn candidates(model: &Model) -> Outcome<Candidates> {
             continue;
         }
         let first = singles.len();
-        let (places, sums) = sets(mechanism, kind, &fitting, &all);
+        let (places, sums) = place_sets(mechanism, kind, &fitting, &all);
         for spots in places {
-            if kind.places == Some(2) && has(mechanism, kind, &spots) {
+            if kind.places == Some(2) && has_effect(mechanism, kind, &spots) {
                 continue;
             }
-            let single = single(k, kind, &spots, singles.len(), &[]);
+            let single = single_candidate(k, kind, &spots, singles.len(), &[]);
             variants[single.sort as usize].add(mechanism, kind, &single, singles.len());
             singles.push(single);
         }
         for sum in sums {
-            entries.push(Entry {
+            entries.push(CandidateEntry {
                 singles: sum.iter().map(|i| first + i).collect(),
             });
         }
@@ -138,26 +138,26 @@ pub(crate) fn candidates(model: &Model) -> Outcome<Candidates> {
     let searched = searched.derive(model, own, &mut singles)?;
     let carried = carried.derive(model, own, &mut singles)?;
     let tilt = match tilt {
-        Some(change) => Some((change, tilted(model)?)),
+        Some(change) => Some((change, derive_tilt(model)?)),
         None => None,
     };
-    Ok(Candidates {
+    Ok(DerivedCandidates {
         kinds: loaded.kinds.clone(),
         singles,
         entries,
         known,
         searched,
-        carried,
+        load_dependent: carried,
         tilt,
         delay,
     })
 }
 
 /// Whether the model has the effect at all of some places already.
-fn has(mechanism: &Mechanism, kind: &EffectKind, spots: &[&Spot]) -> bool {
-    let holds = |effect: &Effect| {
+fn has_effect(mechanism: &Mechanism, kind: &EffectKind, spots: &[&CandidatePlace]) -> bool {
+    let holds = |effect: &ModelEffect| {
         let has =
-            |spot: &&Spot| effect.places.contains(&spot.place) || effect.other == Some(spot.place);
+            |spot: &&CandidatePlace| effect.places.contains(&spot.place) || effect.other == Some(spot.place);
         spots.iter().all(has)
     };
     let mut effects = mechanism.effects.iter();
@@ -165,13 +165,13 @@ fn has(mechanism: &Mechanism, kind: &EffectKind, spots: &[&Spot]) -> bool {
 }
 
 /// A kind at its places; constants that are given are not searched for.
-pub(crate) fn single(
+pub(crate) fn single_candidate(
     k: usize,
     kind: &EffectKind,
-    spots: &[&Spot],
+    spots: &[&CandidatePlace],
     number: usize,
     given: &[(String, f64)],
-) -> Single {
+) -> SingleCandidate {
     let is_open = |symbol: &str| given.iter().all(|(known, _)| known != symbol);
     let open = kind.constants.iter().filter(|c| is_open(&c.symbol));
     let searched = open.filter_map(|c| {
@@ -179,14 +179,14 @@ pub(crate) fn single(
         Some((c.symbol.clone(), name, c.search?))
     });
     let constants: Vec<_> = searched.collect();
-    let is_range = |c: &(String, String, Search)| c.2 != Search::Linear;
-    Single {
-        sort: if uses_load(kind) {
-            Sort::Carried
+    let is_range = |c: &(String, String, ConstantSearch)| c.2 != ConstantSearch::Linear;
+    SingleCandidate {
+        sort: if is_load_dependent(kind) {
+            EvaluationFrequency::LoadDependent
         } else if constants.iter().any(is_range) {
-            Sort::Searched
+            EvaluationFrequency::Searched
         } else {
-            Sort::Known
+            EvaluationFrequency::Known
         },
         kind: k,
         spots: spots.iter().copied().cloned().collect(),
@@ -197,7 +197,7 @@ pub(crate) fn single(
 }
 
 /// Whether the expression of a kind names the load of its place.
-pub(crate) fn uses_load(kind: &EffectKind) -> bool {
+pub(crate) fn is_load_dependent(kind: &EffectKind) -> bool {
     let mut words = kind
         .expression
         .split(|c: char| !c.is_alphanumeric() && c != '_');
@@ -206,19 +206,19 @@ pub(crate) fn uses_load(kind: &EffectKind) -> bool {
 
 /// The model with effects besides.
 #[derive(Default)]
-pub(crate) struct Variant {
-    constants: Vec<Constant>,
+pub(crate) struct CandidateVariant {
+    constants: Vec<ModelConstant>,
     effects: Vec<AddedEffect>,
     /// Which candidates it holds, in order.
     singles: Vec<usize>,
 }
 
-impl Variant {
+impl CandidateVariant {
     pub(crate) fn add(
         &mut self,
         mechanism: &Mechanism,
         kind: &EffectKind,
-        single: &Single,
+        single: &SingleCandidate,
         number: usize,
     ) {
         self.singles.push(number);
@@ -258,9 +258,9 @@ impl Variant {
         self,
         model: &Model,
         own: usize,
-        singles: &mut [Single],
+        singles: &mut [SingleCandidate],
     ) -> Outcome<Derivation> {
-        let mechanism = &model.loaded.with(&self.constants, &self.effects)?;
+        let mechanism = &model.loaded.with_additions(&self.constants, &self.effects)?;
         let mut wanted = Vec::new();
         for (number, effect) in self.singles.iter().zip(&mechanism.effects[own..]) {
             let terms = effect.terms.iter();
@@ -270,18 +270,18 @@ impl Variant {
             wanted.extend(effect.terms.iter().map(|term| term.parameter.0));
         }
         let is_wanted =
-            |product: &Monomial| product.0.iter().any(|(p, n)| *n == 1 && wanted.contains(p));
+            |product: &ParameterMonomial| product.0.iter().any(|(p, n)| *n == 1 && wanted.contains(p));
         let mut derivation = modelmill_codegen::derive_columns(mechanism, &is_wanted)
             .map_err(|error| Error::derivation(&model.path, error))?;
         // One candidate without a finite value somewhere must not stop the others: who looks at the columns leaves it out.
         let guards = &mut derivation.programs.regressor.guards;
-        guards.retain(|guard| !matches!(guard, Guard::Finite(_)));
+        guards.retain(|guard| !matches!(guard, PoseGuard::Finite(_)));
         Ok(derivation)
     }
 }
 
 /// The base columns of a model as functions of a tilt of its base.
-pub(crate) fn tilted(model: &Model) -> Outcome<Derivation> {
+pub(crate) fn derive_tilt(model: &Model) -> Outcome<Derivation> {
     let names = ["tx", "ty", "tz"].map(|t| (t.to_owned(), format!("candidate_{t}")));
     let constants = names
         .each_ref()
@@ -294,20 +294,20 @@ pub(crate) fn tilted(model: &Model) -> Outcome<Derivation> {
             .to_vec(),
         ..AddedEffect::default()
     };
-    let variant = model.loaded.with(&constants, &[tilt])?;
+    let variant = model.loaded.with_additions(&constants, &[tilt])?;
     let reduction = &model.derivation.reduction;
-    let base: Vec<&Monomial> = reduction
+    let base: Vec<&ParameterMonomial> = reduction
         .retained
         .iter()
         .map(|k| &reduction.products[*k])
         .collect();
-    let is_base = |product: &Monomial| base.contains(&product);
+    let is_base = |product: &ParameterMonomial| base.contains(&product);
     modelmill_codegen::derive_columns(&variant, &is_base)
         .map_err(|error| Error::derivation(&model.path, error))
 }
 
-fn named_constant(name: &str, value: f64, unit: &str) -> Constant {
-    Constant {
+fn named_constant(name: &str, value: f64, unit: &str) -> ModelConstant {
+    ModelConstant {
         name: name.to_owned(),
         value,
         unit: unit.to_owned(),
@@ -318,9 +318,9 @@ fn named_constant(name: &str, value: f64, unit: &str) -> Constant {
 
 /// Values that are tried for the constant that a candidate searches for, given the largest rate and the travel of its place;
 /// one where there is none.
-pub(crate) fn grid(single: &Single, [rate, travel]: [f64; 2]) -> Vec<f64> {
+pub(crate) fn grid(single: &SingleCandidate, [rate, travel]: [f64; 2]) -> Vec<f64> {
     for (_, _, search) in &single.constants {
-        let Search::Range { from, to, of } = *search else {
+        let ConstantSearch::Range { from, to, of } = *search else {
             continue;
         };
         let evenly = |count: usize, low: f64, high: f64| -> Vec<f64> {
@@ -355,8 +355,8 @@ pub(crate) fn grid(single: &Single, [rate, travel]: [f64; 2]) -> Vec<f64> {
 }
 
 /// The sign of a kind's parameter, as the search knows it.
-pub(crate) fn sign(sign: Sign) -> modelmill_identify::diagnose::Sign {
-    use modelmill_identify::diagnose::Sign as Known;
+pub(crate) fn sign(sign: Sign) -> modelmill_identify::diagnose::SignConstraint {
+    use modelmill_identify::diagnose::SignConstraint as Known;
     match sign {
         Sign::Positive => Known::Positive,
         Sign::Negative => Known::Negative,

@@ -1,28 +1,28 @@
 //! An effect that the user names, derived like a candidate, with its columns along recordings.
 
-use modelmill_codegen::Evaluator;
-use modelmill_identify::diagnose::{Candidate, Choice, Column, Effect, Source};
+use modelmill_codegen::ModelEvaluator;
+use modelmill_identify::diagnose::{CandidateEffect, ColumnChoice, ForceColumn, LocatedEffect, ColumnSource};
 use modelmill_spec::edit::NewEffect;
-use modelmill_spec::{ActsOn, DriveKind, EffectKind, Mechanics, Mechanism, Place, Search};
+use modelmill_spec::{ActsOn, DriveKind, EffectKind, Mechanics, Mechanism, EffectPlace, ConstantSearch};
 
 use crate::error::{Error, Outcome};
 use crate::model::Model;
 
-use super::candidates::{Candidates, Change, Entry, Variant, single, tilted, uses_load};
-use super::columns::{carried, columns};
-use super::places::{Spot, spots};
-use crate::regressors::{Runs, regressor};
+use super::candidates::{DerivedCandidates, ChangeCandidate, CandidateEntry, CandidateVariant, single_candidate, derive_tilt, is_load_dependent};
+use super::columns::{load_dependent_columns, candidate_columns};
+use super::places::{CandidatePlace, candidate_places};
+use crate::regressors::{SegmentList, regressor};
 
 /// An effect by its name, with values of its parameters and constants.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Named {
+pub struct NamedEffect {
     /// Kind and places.
-    pub effect: Effect,
+    pub effect: LocatedEffect,
     /// Values by the symbols of the kind, SI units.
     pub values: Vec<(String, f64)>,
 }
 
-impl Named {
+impl NamedEffect {
     /// Reads `KIND@PLACE,PLACE:NAME=VALUE:NAME=VALUE`.
     ///
     /// Fails with what is expected.
@@ -61,7 +61,7 @@ impl Named {
             values.push((symbol.to_owned(), value));
         }
         Ok(Self {
-            effect: Effect {
+            effect: LocatedEffect {
                 kind: kind.trim().to_owned(),
                 at,
             },
@@ -72,7 +72,7 @@ impl Named {
 
 /// Whether constants of an effect that have no given value are searched for or have their usual one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Constants {
+pub(crate) enum ConstantPolicy {
     /// Searched for.
     Searched,
     /// The library's usual value.
@@ -80,20 +80,20 @@ pub(crate) enum Constants {
 }
 
 /// A derived effect.
-pub(crate) struct Chosen {
+pub(crate) struct ChosenEffect {
     /// What the user named.
-    pub named: Named,
+    pub named: NamedEffect,
     /// Its kind.
     pub kind: EffectKind,
-    candidates: Candidates,
+    candidates: DerivedCandidates,
 }
 
 /// Derives a named effect.
 ///
 /// Fails, as `add` would, if kind, place or value is unknown or the model has the effect already.
-pub(crate) fn choose(model: &Model, named: &Named, constants: Constants) -> Outcome<Chosen> {
+pub(crate) fn derive_effect(model: &Model, named: &NamedEffect, constants: ConstantPolicy) -> Outcome<ChosenEffect> {
     let loaded = &model.loaded;
-    check(model, named)?;
+    check_effect(model, named)?;
     let mechanism = &loaded.mechanism;
     let kind_is = |kind: &&EffectKind| kind.name == named.effect.kind;
     let kind = loaded.kinds.iter().find(kind_is).cloned();
@@ -105,52 +105,52 @@ pub(crate) fn choose(model: &Model, named: &Named, constants: Constants) -> Outc
             kind.name
         )));
     }
-    let all = spots(mechanism);
+    let all = candidate_places(mechanism);
     let of_kind = named.effect.at.iter().enumerate().map(|(k, place)| {
         // The other place of a kind is where it does not act.
-        let moves = |one: &&Spot| {
+        let moves = |one: &&CandidatePlace| {
             one.name == *place && matches!(one.sort, ActsOn::Drive | ActsOn::Coordinate)
         };
         match all.iter().find(moves) {
             Some(other) if k > 0 && kind.other.is_some() => Ok(other.clone()),
-            _ => spot(mechanism, &kind, &all, place),
+            _ => find_place(mechanism, &kind, &all, place),
         }
     });
-    let places: Vec<Spot> = of_kind.collect::<Outcome<_>>()?;
+    let places: Vec<CandidatePlace> = of_kind.collect::<Outcome<_>>()?;
     let mut singles = Vec::new();
-    let mut variants: [Variant; 3] = Default::default();
+    let mut variants: [CandidateVariant; 3] = Default::default();
     let mut tilt = None;
     let mut entries = Vec::new();
     if kind.mechanics == Some(Mechanics::Tilt) {
-        let change = Change {
+        let change = ChangeCandidate {
             kind: 0,
             spot: places[0].clone(),
         };
-        tilt = Some((change, tilted(model)?));
+        tilt = Some((change, derive_tilt(model)?));
     } else {
-        let given = given(&kind, named, constants)?;
-        let all: Vec<Place> = places.iter().map(|spot| spot.place).collect();
+        let given = fixed_constants(&kind, named, constants)?;
+        let all: Vec<EffectPlace> = places.iter().map(|spot| spot.place).collect();
         let grouped = kind.mechanics.and_then(|one| one.groups(mechanism, &all));
         let joined = kind.places.is_some() || grouped.is_some();
         let together = if joined { places.len() } else { 1 };
         for group in places.chunks(together) {
-            let group: Vec<&Spot> = group.iter().collect();
-            let one = single(0, &kind, &group, singles.len(), &given);
+            let group: Vec<&CandidatePlace> = group.iter().collect();
+            let one = single_candidate(0, &kind, &group, singles.len(), &given);
             variants[one.sort as usize].add(mechanism, &kind, &one, singles.len());
             singles.push(one);
         }
-        entries.push(Entry {
+        entries.push(CandidateEntry {
             singles: (0..singles.len()).collect(),
         });
     }
     let own = mechanism.effects.len();
     let [known, searched, carried] = variants;
-    Ok(Chosen {
-        candidates: Candidates {
+    Ok(ChosenEffect {
+        candidates: DerivedCandidates {
             kinds: vec![kind.clone()],
             known: known.derive(model, own, &mut singles)?,
             searched: searched.derive(model, own, &mut singles)?,
-            carried: carried.derive(model, own, &mut singles)?,
+            load_dependent: carried.derive(model, own, &mut singles)?,
             singles,
             entries,
             tilt,
@@ -162,7 +162,7 @@ pub(crate) fn choose(model: &Model, named: &Named, constants: Constants) -> Outc
 }
 
 /// What `add` would refuse.
-fn check(model: &Model, named: &Named) -> Outcome {
+fn check_effect(model: &Model, named: &NamedEffect) -> Outcome {
     let kinds = &model.loaded.kinds;
     let mut effect = NewEffect {
         kind: named.effect.kind.clone(),
@@ -201,8 +201,8 @@ fn check(model: &Model, named: &Named) -> Outcome {
 }
 
 /// The place of a kind by its name.
-fn spot(mechanism: &Mechanism, kind: &EffectKind, all: &[Spot], name: &str) -> Outcome<Spot> {
-    let suits = |spot: &&Spot| spot.name == name && kind.on.contains(&spot.sort);
+fn find_place(mechanism: &Mechanism, kind: &EffectKind, all: &[CandidatePlace], name: &str) -> Outcome<CandidatePlace> {
+    let suits = |spot: &&CandidatePlace| spot.name == name && kind.on.contains(&spot.sort);
     if let Some(spot) = all.iter().find(suits) {
         return Ok(spot.clone());
     }
@@ -226,10 +226,10 @@ fn spot(mechanism: &Mechanism, kind: &EffectKind, all: &[Spot], name: &str) -> O
 
 /// Constants with a value: those that are given and, where nothing is searched for, the usual ones. The position of rest
 /// of a spring and its like are found with the parameters in any case.
-fn given(kind: &EffectKind, named: &Named, constants: Constants) -> Outcome<Vec<(String, f64)>> {
+fn fixed_constants(kind: &EffectKind, named: &NamedEffect, constants: ConstantPolicy) -> Outcome<Vec<(String, f64)>> {
     let mut given = Vec::new();
     for constant in &kind.constants {
-        if constant.search == Some(Search::Linear) {
+        if constant.search == Some(ConstantSearch::Linear) {
             continue;
         }
         let said = named
@@ -242,10 +242,10 @@ fn given(kind: &EffectKind, named: &Named, constants: Constants) -> Outcome<Vec<
             .and_then(|text| text.parse::<f64>().ok());
         match (said, constants, constant.search, usual) {
             (Some((_, value)), ..) => given.push((constant.symbol.clone(), *value)),
-            (None, Constants::Usual, Some(_), Some(value)) => {
+            (None, ConstantPolicy::Usual, Some(_), Some(value)) => {
                 given.push((constant.symbol.clone(), value));
             }
-            (None, Constants::Searched, Some(_), _) | (None, _, None, Some(_)) => {}
+            (None, ConstantPolicy::Searched, Some(_), _) | (None, _, None, Some(_)) => {}
             (None, ..) => {
                 return Err(Error::input(format!(
                     "`{}` has no usual value of `{symbol}`; write {}@{}:{symbol}=VALUE",
@@ -260,16 +260,16 @@ fn given(kind: &EffectKind, named: &Named, constants: Constants) -> Outcome<Vec<
     Ok(given)
 }
 
-impl Chosen {
+impl ChosenEffect {
     /// The effect along recordings, with its columns for each value of a constant that is searched for; `None` if it has no
     /// effect. `load` is what the drives carry.
     pub(crate) fn candidate(
         &self,
         model: &Model,
-        all: &Runs<'_>,
-        load: &Column,
-    ) -> Outcome<Option<(Candidate, Vec<Choice>)>> {
-        let mut made = columns(&self.candidates, model, all)?;
+        all: &SegmentList<'_>,
+        load: &ForceColumn,
+    ) -> Outcome<Option<(CandidateEffect, Vec<ColumnChoice>)>> {
+        let mut made = candidate_columns(&self.candidates, model, all)?;
         let grids = std::mem::take(&mut made.grids);
         if let Some(effect) = made.undefined.first() {
             return Err(Error::input(format!(
@@ -282,25 +282,25 @@ impl Chosen {
         let Some(candidate) = made.candidates.into_iter().next() else {
             return Ok(None);
         };
-        let only = |columns: Vec<Column>| {
-            vec![Choice {
+        let only = |columns: Vec<ForceColumn>| {
+            vec![ColumnChoice {
                 constants: Vec::new(),
                 columns,
             }]
         };
         let choices = match &candidate.source {
-            Source::Columns(choices) => choices.clone(),
-            Source::Carried => {
+            ColumnSource::Columns(choices) => choices.clone(),
+            ColumnSource::LoadDependent => {
                 let tried = |single: usize| grids[single].clone();
-                let made = carried(&self.candidates, model, all, load, None, &tried)?;
+                let made = load_dependent_columns(&self.candidates, model, all, load, None, &tried)?;
                 made.into_iter()
                     .next()
                     .map_or_else(Vec::new, |(_, choices)| choices)
             }
-            Source::Tilt(tilt) => {
+            ColumnSource::Tilt(tilt) => {
                 let level = vec![0.0; tilt.axes.len()];
                 let sum = |direction: [f64; 3]| {
-                    let mut sum = Column(vec![None; model.drives().len()]);
+                    let mut sum = ForceColumn(vec![None; model.drives().len()]);
                     for (share, change) in direction.iter().zip(&tilt.components) {
                         for (nominal, change) in model.nominal.iter().zip(&change.base) {
                             sum.add(share * nominal, change);
@@ -310,21 +310,21 @@ impl Chosen {
                 };
                 only(tilt.directions(&level).into_iter().map(sum).collect())
             }
-            Source::Reading(_) | Source::Body(_) | Source::Constant(_) => Vec::new(),
+            ColumnSource::ReadingFault(_) | ColumnSource::Body(_) | ColumnSource::Constant(_) => Vec::new(),
         };
         Ok(Some((candidate, choices)))
     }
 
     /// Whether its force follows from the model's nominal values.
     pub(crate) fn needs_nominal(&self) -> bool {
-        self.candidates.tilt.is_some() || uses_load(&self.kind)
+        self.candidates.tilt.is_some() || is_load_dependent(&self.kind)
     }
 }
 
 /// Columns of the base that are to be found, what the bodies of the nominal model carry, and the force of what is known.
-pub(crate) fn base(model: &Model, all: &Runs<'_>) -> Outcome<(Vec<Column>, Column, Column)> {
-    let every = regressor(all, &Evaluator::new(&model.derivation), model)?;
-    let none = Column(vec![None; model.drives().len()]);
+pub(crate) fn base_columns(model: &Model, all: &SegmentList<'_>) -> Outcome<(Vec<ForceColumn>, ForceColumn, ForceColumn)> {
+    let every = regressor(all, &ModelEvaluator::new(&model.derivation), model)?;
+    let none = ForceColumn(vec![None; model.drives().len()]);
     let (mut load, mut known) = (none.clone(), none);
     let mut free = Vec::new();
     for (k, column) in every.into_iter().enumerate() {
@@ -350,7 +350,7 @@ mod tests {
 
     #[test]
     fn effects_are_read_and_nonsense_is_refused() {
-        let read = Named::parse("stribeck_friction@a,b:Fs=15:vs=-2e-2").unwrap();
+        let read = NamedEffect::parse("stribeck_friction@a,b:Fs=15:vs=-2e-2").unwrap();
         assert_eq!(read.effect.kind, "stribeck_friction");
         assert_eq!(read.effect.at, ["a", "b"]);
         let values = [("Fs".to_owned(), 15.0), ("vs".to_owned(), -0.02)];
@@ -366,7 +366,7 @@ mod tests {
             "spring@a:k=nan",
             "spring@a:k=1:k=2",
         ] {
-            assert!(Named::parse(text).is_err(), "{text}");
+            assert!(NamedEffect::parse(text).is_err(), "{text}");
         }
     }
 }

@@ -1,28 +1,28 @@
 //! Columns of all candidates along the recordings, for every choice of their constants.
 
-use modelmill_codegen::Evaluator;
+use modelmill_codegen::ModelEvaluator;
 use modelmill_identify::diagnose::{
-    Candidate, Choice, Column, Effect, EffectParameter, Fault, Nature, Reading, Sign, Source,
+    CandidateEffect, ColumnChoice, ForceColumn, LocatedEffect, EffectParameter, ReadingFaultKind, CandidateNature, ForceReadingFault, SignConstraint, ColumnSource,
 };
-use modelmill_spec::{ActsOn, EffectKind, Mechanics, Search};
+use modelmill_spec::{ActsOn, EffectKind, Mechanics, ConstantSearch};
 use rayon::prelude::*;
 
 use crate::error::Outcome;
 use crate::model::Model;
-use crate::stretch::Stretch;
+use crate::stretch::RecordingSegment;
 
-use super::candidates::{Candidates, Change, Entry, Single, Sort, grid, sign};
-use super::numbers::Motions;
-use super::places::Spot;
+use super::candidates::{DerivedCandidates, ChangeCandidate, CandidateEntry, SingleCandidate, EvaluationFrequency, grid, sign};
+use super::numbers::PlaceMotions;
+use super::places::CandidatePlace;
 use super::tilt::{TILTS, tilt};
-use crate::regressors::{Runs, regressor_of};
+use crate::regressors::{SegmentList, regressor_of};
 
 /// The kind that is a force of one times its parameter.
 const CONSTANT: &str = "force_offset";
 
 /// Candidates with their columns; where each comes from is said in the same order.
-pub(crate) fn columns(candidates: &Candidates, model: &Model, all: &Runs<'_>) -> Outcome<Made> {
-    let is_linear = |single: &Single| single.constants.iter().any(|c| c.2 == Search::Linear);
+pub(crate) fn candidate_columns(candidates: &DerivedCandidates, model: &Model, all: &SegmentList<'_>) -> Outcome<CandidateColumns> {
+    let is_linear = |single: &SingleCandidate| single.constants.iter().any(|c| c.2 == ConstantSearch::Linear);
     let grids = grids(candidates, model, all)?;
     // Nothing changes in a second round where no constant does.
     let of_known = if candidates.singles.iter().any(is_linear) {
@@ -33,30 +33,30 @@ pub(crate) fn columns(candidates: &Candidates, model: &Model, all: &Runs<'_>) ->
     // `found[single][round]`; columns that are linear in a constant are looked at for its values 0 and 1.
     let longest = grids.iter().map(Vec::len).max().unwrap_or(1);
     let rounds = (0..of_known)
-        .map(|round| (Sort::Known, round))
-        .chain((0..longest).map(|round| (Sort::Searched, round)));
-    let jobs: Vec<(Sort, usize, Vec<usize>)> = rounds
+        .map(|round| (EvaluationFrequency::Known, round))
+        .chain((0..longest).map(|round| (EvaluationFrequency::Searched, round)));
+    let jobs: Vec<(EvaluationFrequency, usize, Vec<usize>)> = rounds
         .map(|(sort, round)| {
             let takes_part = |k: &usize| {
                 candidates.singles[*k].sort == sort
-                    && (sort == Sort::Known || round < grids[*k].len())
+                    && (sort == EvaluationFrequency::Known || round < grids[*k].len())
             };
             let of_round = (0..candidates.singles.len()).filter(takes_part);
             (sort, round, of_round.collect())
         })
         .filter(|(_, _, of_round): &(_, _, Vec<usize>)| !of_round.is_empty())
         .collect();
-    let made: Vec<Outcome<Vec<Vec<Column>>>> = jobs
+    let made: Vec<Outcome<Vec<Vec<ForceColumn>>>> = jobs
         .par_iter()
         .map(|(sort, round, of_round)| {
-            let value = |k: usize, search: &Search| match search {
-                Search::Linear => (*round).min(1) as f64,
-                Search::Range { .. } => grids[k][*round],
+            let value = |k: usize, search: &ConstantSearch| match search {
+                ConstantSearch::Linear => (*round).min(1) as f64,
+                ConstantSearch::Range { .. } => grids[k][*round],
             };
-            singles(candidates, of_round, model, all, *sort, &value)
+            single_columns(candidates, of_round, model, all, *sort, &value)
         })
         .collect();
-    let mut found: Vec<Vec<Vec<Column>>> = vec![Vec::new(); candidates.singles.len()];
+    let mut found: Vec<Vec<Vec<ForceColumn>>> = vec![Vec::new(); candidates.singles.len()];
     for ((_, _, of_round), columns) in jobs.iter().zip(made) {
         for (k, columns) in of_round.iter().zip(columns?) {
             found[*k].push(columns);
@@ -83,10 +83,10 @@ pub(crate) fn columns(candidates: &Candidates, model: &Model, all: &Runs<'_>) ->
             let angle = |axis: &usize| EffectParameter {
                 symbol: TILTS[*axis].to_owned(),
                 unit: "rad".to_owned(),
-                sign: Sign::Any,
+                sign: SignConstraint::Any,
             };
             let parameters = tilt.axes.iter().map(angle).collect();
-            made.push(changed(candidates, change, parameters, Source::Tilt(tilt)));
+            made.push(change_candidate(candidates, change, parameters, ColumnSource::Tilt(tilt)));
             origins.push(None);
         }
     }
@@ -94,20 +94,20 @@ pub(crate) fn columns(candidates: &Candidates, model: &Model, all: &Runs<'_>) ->
         let parameter = EffectParameter {
             symbol: "T".to_owned(),
             unit: "s".to_owned(),
-            sign: Sign::Positive,
+            sign: SignConstraint::Positive,
         };
-        made.push(changed(
+        made.push(change_candidate(
             candidates,
             change,
             vec![parameter],
-            Source::Reading(Reading {
-                fault: Fault::Late,
+            ColumnSource::ReadingFault(ForceReadingFault {
+                kind: ReadingFaultKind::Delayed,
                 channel: None,
             }),
         ));
         origins.push(None);
     }
-    Ok(Made {
+    Ok(CandidateColumns {
         candidates: made,
         origins,
         undefined,
@@ -116,29 +116,29 @@ pub(crate) fn columns(candidates: &Candidates, model: &Model, all: &Runs<'_>) ->
 }
 
 /// Values that are tried for the constant of each single candidate; one where it has none.
-fn grids(candidates: &Candidates, model: &Model, all: &Runs<'_>) -> Outcome<Vec<Vec<f64>>> {
-    let is_known = |single: &Single| single.constants.is_empty();
+fn grids(candidates: &DerivedCandidates, model: &Model, all: &SegmentList<'_>) -> Outcome<Vec<Vec<f64>>> {
+    let is_known = |single: &SingleCandidate| single.constants.is_empty();
     if candidates.singles.iter().all(is_known) {
         return Ok(vec![vec![1.0]; candidates.singles.len()]);
     }
-    let motions = Motions::new(model, all)?;
+    let motions = PlaceMotions::new(model, all)?;
     let scales = shared_scales(candidates, &motions);
     let singles = candidates.singles.iter().zip(scales);
     Ok(singles.map(|(single, scale)| grid(single, scale)).collect())
 }
 
 /// Whether a column holds numbers only.
-fn is_finite(column: &Column) -> bool {
+fn is_finite(column: &ForceColumn) -> bool {
     let mut values = column.0.iter().flatten().flatten();
     values.all(|x| x.is_finite())
 }
 
 /// What an entry would add, and where.
-fn effect(candidates: &Candidates, entry: &Entry) -> Effect {
+fn effect(candidates: &DerivedCandidates, entry: &CandidateEntry) -> LocatedEffect {
     let first = &candidates.singles[entry.singles[0]];
     let singles = entry.singles.iter().map(|k| &candidates.singles[*k]);
     let places = singles.flat_map(|single| &single.spots);
-    Effect {
+    LocatedEffect {
         kind: candidates.kinds[first.kind].name.clone(),
         at: places.map(|spot| spot.name.clone()).collect(),
     }
@@ -146,8 +146,8 @@ fn effect(candidates: &Candidates, entry: &Entry) -> Effect {
 
 /// Largest rate and travel of the place of each single candidate. Places that may share a constant look for it on one grid,
 /// that of the place that moves most.
-fn shared_scales(candidates: &Candidates, motions: &Motions) -> Vec<[f64; 2]> {
-    let own = |single: &Single| motions.scale(single.spots[0].place);
+fn shared_scales(candidates: &DerivedCandidates, motions: &PlaceMotions) -> Vec<[f64; 2]> {
+    let own = |single: &SingleCandidate| motions.scale(single.spots[0].place);
     let mut scales: Vec<[f64; 2]> = candidates.singles.iter().map(own).collect();
     loop {
         let before = scales.clone();
@@ -165,55 +165,55 @@ fn shared_scales(candidates: &Candidates, motions: &Motions) -> Vec<[f64; 2]> {
 }
 
 /// Candidates in numbers.
-pub(crate) struct Made {
+pub(crate) struct CandidateColumns {
     /// Those that have columns.
-    pub(crate) candidates: Vec<Candidate>,
+    pub(crate) candidates: Vec<CandidateEffect>,
     /// Where each comes from, in the same order.
-    pub(crate) origins: Vec<Origin>,
+    pub(crate) origins: Vec<CandidateOrigin>,
     /// Effects whose expressions have no finite value somewhere along the recordings.
-    pub(crate) undefined: Vec<Effect>,
+    pub(crate) undefined: Vec<LocatedEffect>,
     /// Values that are tried for the constant of each single candidate.
     pub(crate) grids: Vec<Vec<f64>>,
 }
 
 /// The entry of the candidates that a candidate in numbers comes from, and which of its parameters have an effect; `None`
 /// where it changes the model rather than adds columns.
-pub(crate) type Origin = Option<(usize, Vec<bool>)>;
+pub(crate) type CandidateOrigin = Option<(usize, Vec<bool>)>;
 
-fn changed(
-    candidates: &Candidates,
-    change: &Change,
+fn change_candidate(
+    candidates: &DerivedCandidates,
+    change: &ChangeCandidate,
     parameters: Vec<EffectParameter>,
-    source: Source,
-) -> Candidate {
-    Candidate {
-        effect: Effect {
+    source: ColumnSource,
+) -> CandidateEffect {
+    CandidateEffect {
+        effect: LocatedEffect {
             kind: candidates.kinds[change.kind].name.clone(),
             at: vec![change.spot.name.clone()],
         },
         parameters,
-        searched: 0,
+        searched_constants: 0,
         is_part_of_load: is_part_of_load(&candidates.kinds[change.kind]),
         refines: None,
-        nature: Nature::Effect,
+        nature: CandidateNature::Effect,
         is_per_run: false,
         source,
     }
 }
 
 /// Columns of some single candidates for given values of their constants.
-fn singles(
-    candidates: &Candidates,
+fn single_columns(
+    candidates: &DerivedCandidates,
     which: &[usize],
     model: &Model,
-    all: &Runs<'_>,
-    sort: Sort,
-    value: &dyn Fn(usize, &Search) -> f64,
-) -> Outcome<Vec<Vec<Column>>> {
+    all: &SegmentList<'_>,
+    sort: EvaluationFrequency,
+    value: &dyn Fn(usize, &ConstantSearch) -> f64,
+) -> Outcome<Vec<Vec<ForceColumn>>> {
     let derivation = match sort {
-        Sort::Known => &candidates.known,
-        Sort::Searched => &candidates.searched,
-        Sort::Carried => &candidates.carried,
+        EvaluationFrequency::Known => &candidates.known,
+        EvaluationFrequency::Searched => &candidates.searched,
+        EvaluationFrequency::LoadDependent => &candidates.load_dependent,
     };
     let mechanism = &derivation.mechanism;
     let mut constants: Vec<f64> = mechanism.constants.iter().map(|c| c.value).collect();
@@ -224,7 +224,7 @@ fn singles(
             }
         }
     }
-    let evaluator = Evaluator::with_constants(derivation, constants);
+    let evaluator = ModelEvaluator::with_constants(derivation, constants);
     let reduction = &derivation.reduction;
     let holds =
         |product: usize, parameter: usize| reduction.products[product].0.contains(&(parameter, 1));
@@ -236,8 +236,8 @@ fn singles(
     };
     let columns = regressor_of(all, &evaluator, model, &wanted)?;
     // Where a parameter stands in products, as a mass whose place is one, the others have their nominal values.
-    let of = |(_, parameter): &(String, usize)| -> Column {
-        let mut sum = Column(vec![None; model.drives().len()]);
+    let of = |(_, parameter): &(String, usize)| -> ForceColumn {
+        let mut sum = ForceColumn(vec![None; model.drives().len()]);
         for (k, product) in reduction.retained.iter().enumerate() {
             let powers = &reduction.products[*product].0;
             if holds(*product, *parameter) {
@@ -259,17 +259,17 @@ fn singles(
 
 /// What the drives must supply for a force or torque of one at each place where the library puts a constant one.
 pub(crate) fn unit_forces(
-    candidates: &Candidates,
+    candidates: &DerivedCandidates,
     model: &Model,
-    all: &Runs<'_>,
-) -> Outcome<Vec<(Spot, Column)>> {
+    all: &SegmentList<'_>,
+) -> Outcome<Vec<(CandidatePlace, ForceColumn)>> {
     let is_constant = |k: &usize| {
         let single = &candidates.singles[*k];
         candidates.kinds[single.kind].name == CONSTANT && single.spots.len() == 1
     };
     let which: Vec<usize> = (0..candidates.singles.len()).filter(is_constant).collect();
-    let made = singles(candidates, &which, model, all, Sort::Known, &|_, _| 1.0)?;
-    let of = |(k, columns): (&usize, Vec<Column>)| {
+    let made = single_columns(candidates, &which, model, all, EvaluationFrequency::Known, &|_, _| 1.0)?;
+    let of = |(k, columns): (&usize, Vec<ForceColumn>)| {
         let column = columns.into_iter().next()?;
         Some((candidates.singles[*k].spots[0].clone(), column))
     };
@@ -278,11 +278,11 @@ pub(crate) fn unit_forces(
 
 /// A candidate from the columns of its single places, with which of its parameters have an effect; `None` if none has.
 fn candidate(
-    candidates: &Candidates,
-    entry: &Entry,
-    found: &[Vec<Vec<Column>>],
+    candidates: &DerivedCandidates,
+    entry: &CandidateEntry,
+    found: &[Vec<Vec<ForceColumn>>],
     grids: &[Vec<f64>],
-) -> Option<(Candidate, Vec<bool>)> {
+) -> Option<(CandidateEffect, Vec<bool>)> {
     let first = &candidates.singles[entry.singles[0]];
     let kind = &candidates.kinds[first.kind];
     let is_part_of_load = is_part_of_load(kind);
@@ -299,21 +299,21 @@ fn candidate(
         })
         .collect();
     let effect = effect(candidates, entry);
-    if first.sort == Sort::Carried {
+    if first.sort == EvaluationFrequency::LoadDependent {
         let felt = vec![true; parameters.len()];
-        let candidate = Candidate {
+        let candidate = CandidateEffect {
             effect,
             parameters,
-            searched: usize::from(first.range().is_some()),
+            searched_constants: usize::from(first.range().is_some()),
             is_part_of_load,
             refines: kind.refines.clone(),
-            nature: Nature::Effect,
+            nature: CandidateNature::Effect,
             is_per_run: false,
-            source: Source::Carried,
+            source: ColumnSource::LoadDependent,
         };
         return Some((candidate, felt));
     }
-    let sum = |round: usize| -> Vec<Column> {
+    let sum = |round: usize| -> Vec<ForceColumn> {
         let mut columns = found[entry.singles[0]][round].clone();
         for other in &entry.singles[1..] {
             let more = &found[*other];
@@ -324,19 +324,19 @@ fn candidate(
         columns
     };
     let searched = first.range();
-    let mut choices: Vec<Choice> = match searched {
+    let mut choices: Vec<ColumnChoice> = match searched {
         Some(symbol) => (grids[entry.singles[0]].iter().enumerate())
-            .map(|(round, value)| Choice {
+            .map(|(round, value)| ColumnChoice {
                 constants: vec![(symbol.to_owned(), *value)],
                 columns: sum(round),
             })
             .collect(),
-        None => vec![Choice {
+        None => vec![ColumnChoice {
             constants: Vec::new(),
             columns: sum(0),
         }],
     };
-    let linear = first.constants.iter().find(|c| c.2 == Search::Linear);
+    let linear = first.constants.iter().find(|c| c.2 == ConstantSearch::Linear);
     if let (None, Some((symbol, _, _))) = (searched, linear) {
         let mut shifts = sum(1);
         for (shift, column) in shifts.iter_mut().zip(&choices[0].columns) {
@@ -346,7 +346,7 @@ fn candidate(
             parameters.push(EffectParameter {
                 symbol: format!("{}*{symbol}", parameters[p].symbol),
                 unit: String::new(),
-                sign: Sign::Any,
+                sign: SignConstraint::Any,
             });
             choices[0].columns.push(shift);
         }
@@ -368,15 +368,15 @@ fn candidate(
     if parameters.is_empty() {
         return None;
     }
-    let candidate = Candidate {
+    let candidate = CandidateEffect {
         effect,
         parameters,
-        searched: usize::from(searched.is_some()),
+        searched_constants: usize::from(searched.is_some()),
         is_part_of_load,
         refines: kind.refines.clone(),
-        nature: Nature::Effect,
+        nature: CandidateNature::Effect,
         is_per_run: false,
-        source: Source::Columns(choices),
+        source: ColumnSource::Columns(choices),
     };
     Some((candidate, felt))
 }
@@ -388,17 +388,17 @@ fn is_part_of_load(kind: &EffectKind) -> bool {
 
 /// Columns of candidates that depend on what the drives carry, of all or of one entry, for loads that are stacked and decimated
 /// like the forces, and for some values of each single candidate's constant.
-pub(crate) fn carried(
-    candidates: &Candidates,
+pub(crate) fn load_dependent_columns(
+    candidates: &DerivedCandidates,
     model: &Model,
-    all: &Runs<'_>,
-    load: &Column,
+    all: &SegmentList<'_>,
+    load: &ForceColumn,
     only: Option<usize>,
     tried: &dyn Fn(usize) -> Vec<f64>,
-) -> Outcome<Vec<(usize, Vec<Choice>)>> {
+) -> Outcome<Vec<(usize, Vec<ColumnChoice>)>> {
     let is_wanted = |k: &usize| only.is_none_or(|e| candidates.entries[e].singles.contains(k));
     let which: Vec<usize> = (0..candidates.singles.len())
-        .filter(|k| candidates.singles[*k].sort == Sort::Carried && is_wanted(k))
+        .filter(|k| candidates.singles[*k].sort == EvaluationFrequency::LoadDependent && is_wanted(k))
         .collect();
     if which.is_empty() {
         return Ok(Vec::new());
@@ -408,7 +408,7 @@ pub(crate) fn carried(
     for (one, is_check) in all {
         let kept = one.time().len();
         let of = |values: &Option<Vec<f64>>| match values {
-            Some(values) => between(
+            Some(values) => interpolate(
                 &values[start..start + kept],
                 one.decimation(),
                 one.samples(),
@@ -420,25 +420,25 @@ pub(crate) fn carried(
         loaded.push((one, *is_check));
         start += kept;
     }
-    let all: Vec<(&Stretch, bool)> = loaded.iter().map(|(one, check)| (one, *check)).collect();
+    let all: Vec<(&RecordingSegment, bool)> = loaded.iter().map(|(one, check)| (one, *check)).collect();
     let tried: Vec<Vec<f64>> = which.iter().map(|k| tried(*k)).collect();
     let place = |single: usize| which.iter().position(|w| *w == single);
     // `found[single][round]`.
-    let mut found: Vec<Vec<Vec<Column>>> = vec![Vec::new(); which.len()];
+    let mut found: Vec<Vec<Vec<ForceColumn>>> = vec![Vec::new(); which.len()];
     for round in 0..tried.iter().map(Vec::len).max().unwrap_or(0) {
         let takes_part = |k: &usize| round < tried[*k].len();
         let of_round: Vec<usize> = (0..which.len()).filter(takes_part).collect();
-        let value = |single: usize, search: &Search| match search {
-            Search::Linear => 0.0,
-            Search::Range { .. } => place(single).map_or(1.0, |k| tried[k][round]),
+        let value = |single: usize, search: &ConstantSearch| match search {
+            ConstantSearch::Linear => 0.0,
+            ConstantSearch::Range { .. } => place(single).map_or(1.0, |k| tried[k][round]),
         };
         let singles_of_round: Vec<usize> = of_round.iter().map(|k| which[*k]).collect();
-        let columns = singles(
+        let columns = single_columns(
             candidates,
             &singles_of_round,
             model,
             &all,
-            Sort::Carried,
+            EvaluationFrequency::LoadDependent,
             &value,
         )?;
         for (k, columns) in of_round.into_iter().zip(columns) {
@@ -462,9 +462,9 @@ pub(crate) fn carried(
             }
             // Along these loads it says nothing.
             if !columns.iter().all(is_finite) {
-                columns.fill(Column(vec![None; model.drives().len()]));
+                columns.fill(ForceColumn(vec![None; model.drives().len()]));
             }
-            Choice {
+            ColumnChoice {
                 constants: symbol
                     .map(|one| (one.to_owned(), *value))
                     .into_iter()
@@ -478,7 +478,7 @@ pub(crate) fn carried(
 }
 
 /// Values between samples of which every n-th was kept.
-fn between(kept: &[f64], factor: usize, samples: usize) -> Vec<f64> {
+fn interpolate(kept: &[f64], factor: usize, samples: usize) -> Vec<f64> {
     let last = kept.len().saturating_sub(1);
     let at = |i: usize| {
         let k = (i / factor).min(last);
@@ -489,23 +489,23 @@ fn between(kept: &[f64], factor: usize, samples: usize) -> Vec<f64> {
 }
 
 /// Columns of an entry for another value of the constant that is searched for.
-pub(crate) fn finer(
-    candidates: &Candidates,
+pub(crate) fn refined_columns(
+    candidates: &DerivedCandidates,
     model: &Model,
-    all: &Runs<'_>,
-    entry: &Entry,
+    all: &SegmentList<'_>,
+    entry: &CandidateEntry,
     constant: f64,
-) -> Option<Vec<Column>> {
-    let value = |_: usize, search: &Search| match search {
-        Search::Linear => 0.0,
-        Search::Range { .. } => constant,
+) -> Option<Vec<ForceColumn>> {
+    let value = |_: usize, search: &ConstantSearch| match search {
+        ConstantSearch::Linear => 0.0,
+        ConstantSearch::Range { .. } => constant,
     };
-    let found = singles(
+    let found = single_columns(
         candidates,
         &entry.singles,
         model,
         all,
-        Sort::Searched,
+        EvaluationFrequency::Searched,
         &value,
     )
     .ok()?;

@@ -1,13 +1,13 @@
 //! Lengths and angles of the model that may be wrong: what the forces of its base parameters change by with each of its constants,
 //! by central differences. While base parameters are held they hide what a constant does to them, and nothing is asked.
 
-use modelmill_codegen::Evaluator;
+use modelmill_codegen::ModelEvaluator;
 use modelmill_identify::diagnose::{
-    Candidate, Column, Constant, Effect, EffectParameter, Nature, Sensitivity, Sign, Source,
+    CandidateEffect, ForceColumn, ConstantCorrection, LocatedEffect, EffectParameter, CandidateNature, ForceSensitivity, SignConstraint, ColumnSource,
 };
 
 use crate::model::Model;
-use crate::regressors::{Runs, regressor};
+use crate::regressors::{SegmentList, regressor};
 
 use super::payloads::reach;
 
@@ -17,9 +17,9 @@ const STEP: f64 = 1e-3;
 /// An error of every constant that is a length or an angle; `is_held` says which base parameters are known.
 pub(crate) fn constants(
     model: &Model,
-    all: &Runs<'_>,
+    all: &SegmentList<'_>,
     is_held: &dyn Fn(usize) -> bool,
-) -> Vec<Candidate> {
+) -> Vec<CandidateEffect> {
     let derivation = &model.derivation;
     let mechanism = &derivation.mechanism;
     if (0..model.base.len()).all(is_held) {
@@ -29,7 +29,7 @@ pub(crate) fn constants(
     let along = |k: usize, step: f64| {
         let mut moved = usual.clone();
         moved[k] += step;
-        regressor(all, &Evaluator::with_constants(derivation, moved), model)
+        regressor(all, &ModelEvaluator::with_constants(derivation, moved), model)
     };
     let mut middle = None;
     let mut candidates = Vec::new();
@@ -47,13 +47,13 @@ pub(crate) fn constants(
             middle = along(k, 0.0).ok();
         }
         let Some(middle) = &middle else { continue };
-        let [mut slope, mut bend] = [(); 2].map(|()| Sensitivity {
+        let [mut slope, mut bend] = [(); 2].map(|()| ForceSensitivity {
             base: Vec::new(),
-            held: Column(vec![None; model.drives().len()]),
+            fixed: ForceColumn(vec![None; model.drives().len()]),
         });
         for (p, middle) in middle.iter().enumerate() {
-            let sum = |parts: [(f64, &Column); 3]| {
-                let mut sum = Column(vec![None; model.drives().len()]);
+            let sum = |parts: [(f64, &ForceColumn); 3]| {
+                let mut sum = ForceColumn(vec![None; model.drives().len()]);
                 for (factor, part) in parts.into_iter().filter(|(factor, _)| *factor != 0.0) {
                     sum.add(factor, part);
                 }
@@ -69,31 +69,31 @@ pub(crate) fn constants(
             ]);
             for (part, change) in [(&mut slope, first), (&mut bend, second)] {
                 if is_held(p) {
-                    part.held.add(model.nominal[p], &change);
+                    part.fixed.add(model.nominal[p], &change);
                 } else {
                     part.base.push(change);
                 }
             }
         }
-        if slope.held.is_zero() && slope.base.iter().all(Column::is_zero) {
+        if slope.fixed.is_zero() && slope.base.iter().all(ForceColumn::is_zero) {
             continue;
         }
-        candidates.push(Candidate {
-            effect: Effect {
+        candidates.push(CandidateEffect {
+            effect: LocatedEffect {
                 kind: "constant_error".to_owned(),
                 at: vec![constant.name.clone()],
             },
             parameters: vec![EffectParameter {
                 symbol: "error".to_owned(),
                 unit: constant.unit.clone(),
-                sign: Sign::Any,
+                sign: SignConstraint::Any,
             }],
-            searched: 0,
+            searched_constants: 0,
             is_part_of_load: true,
             refines: None,
-            nature: Nature::Effect,
+            nature: CandidateNature::Effect,
             is_per_run: false,
-            source: Source::Constant(Constant { slope, bend }),
+            source: ColumnSource::Constant(ConstantCorrection { first_derivative: slope, second_derivative: bend }),
         });
     }
     candidates
@@ -102,7 +102,7 @@ pub(crate) fn constants(
 /// Differences below this are rounding.
 const ROUNDING: f64 = 1e-7;
 
-fn without_rounding(mut column: Column) -> Column {
+fn without_rounding(mut column: ForceColumn) -> ForceColumn {
     for slot in &mut column.0 {
         let most = slot.iter().flatten().fold(0.0_f64, |m, x| m.max(x.abs()));
         if most < ROUNDING {

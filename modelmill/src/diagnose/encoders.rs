@@ -3,19 +3,19 @@
 //! rate and its acceleration is had by central differences of the fitted model, so that any error along the motion is a sum of
 //! three products.
 
-use modelmill_identify::changes::Moments;
+use modelmill_identify::changes::NormalEquations;
 use modelmill_identify::diagnose::{
-    Candidate, Choice, Column, Effect, EffectParameter, Nature, Problem, Sign, Source,
+    CandidateEffect, ColumnChoice, ForceColumn, LocatedEffect, EffectParameter, CandidateNature, DiagnosisProblem, SignConstraint, ColumnSource,
 };
 
 use crate::along;
 use crate::model::Model;
-use crate::stretch::Stretch;
+use crate::stretch::RecordingSegment;
 
 use super::numbers::stack;
 use super::places::is_free;
-use super::problem::Held;
-use crate::regressors::Runs;
+use super::problem::FixedParameters;
+use crate::regressors::SegmentList;
 
 /// How often an error may come again in a turn, or along the travel of a coordinate that slides.
 const TIMES: [u32; 16] = [1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 30, 36, 48, 60];
@@ -29,9 +29,9 @@ const JUMPED: f64 = 100.0;
 /// What forces change by with position, rate and acceleration of every active coordinate, for base parameters.
 pub(crate) fn sensitivities(
     model: &Model,
-    all: &Runs<'_>,
+    all: &SegmentList<'_>,
     values: &[f64],
-) -> Vec<Option<[Column; 3]>> {
+) -> Vec<Option<[ForceColumn; 3]>> {
     let coordinates = 0..model.motions().len();
     coordinates
         .map(|i| sensitivity(model, all, values, i))
@@ -39,18 +39,18 @@ pub(crate) fn sensitivities(
 }
 
 /// What the positions of each encoder read too much throughout; a free body has none.
-pub(crate) fn zeros(model: &Model, slopes: &[Option<[Column; 3]>]) -> Vec<Candidate> {
+pub(crate) fn zeros(model: &Model, slopes: &[Option<[ForceColumn; 3]>]) -> Vec<CandidateEffect> {
     let (active, _) = model.derivation.coordinates();
     let has_encoder = |i: &usize| !is_free(&model.derivation.mechanism, *i);
     let each = model.motions().into_iter().zip(slopes).zip(active);
     let each = each.filter_map(|(one, i)| has_encoder(&i).then_some(one));
-    let candidate = |((name, is_angle), slopes): ((String, bool), &Option<[Column; 3]>)| {
+    let candidate = |((name, is_angle), slopes): ((String, bool), &Option<[ForceColumn; 3]>)| {
         let [by_position, ..] = slopes.as_ref()?;
-        let mut column = Column(vec![None; model.drives().len()]);
+        let mut column = ForceColumn(vec![None; model.drives().len()]);
         // Forces are those of the true motion.
         column.add(-1.0, by_position);
-        Some(Candidate {
-            source: Source::Columns(vec![Choice {
+        Some(CandidateEffect {
+            source: ColumnSource::Columns(vec![ColumnChoice {
                 constants: Vec::new(),
                 columns: vec![column],
             }]),
@@ -61,34 +61,34 @@ pub(crate) fn zeros(model: &Model, slopes: &[Option<[Column; 3]>]) -> Vec<Candid
 }
 
 /// A fault of a coordinate's encoder with parameters in its unit.
-fn disturbance(kind: &str, name: String, symbols: &[&str], is_angle: bool) -> Candidate {
+fn disturbance(kind: &str, name: String, symbols: &[&str], is_angle: bool) -> CandidateEffect {
     let parameter = |symbol: &&str| EffectParameter {
         symbol: (*symbol).to_owned(),
         unit: if is_angle { "rad" } else { "m" }.to_owned(),
-        sign: Sign::Any,
+        sign: SignConstraint::Any,
     };
-    Candidate {
-        effect: Effect {
+    CandidateEffect {
+        effect: LocatedEffect {
             kind: kind.to_owned(),
             at: vec![name],
         },
         parameters: symbols.iter().map(parameter).collect(),
-        searched: 0,
+        searched_constants: 0,
         is_part_of_load: false,
         refines: None,
-        nature: Nature::Disturbance,
+        nature: CandidateNature::Disturbance,
         is_per_run: false,
-        source: Source::Columns(Vec::new()),
+        source: ColumnSource::Columns(Vec::new()),
     }
 }
 
 /// An error of each encoder with sine and cosine of its angle, for each number of waves that may be.
 pub(crate) fn encoders(
     model: &Model,
-    all: &Runs<'_>,
-    problem: &Problem,
-    slopes: &[Option<[Column; 3]>],
-) -> Vec<Candidate> {
+    all: &SegmentList<'_>,
+    problem: &DiagnosisProblem,
+    slopes: &[Option<[ForceColumn; 3]>],
+) -> Vec<CandidateEffect> {
     let motions = model.motions();
     let mut candidates = Vec::new();
     for (i, (name, is_angle)) in motions.iter().enumerate() {
@@ -111,7 +111,7 @@ pub(crate) fn encoders(
         let Some(slopes) = &slopes[i] else {
             continue;
         };
-        let step = problem.layout.stretches.iter().map(|s| s.step);
+        let step = problem.layout.segments.iter().map(|s| s.step);
         let step = step.fold(f64::MIN_POSITIVE, f64::max);
         let turn = if *is_angle {
             std::f64::consts::TAU
@@ -129,7 +129,7 @@ pub(crate) fn encoders(
                     let rate = k * cos * qd[j];
                     [sin, rate, k * cos * qdd[j] - k * k * sin * qd[j] * qd[j]]
                 };
-                let mut column = Column(vec![None; model.drives().len()]);
+                let mut column = ForceColumn(vec![None; model.drives().len()]);
                 for (order, slope) in slopes.iter().enumerate() {
                     let mut part = slope.clone();
                     for values in part.0.iter_mut().flatten() {
@@ -142,18 +142,18 @@ pub(crate) fn encoders(
                 }
                 column
             };
-            Some(Choice {
+            Some(ColumnChoice {
                 constants: vec![("times_per_turn".to_owned(), f64::from(times))],
                 columns: vec![wave(0.0), wave(0.5 * std::f64::consts::PI)],
             })
         };
-        let choices: Vec<Choice> = TIMES.into_iter().filter_map(choice).collect();
+        let choices: Vec<ColumnChoice> = TIMES.into_iter().filter_map(choice).collect();
         if choices.is_empty() {
             continue;
         }
-        candidates.push(Candidate {
-            searched: 1,
-            source: Source::Columns(choices),
+        candidates.push(CandidateEffect {
+            searched_constants: 1,
+            source: ColumnSource::Columns(choices),
             ..disturbance(
                 "encoder_eccentricity",
                 name.clone(),
@@ -166,11 +166,11 @@ pub(crate) fn encoders(
 }
 
 /// Base parameters by least squares, drives weighed alike; those that are held keep their nominal values.
-pub(crate) fn values(model: &Model, problem: &Problem, held: Held) -> Vec<f64> {
-    let mut all = Moments::new(problem.base.len());
+pub(crate) fn values(model: &Model, problem: &DiagnosisProblem, held: FixedParameters) -> Vec<f64> {
+    let mut all = NormalEquations::new(problem.base.len());
     for (d, measured) in problem.measured.0.iter().enumerate() {
         let Some(measured) = measured else { continue };
-        let mut one = Moments::new(problem.base.len());
+        let mut one = NormalEquations::new(problem.base.len());
         let columns: Vec<Option<&[f64]>> = problem.base.iter().map(|c| c.0[d].as_deref()).collect();
         one.add_rows(&columns, measured);
         let weight = one.total.max(f64::MIN_POSITIVE).recip();
@@ -182,7 +182,7 @@ pub(crate) fn values(model: &Model, problem: &Problem, held: Held) -> Vec<f64> {
     let mut next = solved.iter();
     (0..model.base.len())
         .map(|k| {
-            if held == Held::All || model.is_known(k) {
+            if held == FixedParameters::All || model.is_known(k) {
                 model.nominal[k]
             } else {
                 next.next().copied().unwrap_or(0.0)
@@ -195,15 +195,15 @@ pub(crate) fn values(model: &Model, problem: &Problem, held: Held) -> Vec<f64> {
 /// beside the recording.
 fn sensitivity(
     model: &Model,
-    all: &Runs<'_>,
+    all: &SegmentList<'_>,
     values: &[f64],
     coordinate: usize,
-) -> Option<[Column; 3]> {
+) -> Option<[ForceColumn; 3]> {
     let mut slopes = Vec::new();
     for order in 0..3 {
         let along = |sign: f64| {
             stack(all, |one| {
-                let mut turned: Stretch = one.clone();
+                let mut turned: RecordingSegment = one.clone();
                 let run = &mut turned.run;
                 let column = &mut [&mut run.q, &mut run.qd, &mut run.qdd][order][coordinate];
                 let largest = column.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
@@ -232,7 +232,7 @@ fn sensitivity(
             }
             slope
         });
-        slopes.push(Column::new(slope.collect()));
+        slopes.push(ForceColumn::new(slope.collect()));
     }
-    <[Column; 3]>::try_from(slopes).ok()
+    <[ForceColumn; 3]>::try_from(slopes).ok()
 }

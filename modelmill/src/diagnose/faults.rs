@@ -1,15 +1,15 @@
 //! What is known to be wrong with recordings before anything is looked for: pushes, coarse readings, and what another recording
 //! of the machine does not share. All of it is told, and none of it is left to be taken for an effect.
 
-use modelmill_identify::changes::Moments;
-use modelmill_identify::diagnose::{Disturbance, Problem, Quantity, step_of_values};
+use modelmill_identify::changes::NormalEquations;
+use modelmill_identify::diagnose::{Disturbance, DiagnosisProblem, EstimatedQuantity, quantisation_step};
 
 use crate::error::Outcome;
 use crate::model::Model;
-use crate::recording::Recording;
-use crate::runs::{Difference, What, differences};
+use crate::recording::PreparedRecording;
+use crate::runs::{RecordingDifference, PhysicalChange, differences};
 
-use crate::regressors::Runs;
+use crate::regressors::SegmentList;
 
 /// About a push so long is left out on either side, s.
 const MARGIN: f64 = 0.15;
@@ -23,7 +23,7 @@ const FEWEST_BEYOND: usize = 10;
 const COMES_AGAIN: f64 = 0.5;
 
 /// What later recordings do not share with the first one; nothing where that cannot be said.
-pub(crate) fn between_runs(model: &Model, recordings: &[&Recording]) -> Vec<Difference> {
+pub(crate) fn run_differences(model: &Model, recordings: &[&PreparedRecording]) -> Vec<RecordingDifference> {
     if recordings.len() < 2 {
         return Vec::new();
     }
@@ -31,11 +31,11 @@ pub(crate) fn between_runs(model: &Model, recordings: &[&Recording]) -> Vec<Diff
 }
 
 /// Takes what is known off a problem, and tells it there.
-pub(crate) fn take_off(
-    problem: &mut Problem,
+pub(crate) fn subtract_known(
+    problem: &mut DiagnosisProblem,
     model: &Model,
-    all: &Runs<'_>,
-    between: &[Difference],
+    all: &SegmentList<'_>,
+    between: &[RecordingDifference],
 ) -> Outcome<()> {
     problem.removed.resize(model.drives().len(), 0.0);
     let samples = problem.layout.samples().max(1) as f64;
@@ -52,16 +52,16 @@ pub(crate) fn take_off(
             }
             problem.removed[d] += force.iter().map(|f| f * f).sum::<f64>() / samples;
         }
-        problem.disturbances.push(told(one));
+        problem.disturbances.push(difference_disturbance(one));
     }
-    coarse(problem, model, all)?;
-    pushes(problem, all);
+    add_quantisation_noise(problem, model, all)?;
+    remove_contact_events(problem, all);
     for one in all.iter().flat_map(|(one, _)| &one.faults) {
         if one.kind == "contact_event" {
             continue;
         }
         let is_same = |told: &&mut Disturbance| {
-            told.says.is_some() && (&told.kind, &told.says) == (&one.kind, &one.says)
+            told.description.is_some() && (&told.kind, &told.description) == (&one.kind, &one.description)
         };
         match problem.disturbances.iter_mut().find(is_same) {
             Some(told) => {
@@ -79,17 +79,17 @@ pub(crate) fn take_off(
 }
 
 /// A difference of two recordings by name.
-fn told(one: &Difference) -> Disturbance {
-    let (_, at, values) = one.changed.what.parts(one.changed.unit);
-    let kind = match one.changed.what {
-        What::Payload { .. } => "payload_change",
-        What::Clock { .. } => "time_base",
+fn difference_disturbance(one: &RecordingDifference) -> Disturbance {
+    let (_, at, values) = one.changed.change.parts(one.changed.unit);
+    let kind = match one.changed.change {
+        PhysicalChange::Payload { .. } => "payload_change",
+        PhysicalChange::Clock { .. } => "time_base",
         _ => "different_runs",
     };
-    let estimates = values.into_iter().map(|(name, value, unit)| Quantity {
+    let estimates = values.into_iter().map(|(name, value, unit)| EstimatedQuantity {
         name: name.to_owned(),
         value: value.value,
-        deviation: Some(value.deviation),
+        standard_deviation: Some(value.deviation),
         unit: unit.to_owned(),
     });
     Disturbance {
@@ -98,16 +98,16 @@ fn told(one: &Difference) -> Disturbance {
         estimates: estimates.collect(),
         recordings: vec![one.first.clone(), one.later.clone()],
         interval: None,
-        says: Some(format!(
+        description: Some(format!(
             "{} differs between the recordings: in {} beside {}, {}",
-            match one.changed.what {
-                What::Payload { .. } => "the payload",
-                What::Friction { .. } => "the friction",
-                What::Offset { .. } => "a constant force",
-                What::Scale { .. } => "the scale of a force",
-                What::Clock { .. } => "the clock",
-                What::EncoderZero { .. } => "the zero of an encoder",
-                What::ContactEvent { .. } => "a push",
+            match one.changed.change {
+                PhysicalChange::Payload { .. } => "the payload",
+                PhysicalChange::Friction { .. } => "the friction",
+                PhysicalChange::Offset { .. } => "a constant force",
+                PhysicalChange::Scale { .. } => "the scale of a force",
+                PhysicalChange::Clock { .. } => "the clock",
+                PhysicalChange::EncoderZero { .. } => "the zero of an encoder",
+                PhysicalChange::ContactEvent { .. } => "a push",
             },
             one.later,
             one.first,
@@ -117,14 +117,14 @@ fn told(one: &Difference) -> Disturbance {
 }
 
 /// Forces that are read in steps coarser than their noise: half a step either way is their noise.
-fn coarse(problem: &mut Problem, model: &Model, all: &Runs<'_>) -> Outcome<()> {
+fn add_quantisation_noise(problem: &mut DiagnosisProblem, model: &Model, all: &SegmentList<'_>) -> Outcome<()> {
     for (d, drive) in model.drives().iter().enumerate() {
         let mut recorded = Vec::new();
         for (one, _) in all {
-            recorded.extend_from_slice(&one.run.measured()?[d]);
+            recorded.extend_from_slice(&one.run.measured_forces()?[d]);
         }
         let is_decimated = all.iter().any(|(one, _)| one.decimation() > 1);
-        let Some(step) = step_of_values(&recorded, problem.noise[d]).filter(|_| !is_decimated)
+        let Some(step) = quantisation_step(&recorded, problem.noise[d]).filter(|_| !is_decimated)
         else {
             continue;
         };
@@ -132,10 +132,10 @@ fn coarse(problem: &mut Problem, model: &Model, all: &Runs<'_>) -> Outcome<()> {
         problem.disturbances.push(Disturbance {
             kind: "quantised_force".to_owned(),
             at: vec![drive.clone()],
-            estimates: vec![Quantity::new("step", step, model.force_unit(d))],
+            estimates: vec![EstimatedQuantity::new("step", step, model.force_unit(d))],
             recordings: Vec::new(),
             interval: None,
-            says: None,
+            description: None,
         });
     }
     Ok(())
@@ -143,8 +143,8 @@ fn coarse(problem: &mut Problem, model: &Model, all: &Runs<'_>) -> Outcome<()> {
 
 /// Leaves out pushes: events that no place of a coordinate explains. A push does not come again where the state comes again; a
 /// stop does, in any of the recordings.
-fn pushes(problem: &mut Problem, all: &Runs<'_>) {
-    let events: Vec<Disturbance> = merged(all);
+fn remove_contact_events(problem: &mut DiagnosisProblem, all: &SegmentList<'_>) {
+    let events: Vec<Disturbance> = merge_events(all);
     if events.is_empty() {
         return;
     }
@@ -178,7 +178,7 @@ fn pushes(problem: &mut Problem, all: &Runs<'_>) {
         let depths: Vec<f64> = along.iter().map(|x| x - place).collect();
         concerned
             .iter()
-            .any(|d| acts_beyond(problem, *d, &depths, &inside, &about))
+            .any(|d| is_force_beyond_place(problem, *d, &depths, &inside, &about))
     };
     if (0..coordinates).any(|i| explains(i, 1.0) || explains(i, -1.0)) {
         return;
@@ -189,8 +189,8 @@ fn pushes(problem: &mut Problem, all: &Runs<'_>) {
 
 /// Whether the force of an event is one that acts beyond a place: the line over the depth that it follows during the event says it
 /// at other times too. Where there are no other times nothing speaks for an event. The model is fitted to what is neither.
-fn acts_beyond(
-    problem: &Problem,
+fn is_force_beyond_place(
+    problem: &DiagnosisProblem,
     channel: usize,
     depths: &[f64],
     inside: &[bool],
@@ -209,7 +209,7 @@ fn acts_beyond(
     let some = |values: &[f64]| -> Vec<f64> { elsewhere.iter().map(|i| values[*i]).collect() };
     let picked: Vec<Option<Vec<f64>>> = columns.iter().map(|column| column.map(some)).collect();
     let picked: Vec<Option<&[f64]>> = picked.iter().map(Option::as_deref).collect();
-    let mut moments = Moments::new(columns.len());
+    let mut moments = NormalEquations::new(columns.len());
     moments.add_rows(&picked, &some(measured));
     let factors = moments.solve().values;
     let rest = |i: usize| {
@@ -227,7 +227,7 @@ fn acts_beyond(
     if otherwise.len() < FEWEST_BEYOND {
         return true;
     }
-    let Some(line) = line(&during) else {
+    let Some(line) = fit_line(&during) else {
         return false;
     };
     let left: f64 = otherwise.iter().map(|(x, y)| (y - line(*x)).powi(2)).sum();
@@ -236,7 +236,7 @@ fn acts_beyond(
 }
 
 /// The straight line through some points by least squares.
-fn line(points: &[(f64, f64)]) -> Option<impl Fn(f64) -> f64 + use<>> {
+fn fit_line(points: &[(f64, f64)]) -> Option<impl Fn(f64) -> f64 + use<>> {
     let n = points.len() as f64;
     let mean = |of: &dyn Fn(&(f64, f64)) -> f64| points.iter().map(of).sum::<f64>() / n;
     let (x, y) = (mean(&|p| p.0), mean(&|p| p.1));
@@ -246,7 +246,7 @@ fn line(points: &[(f64, f64)]) -> Option<impl Fn(f64) -> f64 + use<>> {
 }
 
 /// Events of all recordings, those that are close together as one, without the short ones.
-fn merged(all: &Runs<'_>) -> Vec<Disturbance> {
+fn merge_events(all: &SegmentList<'_>) -> Vec<Disturbance> {
     let mut events: Vec<Disturbance> = Vec::new();
     let faults = all.iter().flat_map(|(one, _)| &one.faults);
     for event in faults.filter(|one| one.kind == "contact_event") {

@@ -1,39 +1,39 @@
 //! What a diagnosis found, as values: the verdict, what is missing with estimates and doubles, the model with what was
 //! found beside the model as it is, and where errors live. Text, JSON and the page print them.
 
-use modelmill_identify::diagnose::{Diagnosis, Effect, EffectParameter, FoundEffect, Verdict};
-use modelmill_identify::{FitParameter, Note, Region, Status};
+use modelmill_identify::diagnose::{ModelDiagnosis, LocatedEffect, EffectParameter, IdentifiedEffect, DiagnosisVerdict};
+use modelmill_identify::{FitParameter, RecordingNote, ErrorRegion, ParameterStatus};
 use modelmill_spec::Mechanics;
 use modelmill_spec::edit::NewEffect;
 
 use crate::along;
-use crate::compare::{self, Places};
+use crate::compare::{self, ErrorLocations};
 use crate::error::{Error, Outcome};
 use crate::model::Model;
-use crate::recording::{Recording, stretches};
-use crate::runs::Difference;
-use crate::stretch::Stretch;
+use crate::recording::{PreparedRecording, segments};
+use crate::runs::RecordingDifference;
+use crate::stretch::RecordingSegment;
 use crate::text::table::percent;
 
-use super::added::{self, Added};
-use super::chosen::Named;
+use super::added::{self, CompletedModelFile};
+use super::chosen::NamedEffect;
 use super::faults;
-use super::laws::{self, Hypothesis};
+use super::laws::{self, LawHypothesis};
 use super::long;
-use super::off_nominal::{OffNominal, off_nominal, turned};
-use super::problem::{self, Answer, Asked, Held};
-use super::versions::Version;
-use super::words::{self, Judged};
+use super::off_nominal::{OffNominalParameter, off_nominal_parameters, reversed_sign_note};
+use super::problem::{self, DiagnosisSolution, DiagnosisQuery, FixedParameters};
+use super::versions::ModelVersion;
+use super::words::{self, ValidationMethod};
 
 /// Fails where what is fitted to the recordings misses the forces of others by more than these are: nothing that is found in the
 /// fit holds then.
-fn foretells(answer: &Answer, judged: Judged) -> Outcome {
+fn check_prediction(answer: &DiagnosisSolution, judged: ValidationMethod) -> Outcome {
     let diagnosis = &answer.diagnosis;
-    let last = diagnosis.ladder.last();
+    let last = diagnosis.steps.last();
     let Some(last) = last.filter(|last| last.check > 1.0) else {
         return Ok(());
     };
-    if words::is_to_be_cleared_up(diagnosis) {
+    if words::has_suspicion(diagnosis) {
         return Ok(());
     }
     Err(Error::input(format!(
@@ -41,7 +41,7 @@ fn foretells(answer: &Answer, judged: Judged) -> Outcome {
          any force would: nothing can be said of what is missing. Record longer to fit to, with all drives moving far and fast \
          (verb `excite`), or hold the parameters of an earlier run (option `parameters`)",
         percent(Some(last.fit)),
-        judged.words(),
+        judged.phrase(),
         percent(Some(last.check))
     )))
 }
@@ -51,105 +51,105 @@ const NO_WORSE: f64 = 1.5;
 
 /// What is asked of a diagnosis; [`Question::default`] identifies what the model file leaves open.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Question {
+pub struct DiagnosisOptions {
     /// Which parameters keep their nominal values.
-    pub held: Held,
+    pub fixed: FixedParameters,
     /// Where base parameters come out off their nominal values, ask once more with all of them held: they may hide what is
     /// missing.
-    pub again_with_nominal: bool,
+    pub repeat_with_nominal: bool,
 }
 
-impl Default for Question {
+impl Default for DiagnosisOptions {
     fn default() -> Self {
         Self {
-            held: Held::Known,
-            again_with_nominal: true,
+            fixed: FixedParameters::Known,
+            repeat_with_nominal: true,
         }
     }
 }
 
 /// What a diagnosis found.
-pub struct Findings {
+pub struct DiagnosisFindings {
     /// Verdict, ladder, candidates with the reason of their refusal, and what is left unexplained.
-    pub diagnosis: Diagnosis,
+    pub diagnosis: ModelDiagnosis,
     /// What is missing, with what is known of it.
-    pub missing: Vec<Missing>,
+    pub missing: Vec<MissingEffect>,
     /// Laws that no library holds and that would explain what nobody explains: hypotheses.
-    pub laws: Vec<Hypothesis>,
+    pub laws: Vec<LawHypothesis>,
     /// What the recordings leave open.
-    pub untold: Vec<Untold>,
+    pub undecided: Vec<UndecidedEffect>,
     /// Base parameters of the bodies that are not what the file says, the farthest first.
-    pub off_nominal: Vec<OffNominal>,
+    pub off_nominal: Vec<OffNominalParameter>,
     /// The same question with all parameters held at their nominal values, where some are off and it was asked for.
-    pub with_nominal: Option<WithNominal>,
+    pub with_nominal: Option<NominalDiagnosis>,
     /// Where the error sits that matters: what is left unexplained, or that of the model as it is.
-    pub regions: Vec<Region>,
+    pub regions: Vec<ErrorRegion>,
     /// The model as it is, along all recordings.
-    pub before: Version,
+    pub before: ModelVersion,
     /// The model with what was found, or why there is none; the reason is empty where nothing was found.
-    pub after: Result<Version, String>,
+    pub after: Result<ModelVersion, String>,
     /// What was found, as entries of a model file.
     pub entries: Vec<NewEffect>,
     /// The model file with them.
-    pub edited: Option<Added>,
+    pub edited: Option<CompletedModelFile>,
     /// Where the error of the model as it is lives.
-    pub places: Places,
+    pub places: ErrorLocations,
     /// Where what is left in the end lives.
-    pub left: Option<Places>,
+    pub residual_locations: Option<ErrorLocations>,
     /// Where errors are judged.
-    pub judged: Judged,
+    pub validation: ValidationMethod,
     /// Remarks on the recordings.
-    pub notes: Vec<Note>,
+    pub notes: Vec<RecordingNote>,
     /// What was asked and with which columns.
-    pub(crate) answer: Answer,
+    pub(crate) answer: DiagnosisSolution,
     /// Variables on which errors may depend, along the recordings that are judged.
     pub(crate) variables: Vec<(String, Vec<f64>)>,
 }
 
 /// An effect that is missing.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Missing {
+pub struct MissingEffect {
     /// Its kind and places.
-    pub effect: Effect,
+    pub effect: LocatedEffect,
     /// Its parameters and constants.
-    pub estimates: Vec<Estimate>,
+    pub estimates: Vec<EffectEstimate>,
     /// How likely it is that it is there, between 0 and 1.
     pub probability: f64,
     /// What the recordings cannot tell it from.
-    pub indistinguishable_from: Vec<Effect>,
+    pub indistinguishable_from: Vec<LocatedEffect>,
     /// Which experiment tells it from these, as the library says.
-    pub separate_by: Option<String>,
+    pub separating_experiment: Option<String>,
     /// The motion that would tell it from these, if one can be sought.
-    pub separation: Option<Separation>,
+    pub separation: Option<SeparationProposal>,
 }
 
 /// An effect that the recordings leave open.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Untold {
+pub struct UndecidedEffect {
     /// Its kind and places.
-    pub effect: Effect,
+    pub effect: LocatedEffect,
     /// Why they do.
-    pub says: String,
+    pub reason: String,
     /// Which experiment would tell.
-    pub separate_by: String,
+    pub separating_experiment: String,
 }
 
 /// Effects between which a motion is to decide.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Separation {
+pub struct SeparationProposal {
     /// The effect that was found, with its values.
-    pub effect: Named,
+    pub effect: NamedEffect,
     /// What it may be taken for.
-    pub rivals: Vec<Effect>,
+    pub rivals: Vec<LocatedEffect>,
     /// What is there in either case, with its constants.
-    pub beside: Vec<Named>,
+    pub common_effects: Vec<NamedEffect>,
     /// Noise of the forces, if it is known.
     pub noise: Option<f64>,
 }
 
 /// An estimate of a found effect.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Estimate {
+pub struct EffectEstimate {
     /// Symbol of the parameter or constant.
     pub name: String,
     /// Its value.
@@ -161,17 +161,17 @@ pub struct Estimate {
 }
 
 /// A diagnosis with all parameters held at their nominal values.
-pub struct WithNominal {
+pub struct NominalDiagnosis {
     /// Verdict, ladder and candidates.
-    pub diagnosis: Diagnosis,
+    pub diagnosis: ModelDiagnosis,
     /// What is missing then.
-    pub missing: Vec<(Effect, Vec<Estimate>)>,
+    pub missing: Vec<(LocatedEffect, Vec<EffectEstimate>)>,
 }
 
-impl Findings {
+impl DiagnosisFindings {
     /// The entries that are worth adding: none while the recording or the model is in doubt.
-    pub fn to_add(&self) -> &[NewEffect] {
-        if words::is_to_be_cleared_up(&self.diagnosis) {
+    pub fn entries_to_add(&self) -> &[NewEffect] {
+        if words::has_suspicion(&self.diagnosis) {
             &[]
         } else {
             &self.entries
@@ -179,16 +179,16 @@ impl Findings {
     }
 
     /// What is to be done where nothing, or not all, is to be added to the model file.
-    pub(crate) fn beside_the_file(&self) -> Option<&'static str> {
+    pub(crate) fn further_action(&self) -> Option<&'static str> {
         if self.missing.is_empty() {
             return None;
         }
-        if words::is_to_be_cleared_up(&self.diagnosis) {
+        if words::has_suspicion(&self.diagnosis) {
             return Some(
                 "First clear up what the verdict begins with: effects may only make up for it.",
             );
         }
-        let is_late = |found: &Missing| {
+        let is_late = |found: &MissingEffect| {
             let is_its = |entry: &NewEffect| entry.kind == found.effect.kind;
             ["time_delay", "force_lag"].contains(&found.effect.kind.as_str())
                 && !self.entries.iter().any(is_its)
@@ -206,73 +206,73 @@ impl Model {
     /// Fails when a recording is too short, holds no force, or leads where the mechanism cannot stand.
     pub fn diagnose(
         &self,
-        fit: &[&Recording],
-        check: &[&Recording],
-        question: &Question,
-    ) -> Outcome<Findings> {
-        let fewer = |all: &[&Recording]| -> Outcome<Vec<Recording>> {
+        fit: &[&PreparedRecording],
+        check: &[&PreparedRecording],
+        question: &DiagnosisOptions,
+    ) -> Outcome<DiagnosisFindings> {
+        let fewer = |all: &[&PreparedRecording]| -> Outcome<Vec<PreparedRecording>> {
             all.iter().map(|one| one.for_diagnosis(self)).collect()
         };
         let [fewer_fit, fewer_check] = [fewer(fit)?, fewer(check)?];
         let [of_fit, of_check] =
-            [&fewer_fit, &fewer_check].map(|all| all.iter().collect::<Vec<&Recording>>());
-        let data = stretches(self, &of_fit, &of_check);
-        let held = question.held;
-        let recordings: Vec<&Recording> = of_fit.into_iter().chain(of_check).collect();
+            [&fewer_fit, &fewer_check].map(|all| all.iter().collect::<Vec<&PreparedRecording>>());
+        let data = segments(self, &of_fit, &of_check);
+        let held = question.fixed;
+        let recordings: Vec<&PreparedRecording> = of_fit.into_iter().chain(of_check).collect();
         let between =
-            (self.host()).watched("holding the recordings against each other", 0, |_| {
-                faults::between_runs(self, &recordings)
+            (self.host()).run_job("holding the recordings against each other", 0, |_| {
+                faults::run_differences(self, &recordings)
             })?;
-        let find = |between: &[Difference]| {
-            let asked = Asked {
-                held,
+        let find = |between: &[RecordingDifference]| {
+            let asked = DiagnosisQuery {
+                fixed: held,
                 in_full: true,
-                between,
+                run_differences: between,
             };
-            problem::find(self, &data[0], &data[1], asked)
+            problem::find_missing_effects(self, &data[0], &data[1], asked)
         };
         let mut answer = find(&between)?;
         let mut between = between;
         if !between.is_empty() {
             // What the model lacks may look as if the recordings differed.
             let without = find(&[])?;
-            if without.left() < NO_WORSE * answer.left() {
+            if without.mean_square_residual() < NO_WORSE * answer.mean_square_residual() {
                 answer = without;
                 between.clear();
             }
         }
         let judged = if data[1].is_empty() {
-            Judged::CrossValidation
+            ValidationMethod::CrossValidation
         } else {
-            Judged::Check
+            ValidationMethod::Check
         };
-        if held == Held::Known {
-            foretells(&answer, judged)?;
+        if held == FixedParameters::Known {
+            check_prediction(&answer, judged)?;
         }
-        let notes = data.iter().flatten().flat_map(Stretch::notes);
+        let notes = data.iter().flatten().flat_map(RecordingSegment::notes);
         let notes = self.caution().into_iter().chain(notes.cloned()).collect();
         let entries = added::entries(self, &answer);
         let (edited, after) = if entries.is_empty() {
             (None, Err(String::new()))
         } else {
-            match added::add(self, &entries) {
+            match added::add_entries(self, &entries) {
                 Ok(edited) => {
-                    let after = with_effects(self, &edited, [fit, check], &data, held);
+                    let after = version_with_effects(self, &edited, [fit, check], &data, held);
                     (Some(edited), after.map_err(|error| error.to_string()))
                 }
                 Err(error) => (None, Err(error.to_string())),
             }
         };
         let [fit_data, check_data] = data;
-        let before = Version::new(self.clone(), fit_data, check_data, held)?;
-        let places = places(&before)?;
-        let left = after.as_ref().ok().map(self::places).transpose()?;
+        let before = ModelVersion::new(self.clone(), fit_data, check_data, held)?;
+        let places = judged_error_locations(&before)?;
+        let left = after.as_ref().ok().map(self::judged_error_locations).transpose()?;
         let variables = variables(&before)?;
-        let mut findings = Findings {
+        let mut findings = DiagnosisFindings {
             diagnosis: answer.diagnosis.clone(),
             missing: Vec::new(),
             laws: Vec::new(),
-            untold: Vec::new(),
+            undecided: Vec::new(),
             off_nominal: Vec::new(),
             with_nominal: None,
             regions: Vec::new(),
@@ -281,31 +281,31 @@ impl Model {
             entries,
             edited,
             places,
-            left,
-            judged,
+            residual_locations: left,
+            validation: judged,
             notes,
             answer,
             variables,
         };
-        findings.missing = missing(&findings);
+        findings.missing = missing_effects(&findings);
         findings.laws = laws::hypotheses(&findings.before.model, &findings.diagnosis);
-        findings.untold = untold(&findings);
-        findings.off_nominal = off_nominal(findings.last());
-        if let Some(note) = turned(findings.last(), &findings.off_nominal) {
+        findings.undecided = undecided_effects(&findings);
+        findings.off_nominal = off_nominal_parameters(findings.final_version());
+        if let Some(note) = reversed_sign_note(findings.final_version(), &findings.off_nominal) {
             self.host().note(&note);
             findings.notes.push(note);
         }
         findings.regions = regions(&findings);
-        if question.again_with_nominal && held != Held::All && !findings.off_nominal.is_empty() {
-            findings.with_nominal = Some(with_nominal(&findings, &between)?);
+        if question.repeat_with_nominal && held != FixedParameters::All && !findings.off_nominal.is_empty() {
+            findings.with_nominal = Some(nominal_diagnosis(&findings, &between)?);
         }
         Ok(findings)
     }
 }
 
-impl Findings {
+impl DiagnosisFindings {
     /// The model with what was found, or as it is.
-    pub fn last(&self) -> &Version {
+    pub fn final_version(&self) -> &ModelVersion {
         self.after.as_ref().unwrap_or(&self.before)
     }
 
@@ -315,13 +315,13 @@ impl Findings {
     }
 }
 
-fn with_effects(
+fn version_with_effects(
     model: &Model,
-    edited: &Added,
-    recordings: [&[&Recording]; 2],
-    before: &[Vec<Stretch>; 2],
-    held: Held,
-) -> Outcome<Version> {
+    edited: &CompletedModelFile,
+    recordings: [&[&PreparedRecording]; 2],
+    before: &[Vec<RecordingSegment>; 2],
+    held: FixedParameters,
+) -> Outcome<ModelVersion> {
     let delay = model.derivation.mechanism.force_delay;
     let model = (model.host())
         .derive(&model.path, edited.loaded.clone())?
@@ -329,11 +329,11 @@ fn with_effects(
     let is_later = model.derivation.mechanism.force_delay.to_bits() != delay.to_bits();
     let [fit, check] = if is_later {
         // With a delay forces belong to earlier states.
-        let again = |recordings: &[&Recording]| -> Outcome<Vec<Stretch>> {
+        let again = |recordings: &[&PreparedRecording]| -> Outcome<Vec<RecordingSegment>> {
             let mut all = Vec::new();
             for one in recordings {
-                for stretch in one.prepared_for(&model)? {
-                    all.push(long::thinned(&model, &stretch)?);
+                for stretch in one.prepare_for(&model)? {
+                    all.push(long::thin_out(&model, &stretch)?);
                 }
             }
             Ok(all)
@@ -343,51 +343,51 @@ fn with_effects(
         before.clone()
     };
     let host = model.host().clone();
-    host.watched("identifying with what was found", 0, |_| {
-        Version::new(model, fit, check, held)
+    host.run_job("identifying with what was found", 0, |_| {
+        ModelVersion::new(model, fit, check, held)
     })?
 }
 
 /// The same question with all parameters held at their nominal values.
-fn with_nominal(findings: &Findings, between: &[Difference]) -> Outcome<WithNominal> {
+fn nominal_diagnosis(findings: &DiagnosisFindings, between: &[RecordingDifference]) -> Outcome<NominalDiagnosis> {
     let version = &findings.before;
-    let of = |is_check: bool| -> Vec<Stretch> {
+    let of = |is_check: bool| -> Vec<RecordingSegment> {
         let runs = version.data.iter().zip(&version.runs);
         let wanted = runs.filter(|(_, run)| run.is_check == is_check);
         wanted.map(|(data, _)| data.clone()).collect()
     };
-    let asked = Asked {
-        held: Held::All,
+    let asked = DiagnosisQuery {
+        fixed: FixedParameters::All,
         in_full: false,
-        between,
+        run_differences: between,
     };
-    let answer = problem::find(&version.model, &of(false), &of(true), asked)?;
+    let answer = problem::find_missing_effects(&version.model, &of(false), &of(true), asked)?;
     let missing = answer.diagnosis.effects.iter().map(|found| {
         let parameters = &answer.problem.candidates[found.candidate].parameters;
-        (found.effect.clone(), of_search(parameters, found))
+        (found.effect.clone(), search_estimates(parameters, found))
     });
-    Ok(WithNominal {
+    Ok(NominalDiagnosis {
         missing: missing.collect(),
         diagnosis: answer.diagnosis,
     })
 }
 
-fn missing(findings: &Findings) -> Vec<Missing> {
+fn missing_effects(findings: &DiagnosisFindings) -> Vec<MissingEffect> {
     let found = findings.diagnosis.effects.iter();
     found
-        .map(|found| Missing {
+        .map(|found| MissingEffect {
             effect: found.effect.clone(),
             estimates: estimates(findings, found),
             probability: found.probability,
             indistinguishable_from: found.indistinguishable_from.clone(),
-            separate_by: separate_by(findings, found),
+            separating_experiment: separating_experiment(findings, found),
             separation: separation(findings, found),
         })
         .collect()
 }
 
-fn untold(findings: &Findings) -> Vec<Untold> {
-    let of = |effect: &Effect| {
+fn undecided_effects(findings: &DiagnosisFindings) -> Vec<UndecidedEffect> {
+    let of = |effect: &LocatedEffect| {
         let mut kinds = findings.answer.candidates.kinds.iter();
         let kind = kinds.find(|kind| kind.name == effect.kind);
         let place = effect.at.join(" and ");
@@ -395,19 +395,19 @@ fn untold(findings: &Findings) -> Vec<Untold> {
         let more = format!(
             "A motion over more of the travel of {place}, at other speeds and with another load, tells it from what the model has."
         );
-        Untold {
+        UndecidedEffect {
             effect: effect.clone(),
-            says: "along these motions its force is all but a combination of forces that the model has, so that even one as large \
+            reason: "along these motions its force is all but a combination of forces that the model has, so that even one as large \
                    as the drive's own is neither seen nor excluded"
                 .to_owned(),
-            separate_by: format!("{known} {more}").trim().to_owned(),
+            separating_experiment: format!("{known} {more}").trim().to_owned(),
         }
     };
-    findings.diagnosis.untold.iter().map(of).collect()
+    findings.diagnosis.undetermined_effects.iter().map(of).collect()
 }
 
 /// Unit of a constant of a found effect at its places.
-fn unit_of_constant(findings: &Findings, found: &FoundEffect, name: &str) -> String {
+fn unit_of_constant(findings: &DiagnosisFindings, found: &IdentifiedEffect, name: &str) -> String {
     let candidates = &findings.answer.candidates;
     let kind = (candidates.kinds.iter()).find(|kind| kind.name == found.effect.kind);
     let constant = kind.and_then(|kind| kind.constants.iter().find(|one| one.symbol == name));
@@ -421,9 +421,9 @@ fn unit_of_constant(findings: &Findings, found: &FoundEffect, name: &str) -> Str
 }
 
 /// Estimates as the search has them.
-fn of_search(parameters: &[EffectParameter], found: &FoundEffect) -> Vec<Estimate> {
-    let values = found.estimates.iter().zip(&found.deviations);
-    let of = |(p, (value, std)): (&EffectParameter, (&f64, &Option<f64>))| Estimate {
+fn search_estimates(parameters: &[EffectParameter], found: &IdentifiedEffect) -> Vec<EffectEstimate> {
+    let values = found.estimates.iter().zip(&found.standard_deviations);
+    let of = |(p, (value, std)): (&EffectParameter, (&f64, &Option<f64>))| EffectEstimate {
         name: p.symbol.clone(),
         value: *value,
         std: *std,
@@ -434,10 +434,10 @@ fn of_search(parameters: &[EffectParameter], found: &FoundEffect) -> Vec<Estimat
 
 /// Estimates of an effect with their deviations, from identification with everything that was found; where the model with
 /// the effects cannot say them apart, those of the search.
-fn estimates(findings: &Findings, found: &FoundEffect) -> Vec<Estimate> {
+fn estimates(findings: &DiagnosisFindings, found: &IdentifiedEffect) -> Vec<EffectEstimate> {
     let parameters = &findings.answer.problem.candidates[found.candidate].parameters;
-    let mut all = of_search(parameters, found);
-    all.extend(found.constants.iter().map(|(name, value)| Estimate {
+    let mut all = search_estimates(parameters, found);
+    all.extend(found.constants.iter().map(|(name, value)| EffectEstimate {
         name: name.clone(),
         value: *value,
         std: None,
@@ -451,7 +451,7 @@ fn estimates(findings: &Findings, found: &FoundEffect) -> Vec<Estimate> {
             if estimate.value == 0.0 {
                 continue;
             }
-            if let Some(p) = identified(findings, entry, &estimate.name) {
+            if let Some(p) = identified_parameter(findings, entry, &estimate.name) {
                 estimate.value = p.value;
                 estimate.std = p.std;
             } else if let Some((_, constant)) = estimate.name.clone().split_once('*') {
@@ -471,8 +471,8 @@ fn estimates(findings: &Findings, found: &FoundEffect) -> Vec<Estimate> {
 }
 
 /// The identified parameter of an added effect, if the model with the effects has it by itself.
-fn identified<'a>(
-    findings: &'a Findings,
+fn identified_parameter<'a>(
+    findings: &'a DiagnosisFindings,
     entry: &NewEffect,
     symbol: &str,
 ) -> Option<&'a FitParameter> {
@@ -495,11 +495,11 @@ fn identified<'a>(
         .position(|k| reduction.products[*k].0 == [(term.parameter.0, 1)])?;
     fit.parameters
         .get(k)
-        .filter(|p| p.status == Status::Identified)
+        .filter(|p| p.status == ParameterStatus::Identified)
 }
 
 /// Which experiment tells an effect from its doubles, as the library says.
-fn separate_by(findings: &Findings, found: &FoundEffect) -> Option<String> {
+fn separating_experiment(findings: &DiagnosisFindings, found: &IdentifiedEffect) -> Option<String> {
     if found.indistinguishable_from.is_empty() {
         return None;
     }
@@ -509,8 +509,8 @@ fn separate_by(findings: &Findings, found: &FoundEffect) -> Option<String> {
 }
 
 /// What a motion would have to decide. What only moves forces in time has no force of its own to be made large.
-fn separation(findings: &Findings, found: &FoundEffect) -> Option<Separation> {
-    let is_force = |effect: &&Effect| {
+fn separation(findings: &DiagnosisFindings, found: &IdentifiedEffect) -> Option<SeparationProposal> {
+    let is_force = |effect: &&LocatedEffect| {
         let kinds = findings.answer.candidates.kinds.iter();
         let mut kind = kinds.filter(|kind| kind.name == effect.kind);
         // What no library holds has no columns along another motion.
@@ -518,7 +518,7 @@ fn separation(findings: &Findings, found: &FoundEffect) -> Option<Separation> {
             .is_some_and(|kind| kind.mechanics != Some(Mechanics::Delay))
     };
     let rivals = found.indistinguishable_from.iter().filter(is_force);
-    let rivals: Vec<Effect> = rivals.cloned().collect();
+    let rivals: Vec<LocatedEffect> = rivals.cloned().collect();
     if rivals.is_empty() || !is_force(&&found.effect) {
         return None;
     }
@@ -529,14 +529,14 @@ fn separation(findings: &Findings, found: &FoundEffect) -> Option<Separation> {
     let noise = &findings.answer.problem.noise;
     let squares: f64 = noise.iter().map(|n| n * n).sum();
     let noise = (squares / noise.len().max(1) as f64).sqrt();
-    Some(Separation {
-        effect: Named {
+    Some(SeparationProposal {
+        effect: NamedEffect {
             effect: found.effect.clone(),
             values: values.map(|e| (e.name, e.value)).collect(),
         },
         rivals,
-        beside: others
-            .map(|other| Named {
+        common_effects: others
+            .map(|other| NamedEffect {
                 effect: other.effect.clone(),
                 values: other.constants.clone(),
             })
@@ -546,36 +546,36 @@ fn separation(findings: &Findings, found: &FoundEffect) -> Option<Separation> {
 }
 
 /// Where the error sits that matters: what is left unexplained, or that of the model as it is.
-fn regions(findings: &Findings) -> Vec<Region> {
+fn regions(findings: &DiagnosisFindings) -> Vec<ErrorRegion> {
     let diagnosis = &findings.answer.diagnosis;
-    if diagnosis.verdict != Verdict::Unexplained {
+    if diagnosis.verdict != DiagnosisVerdict::Unexplained {
         return findings.places.regions.clone();
     }
     let channels = &findings.answer.problem.layout.channels;
-    let left = findings.left.as_ref().unwrap_or(&findings.places);
+    let left = findings.residual_locations.as_ref().unwrap_or(&findings.places);
     let mut regions = Vec::new();
     for d in &diagnosis.unexplained {
         let of_channel = left.regions.iter().filter(|r| r.channel == channels[*d]);
         let before = regions.len();
         regions.extend(of_channel.cloned());
         if regions.len() == before {
-            regions.push(everywhere(findings, *d));
+            regions.push(overall_region(findings, *d));
         }
     }
     regions
 }
 
 /// A channel whose error sits nowhere in particular.
-fn everywhere(findings: &Findings, channel: usize) -> Region {
+fn overall_region(findings: &DiagnosisFindings, channel: usize) -> ErrorRegion {
     let name = findings.answer.problem.layout.channels[channel].clone();
-    let version = findings.last();
-    let judged = version.judged();
+    let version = findings.final_version();
+    let judged = version.validation_runs();
     let times = judged.iter().flat_map(|k| &version.runs[*k].time);
     let range = times.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], t| {
         [low.min(*t), high.max(*t)]
     });
-    let again = 100.0 * findings.answer.diagnosis.reproducible[channel];
-    Region {
+    let again = 100.0 * findings.answer.diagnosis.repeatable_share[channel];
+    ErrorRegion {
         says: format!(
             "what is left of {name} is spread over all of the time, and {again:.0} % of its square comes again with the state"
         ),
@@ -588,8 +588,8 @@ fn everywhere(findings: &Findings, channel: usize) -> Region {
 }
 
 /// Where the error of a model lives on the recordings that are judged.
-fn places(version: &Version) -> Outcome<Places> {
-    let judged = version.judged();
+fn judged_error_locations(version: &ModelVersion) -> Outcome<ErrorLocations> {
+    let judged = version.validation_runs();
     let (first, last) = (
         judged.first().copied().unwrap_or(0),
         judged.last().map_or(0, |k| k + 1),
@@ -597,7 +597,7 @@ fn places(version: &Version) -> Outcome<Places> {
     let runs = &version.runs[first..last];
     let measured: Vec<_> = runs.iter().map(|run| run.measured.clone()).collect();
     let forces: Vec<_> = runs.iter().map(|run| run.forces.clone()).collect();
-    compare::places(
+    compare::error_locations(
         &version.model,
         &version.data[first..last],
         &measured,
@@ -606,9 +606,9 @@ fn places(version: &Version) -> Outcome<Places> {
 }
 
 /// Variables along the recordings that are judged, one after the other.
-fn variables(version: &Version) -> Outcome<Vec<(String, Vec<f64>)>> {
+fn variables(version: &ModelVersion) -> Outcome<Vec<(String, Vec<f64>)>> {
     let mut joined: Vec<(String, Vec<f64>)> = Vec::new();
-    for k in version.judged() {
+    for k in version.validation_runs() {
         let variables = along::variables(&version.model, &version.data[k])?;
         if joined.is_empty() {
             joined = variables;

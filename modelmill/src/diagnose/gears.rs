@@ -4,14 +4,14 @@
 //! between flanks do not show in this.
 
 use modelmill_identify::diagnose::{
-    Candidate, Choice, Column, Effect, EffectParameter, Nature, Sign, Source,
+    CandidateEffect, ColumnChoice, ForceColumn, LocatedEffect, EffectParameter, CandidateNature, SignConstraint, ColumnSource,
 };
 use modelmill_spec::DriveKind;
 
 use crate::along;
 use crate::error::Outcome;
 use crate::model::Model;
-use crate::regressors::Runs;
+use crate::regressors::SegmentList;
 
 use super::numbers::stack;
 
@@ -22,10 +22,10 @@ const KINDS: [(&str, &str); 2] = [("drive_compliance", "compliance"), ("backlash
 /// rate and acceleration of each coordinate, and `values` are base parameters.
 pub(crate) fn gears(
     model: &Model,
-    all: &Runs<'_>,
+    all: &SegmentList<'_>,
     values: &[f64],
-    slopes: &[Option<[Column; 3]>],
-) -> Outcome<Vec<Candidate>> {
+    slopes: &[Option<[ForceColumn; 3]>],
+) -> Outcome<Vec<CandidateEffect>> {
     // Friction of motor and gear does not pass through the gear.
     let carried: Vec<f64> = (values.iter().enumerate())
         .map(|(k, value)| if model.is_effect(k) { 0.0 } else { *value })
@@ -47,7 +47,7 @@ pub(crate) fn gears(
         Ok(loads.into_iter().chain(rates).chain(bends).collect())
     })?;
     let mechanism = &model.derivation.mechanism;
-    let active = model.active();
+    let active = model.active_coordinates();
     let driven = mechanism.drives.iter().filter(|drive| drive.is_driven);
     let mut candidates = Vec::new();
     for (d, drive) in driven.enumerate() {
@@ -69,7 +69,7 @@ pub(crate) fn gears(
                 (false, 0) => 0.5 * loads[d][sample].signum(),
                 (false, _) => 0.0,
             };
-            let mut column = Column(vec![None; n]);
+            let mut column = ForceColumn(vec![None; n]);
             for (order, slope) in slopes.iter().enumerate() {
                 let mut part = slope.clone();
                 for values in part.0.iter_mut().flatten() {
@@ -88,22 +88,22 @@ pub(crate) fn gears(
                 (false, true) => "rad",
                 (false, false) => "m",
             };
-            candidates.push(Candidate {
-                effect: Effect {
+            candidates.push(CandidateEffect {
+                effect: LocatedEffect {
                     kind: kind.to_owned(),
                     at: vec![drive.name.clone()],
                 },
                 parameters: vec![EffectParameter {
                     symbol: symbol.to_owned(),
                     unit: unit.to_owned(),
-                    sign: Sign::Positive,
+                    sign: SignConstraint::Positive,
                 }],
-                searched: 0,
+                searched_constants: 0,
                 is_part_of_load: false,
                 refines: None,
-                nature: Nature::Effect,
+                nature: CandidateNature::Effect,
                 is_per_run: false,
-                source: Source::Columns(vec![Choice {
+                source: ColumnSource::Columns(vec![ColumnChoice {
                     constants: Vec::new(),
                     columns: vec![column],
                 }]),

@@ -2,9 +2,9 @@
 //! lack it.
 
 use modelmill_identify::diagnose::{
-    Candidate, Choice, Column, Effect, EffectParameter, Nature, Sign, Source,
+    CandidateEffect, ColumnChoice, ForceColumn, LocatedEffect, EffectParameter, CandidateNature, SignConstraint, ColumnSource,
 };
-use modelmill_spec::{EffectTerm, Place};
+use modelmill_spec::{EffectTerm, EffectPlace};
 
 use crate::model::Model;
 
@@ -13,12 +13,12 @@ const KINDS: [&str; 2] = ["coulomb_friction", "viscous_friction"];
 
 /// A change of the friction that the model has, for each set of drives at which it has the same; `base` are the columns of all
 /// base parameters.
-pub(crate) fn changes(model: &Model, base: &[Column]) -> Vec<Candidate> {
+pub(crate) fn changes(model: &Model, base: &[ForceColumn]) -> Vec<CandidateEffect> {
     let effects = &model.derivation.mechanism.effects;
     let own = effects
         .iter()
         .filter(|effect| KINDS.contains(&effect.kind.as_str()));
-    let mut of_places: Vec<(&[Place], Vec<&EffectTerm>)> = Vec::new();
+    let mut of_places: Vec<(&[EffectPlace], Vec<&EffectTerm>)> = Vec::new();
     for effect in own {
         match of_places
             .iter_mut()
@@ -35,12 +35,12 @@ pub(crate) fn changes(model: &Model, base: &[Column]) -> Vec<Candidate> {
 
 fn change(
     model: &Model,
-    base: &[Column],
-    at: &[Place],
+    base: &[ForceColumn],
+    at: &[EffectPlace],
     terms: &[&EffectTerm],
-) -> Option<Candidate> {
-    let drive = |place: &Place| match place {
-        Place::Drive(d) => Some(d.0),
+) -> Option<CandidateEffect> {
+    let drive = |place: &EffectPlace| match place {
+        EffectPlace::Drive(d) => Some(d.0),
         _ => None,
     };
     let drives: Vec<usize> = at.iter().map(drive).collect::<Option<_>>()?;
@@ -53,21 +53,21 @@ fn change(
     let parameter = |(term, k): (&&EffectTerm, &usize)| EffectParameter {
         symbol: format!("change of {}", term.symbol),
         unit: model.base[*k].unit.clone(),
-        sign: Sign::Any,
+        sign: SignConstraint::Any,
     };
     let names = model.drives();
-    Some(Candidate {
-        effect: Effect {
+    Some(CandidateEffect {
+        effect: LocatedEffect {
             kind: "different_runs".to_owned(),
             at: drives.iter().map(|d| names[*d].clone()).collect(),
         },
         parameters: terms.iter().zip(&which).map(parameter).collect(),
-        searched: 0,
+        searched_constants: 0,
         is_part_of_load: false,
         refines: None,
-        nature: Nature::Disturbance,
+        nature: CandidateNature::Disturbance,
         is_per_run: false,
-        source: Source::Columns(vec![Choice {
+        source: ColumnSource::Columns(vec![ColumnChoice {
             constants: Vec::new(),
             columns: which.iter().map(|k| base[*k].clone()).collect(),
         }]),

@@ -4,12 +4,12 @@
 //! States that were smoothed change little between samples; after a first step as many are left for every one that is kept in
 //! the end as the parallel filter needs to filter regressor and forces alike.
 
-use modelmill_identify::{LowPass, Note, PASSED_BY_DECIMATION, decimate_time};
+use modelmill_identify::{LowPass, RecordingNote, DECIMATION_PASSBAND, decimate_time};
 
 use crate::error::{Error, Outcome};
 use crate::model::Model;
-use crate::recording::Recording;
-use crate::stretch::Stretch;
+use crate::recording::PreparedRecording;
+use crate::stretch::RecordingSegment;
 
 /// Shorter stretches stay as they are.
 const LONG: usize = 150_000;
@@ -23,19 +23,19 @@ const LEFT: usize = 4;
 /// would change forces that are held against states as they were.
 const ORDER: usize = 4;
 
-impl Recording {
+impl PreparedRecording {
     /// The recording with long stretches in the fewer samples that a diagnosis looks at: for those who need it for nothing else,
     /// since it takes less memory so.
     ///
     /// Fails when a stretch cannot be filtered.
     pub fn for_diagnosis(&self, model: &Model) -> Outcome<Self> {
-        let stretches = self.stretches.iter().map(|one| thinned(model, one));
-        Ok(self.with(stretches.collect::<Outcome<_>>()?))
+        let stretches = self.segments.iter().map(|one| thin_out(model, one));
+        Ok(self.with_segments(stretches.collect::<Outcome<_>>()?))
     }
 }
 
 /// A stretch in fewer samples, if it is long and the parallel filter keeps few of them.
-pub(crate) fn thinned(model: &Model, stretch: &Stretch) -> Outcome<Stretch> {
+pub(crate) fn thin_out(model: &Model, stretch: &RecordingSegment) -> Outcome<RecordingSegment> {
     let (samples, every) = (stretch.samples(), stretch.decimation());
     let time = &stretch.run.time;
     let step = match time.as_slice() {
@@ -45,7 +45,7 @@ pub(crate) fn thinned(model: &Model, stretch: &Stretch) -> Outcome<Stretch> {
     let kept = samples.div_ceil(every);
     // Beyond, the parallel filter would take too much of what tells effects apart.
     let most = (stretch.run.prepared.band_hz).map_or(every as f64, |band| {
-        PASSED_BY_DECIMATION / (PART_OF_BAND * band * step)
+        DECIMATION_PASSBAND / (PART_OF_BAND * band * step)
     });
     let wanted = (every + 1..=every * kept.div_ceil(KEPT))
         .rev()
@@ -61,7 +61,7 @@ pub(crate) fn thinned(model: &Model, stretch: &Stretch) -> Outcome<Stretch> {
     };
     let filtered = |all: &[Vec<f64>]| -> Outcome<Vec<Vec<f64>>> {
         let one = |values: &Vec<f64>| -> Outcome<Vec<f64>> {
-            let filter = LowPass::butterworth(ORDER, PASSED_BY_DECIMATION / factor as f64, 1.0);
+            let filter = LowPass::butterworth(ORDER, DECIMATION_PASSBAND / factor as f64, 1.0);
             let smooth = filter.and_then(|filter| filter.zero_phase(values));
             let smooth = smooth.map_err(|error| Error::input(format!("{}: {error}", run.file)))?;
             Ok(smooth.into_iter().step_by(factor).collect())
@@ -76,12 +76,12 @@ pub(crate) fn thinned(model: &Model, stretch: &Stretch) -> Outcome<Stretch> {
         };
         (0..out.len().div_ceil(factor)).map(about).collect()
     };
-    let mut thinned = Stretch {
+    let mut thinned = RecordingSegment {
         variance: stretch.variance.as_deref().map(picked),
         load: stretch.load.as_deref().map(&filtered).transpose()?,
         maps_from_degrees: stretch.maps_from_degrees.clone(),
         faults: stretch.faults.clone(),
-        ..Stretch::from(modelmill_identify::Run {
+        ..RecordingSegment::from(modelmill_identify::PreparedRun {
             file: run.file.clone(),
             time: decimate_time(time, factor),
             q: picked(&run.q),
@@ -91,13 +91,13 @@ pub(crate) fn thinned(model: &Model, stretch: &Stretch) -> Outcome<Stretch> {
             missing_force: run.missing_force.clone(),
             left_out: run.left_out.iter().map(heard).collect(),
             lines: run.lines.iter().copied().step_by(factor).collect(),
-            repeats: run.repeats.clone(),
+            repeatability: run.repeatability.clone(),
             prepared: run.prepared.clone(),
             notes: run.notes.clone(),
         })
     };
     thinned.run.prepared.decimate = LEFT;
-    let passed = PASSED_BY_DECIMATION / (step * (factor * LEFT) as f64);
+    let passed = DECIMATION_PASSBAND / (step * (factor * LEFT) as f64);
     let says = format!(
         "{} is long: the diagnosis looks at one in {} of its {samples} samples, after the parallel filter, which passes what \
          is below {} Hz.",
@@ -105,22 +105,22 @@ pub(crate) fn thinned(model: &Model, stretch: &Stretch) -> Outcome<Stretch> {
         factor * LEFT,
         crate::text::table::significant(passed, 3)
     );
-    thinned.note(model, Note::info(says));
+    thinned.note(model, RecordingNote::info(says));
     Ok(thinned)
 }
 
 #[cfg(test)]
 mod tests {
-    use modelmill_identify::{PreparedAs, Run};
+    use modelmill_identify::{PreparationRecord, PreparedRun};
 
     use super::*;
     use crate::Host;
 
     /// A long stretch of a pendulum, of which the parallel filter keeps one in ten samples.
-    fn long(samples: usize, band_hz: f64) -> Stretch {
+    fn long(samples: usize, band_hz: f64) -> RecordingSegment {
         let time: Vec<f64> = (0..samples).map(|i| 1e-3 * i as f64).collect();
         let of = |f: &dyn Fn(f64) -> f64| vec![time.iter().map(|t| f(*t)).collect::<Vec<f64>>()];
-        Stretch::from(Run {
+        RecordingSegment::from(PreparedRun {
             file: "long.csv".to_owned(),
             q: of(&f64::sin),
             qd: of(&f64::cos),
@@ -129,11 +129,11 @@ mod tests {
             missing_force: Vec::new(),
             left_out: vec![vec![false; samples]],
             lines: (0..samples as u64).collect(),
-            repeats: None,
-            prepared: PreparedAs {
+            repeatability: None,
+            prepared: PreparationRecord {
                 band_hz: Some(band_hz),
                 decimate: 10,
-                ..PreparedAs::default()
+                ..PreparationRecord::default()
             },
             notes: Vec::new(),
             time,
@@ -156,19 +156,19 @@ mod tests {
             (650_000, 100.0, 40_625),
         ] {
             let whole = long(samples, band);
-            let fewer = thinned(&model, &whole).unwrap_or_else(|error| panic!("{error}"));
+            let fewer = thin_out(&model, &whole).unwrap_or_else(|error| panic!("{error}"));
             assert_eq!(
                 fewer.samples().div_ceil(fewer.decimation()),
                 kept,
                 "{band} Hz"
             );
-            let again = thinned(&model, &fewer).unwrap_or_else(|error| panic!("{error}"));
+            let again = thin_out(&model, &fewer).unwrap_or_else(|error| panic!("{error}"));
             assert_eq!(again.samples(), fewer.samples());
             assert_eq!(again.decimation(), fewer.decimation());
             // States are picked, and forces go with them.
             for (q, force) in fewer.run.q[0]
                 .iter()
-                .zip(&fewer.run.measured().expect("forces")[0])
+                .zip(&fewer.run.measured_forces().expect("forces")[0])
             {
                 assert!((force - 5.0 * q).abs() < 1e-3, "{force} N m at {q}");
             }

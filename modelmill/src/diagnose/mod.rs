@@ -31,13 +31,13 @@ mod versions;
 pub mod words;
 
 pub(crate) use candidates::sign;
-pub use chosen::Named;
-pub(crate) use chosen::{Chosen, Constants, base, choose};
-pub use findings::{Estimate, Findings, Missing, Question, Separation, Untold, WithNominal};
-pub use laws::{Hypothesis, Law, LawEntry};
+pub use chosen::NamedEffect;
+pub(crate) use chosen::{ChosenEffect, ConstantPolicy, base_columns, derive_effect};
+pub use findings::{EffectEstimate, DiagnosisFindings, MissingEffect, DiagnosisOptions, SeparationProposal, UndecidedEffect, NominalDiagnosis};
+pub use laws::{LawHypothesis, ProposedLaw, LawEntry};
 pub use modelmill_identify::diagnose::{
-    Budget, Diagnosis, Disturbance, Effect, Quantity, Rung, Verdict,
+    ResidualBudget, ModelDiagnosis, Disturbance, LocatedEffect, EstimatedQuantity, SelectionStep, DiagnosisVerdict,
 };
-pub use off_nominal::OffNominal;
-pub use problem::Held;
-pub use versions::{Along, Version};
+pub use off_nominal::OffNominalParameter;
+pub use problem::FixedParameters;
+pub use versions::{ForceComparison, ModelVersion};

@@ -1,18 +1,18 @@
 //! Numbers along all recordings of a diagnosis: regressors, motions of places, each channel stacked and decimated alike.
 
-use modelmill_codegen::Evaluator;
-use modelmill_identify::diagnose::{Layout, Stretch as LaidOut};
-use modelmill_spec::Place;
+use modelmill_codegen::ModelEvaluator;
+use modelmill_identify::diagnose::{SampleLayout, SampleSegment as LaidOut};
+use modelmill_spec::EffectPlace;
 
-use crate::along::decimated;
+use crate::along::filter_and_decimate;
 use crate::error::{Error, Outcome};
 use crate::model::Model;
-use crate::regressors::Runs;
-use crate::stretch::Stretch;
+use crate::regressors::SegmentList;
+use crate::stretch::RecordingSegment;
 
 /// Names of the channels and lengths of the stretches.
-pub(crate) fn layout(model: &Model, all: &Runs<'_>) -> Layout {
-    let stretch = |(one, is_check): &(&Stretch, bool)| {
+pub(crate) fn layout(model: &Model, all: &SegmentList<'_>) -> SampleLayout {
+    let stretch = |(one, is_check): &(&RecordingSegment, bool)| {
         let time = one.time();
         let mean = |time: &[f64]| match time {
             [first, .., last] => (last - first) / (time.len() - 1) as f64,
@@ -22,36 +22,36 @@ pub(crate) fn layout(model: &Model, all: &Runs<'_>) -> Layout {
             name: one.run.file.clone(),
             samples: time.len(),
             step: mean(&time),
-            sampled: mean(&one.run.time),
+            recorded_step: mean(&one.run.time),
             is_check: *is_check,
         }
     };
     let all_count = (all.iter()).all(|(one, _)| one.run.left_out.iter().flatten().all(|out| !out));
     let of_drive = |drive: usize| {
-        let of = |(one, _): &(&Stretch, bool)| -> Vec<bool> {
+        let of = |(one, _): &(&RecordingSegment, bool)| -> Vec<bool> {
             let kept = 0..one.time().len();
-            kept.map(|i| one.hears_of_faults(drive, i)).collect()
+            kept.map(|i| one.has_excluded_input(drive, i)).collect()
         };
         all.iter().flat_map(of).collect()
     };
     let drives = if all_count { 0 } else { model.drives().len() };
-    Layout {
+    SampleLayout {
         channels: model.drives(),
-        stretches: all.iter().map(stretch).collect(),
+        segments: all.iter().map(stretch).collect(),
         left_out: (0..drives).map(of_drive).collect(),
     }
 }
 
 /// Channels of all recordings one after the other, decimated like the forces.
 pub(crate) fn stack(
-    all: &Runs<'_>,
-    mut of: impl FnMut(&Stretch) -> Outcome<Vec<Vec<f64>>>,
+    all: &SegmentList<'_>,
+    mut of: impl FnMut(&RecordingSegment) -> Outcome<Vec<Vec<f64>>>,
 ) -> Outcome<Vec<Vec<f64>>> {
     let mut stacked: Vec<Vec<f64>> = Vec::new();
     for (one, _) in all {
         let columns = of(one)?;
         stacked.resize(columns.len().max(stacked.len()), Vec::new());
-        for (whole, column) in stacked.iter_mut().zip(decimated(columns, one)?) {
+        for (whole, column) in stacked.iter_mut().zip(filter_and_decimate(columns, one)?) {
             whole.extend(column);
         }
     }
@@ -59,11 +59,11 @@ pub(crate) fn stack(
 }
 
 /// Variables on which an unknown force may depend.
-pub(crate) fn variables(model: &Model, all: &Runs<'_>) -> Vec<(String, Vec<f64>)> {
+pub(crate) fn variables(model: &Model, all: &SegmentList<'_>) -> Vec<(String, Vec<f64>)> {
     let mut variables = Vec::new();
-    for (i, name) in model.active().into_iter().enumerate() {
+    for (i, name) in model.active_coordinates().into_iter().enumerate() {
         for (suffix, order) in [("", 0), ("_d", 1), ("_dd", 2)] {
-            let of = |one: &Stretch| -> Vec<f64> {
+            let of = |one: &RecordingSegment| -> Vec<f64> {
                 let run = &one.run;
                 let values = [&run.q, &run.qd, &run.qdd][order];
                 values[i]
@@ -80,7 +80,7 @@ pub(crate) fn variables(model: &Model, all: &Runs<'_>) -> Vec<(String, Vec<f64>)
 }
 
 /// Largest rate and travel of a place; zero where it has none.
-pub(crate) struct Motions {
+pub(crate) struct PlaceMotions {
     drives: Vec<Vec<f64>>,
     active: Vec<usize>,
     active_motion: Vec<[Vec<f64>; 2]>,
@@ -88,18 +88,18 @@ pub(crate) struct Motions {
     passive_motion: Vec<Vec<f64>>,
 }
 
-impl Motions {
-    pub(crate) fn new(model: &Model, all: &Runs<'_>) -> Outcome<Self> {
-        let evaluator = Evaluator::new(&model.derivation);
+impl PlaceMotions {
+    pub(crate) fn new(model: &Model, all: &SegmentList<'_>) -> Outcome<Self> {
+        let evaluator = ModelEvaluator::new(&model.derivation);
         let (active, passive) = model.derivation.coordinates();
-        let drives = states(all, model, |states| evaluator.drives(states))?;
+        let drives = stack_states(all, model, |states| evaluator.drive_motion(states))?;
         let passive_motion = if passive.is_empty() {
             Vec::new()
         } else {
-            states(all, model, |states| evaluator.passive(states))?
+            stack_states(all, model, |states| evaluator.passive_motion(states))?
         };
         let motion = |order: usize, i: usize| -> Vec<f64> {
-            let one = |(data, _): &(&Stretch, bool)| [&data.run.q, &data.run.qd][order][i].clone();
+            let one = |(data, _): &(&RecordingSegment, bool)| [&data.run.q, &data.run.qd][order][i].clone();
             all.iter().flat_map(one).collect()
         };
         Ok(Self {
@@ -114,11 +114,11 @@ impl Motions {
     }
 
     /// Largest rate and travel.
-    pub(crate) fn scale(&self, place: Place) -> [f64; 2] {
+    pub(crate) fn scale(&self, place: EffectPlace) -> [f64; 2] {
         let n = self.drives.len() / (2 + self.active.len()).max(1);
         let found = match place {
-            Place::Drive(d) => Some((&self.drives[n + d.0], &self.drives[d.0])),
-            Place::Coordinate(i) => {
+            EffectPlace::Drive(d) => Some((&self.drives[n + d.0], &self.drives[d.0])),
+            EffectPlace::Coordinate(i) => {
                 let at = |list: &[usize]| list.iter().position(|k| *k == i.0);
                 let passive = at(&self.passive).map(|k| {
                     (
@@ -141,11 +141,11 @@ impl Motions {
     }
 }
 
-fn states(
-    all: &Runs<'_>,
+fn stack_states(
+    all: &SegmentList<'_>,
     model: &Model,
     mut evaluate: impl FnMut(
-        &modelmill_codegen::States<'_>,
+        &modelmill_codegen::MotionStates<'_>,
     ) -> Result<Vec<Vec<f64>>, modelmill_codegen::PoseFault>,
 ) -> Outcome<Vec<Vec<f64>>> {
     let mut stacked: Vec<Vec<f64>> = Vec::new();

@@ -1,10 +1,10 @@
 //! Base parameters that come out off what the file says, and what that means where no body could have them.
 
-use modelmill_identify::{FitParameter, Note, Status};
+use modelmill_identify::{FitParameter, RecordingNote, ParameterStatus};
 use modelmill_runtime::Random;
 use modelmill_spec::Sign;
 
-use super::versions::Version;
+use super::versions::ModelVersion;
 
 /// A base parameter is off its nominal value from this many of its deviations on, and from this share of it on.
 const SIGMAS: f64 = 5.0;
@@ -16,7 +16,7 @@ const TRIED: usize = 200;
 
 /// A base parameter that is not what the file says.
 #[derive(Clone, Debug, PartialEq)]
-pub struct OffNominal {
+pub struct OffNominalParameter {
     /// The parameter as it was identified.
     pub parameter: FitParameter,
     /// Its nominal value.
@@ -26,19 +26,19 @@ pub struct OffNominal {
 }
 
 /// Base parameters of the bodies that are not what the file says, with the nominal value and the distance in deviations.
-pub(super) fn off_nominal(version: &Version) -> Vec<OffNominal> {
+pub(super) fn off_nominal_parameters(version: &ModelVersion) -> Vec<OffNominalParameter> {
     let Some(identified) = &version.identified else {
         return Vec::new();
     };
     let parameters = identified.fit.parameters.iter().enumerate();
-    let mut off: Vec<OffNominal> = parameters
-        .filter(|(k, p)| p.status == Status::Identified && !version.model.is_effect(*k))
+    let mut off: Vec<OffNominalParameter> = parameters
+        .filter(|(k, p)| p.status == ParameterStatus::Identified && !version.model.is_effect(*k))
         .filter_map(|(_, p)| {
             let (nominal, std) = (p.nominal?, p.std?);
             let sigmas = (p.value - nominal).abs() / std;
             let is_off =
                 std > 0.0 && sigmas > SIGMAS && (p.value - nominal).abs() > OFF * nominal.abs();
-            is_off.then(|| OffNominal {
+            is_off.then(|| OffNominalParameter {
                 parameter: p.clone(),
                 nominal,
                 sigmas,
@@ -51,9 +51,9 @@ pub(super) fn off_nominal(version: &Version) -> Vec<OffNominal> {
 
 /// What base parameters say whose sign no bodies near those of the file have: not the bodies are wrong, but what turns their
 /// forces.
-pub(super) fn turned(version: &Version, off: &[OffNominal]) -> Option<Note> {
+pub(super) fn reversed_sign_note(version: &ModelVersion, off: &[OffNominalParameter]) -> Option<RecordingNote> {
     let model = &version.model;
-    let has_turned = |off: &&OffNominal| {
+    let has_turned = |off: &&OffNominalParameter| {
         let p = &off.parameter;
         let is_other = p.value * off.nominal < 0.0
             && p.std.is_some_and(|std| p.value.abs() > SIGMAS * std)
@@ -61,10 +61,10 @@ pub(super) fn turned(version: &Version, off: &[OffNominal]) -> Option<Note> {
         let k = model.base.iter().position(|one| one.name == p.name);
         is_other && k.is_some_and(|k| has_one_sign(version, k))
     };
-    let turned: Vec<&OffNominal> = off.iter().filter(has_turned).collect();
+    let turned: Vec<&OffNominalParameter> = off.iter().filter(has_turned).collect();
     let first = turned.first()?;
     let names: Vec<&str> = turned.iter().map(|o| o.parameter.name.as_str()).collect();
-    Some(Note::warning(format!(
+    Some(RecordingNote::warning(format!(
         "{} with a sign that no bodies near those of the file have (`{}` is {:.4} {unit}; the file's values give {:.4} {unit}). Look \
          first at the direction of gravity, the signs of lengths and angles, and which way drives and columns of the recording \
          count (verb `check` draws the mechanism with option `picture`): what is said to be missing may only make up for that.",
@@ -82,7 +82,7 @@ pub(super) fn turned(version: &Version, off: &[OffNominal]) -> Option<Note> {
 
 /// Whether a base parameter keeps its sign whatever the parameters of the bodies are, within a factor of those of the file. First
 /// moments and products of inertia may have either sign: they turn with a small change of where a body's mass is.
-fn has_one_sign(version: &Version, k: usize) -> bool {
+fn has_one_sign(version: &ModelVersion, k: usize) -> bool {
     let derivation = &version.model.derivation;
     let mechanism = &derivation.mechanism;
     let constants: Vec<f64> = mechanism.constants.iter().map(|c| c.value).collect();
@@ -100,13 +100,13 @@ fn has_one_sign(version: &Version, k: usize) -> bool {
         alike.map(|p| p.nominal.abs()).fold(0.0, f64::max)
     };
     let mut factor = |i: usize| {
-        let turned = if may_turn(i) && random.between(0.0, 1.0) < 0.5 {
+        let turned = if may_turn(i) && random.uniform(0.0, 1.0) < 0.5 {
             -1.0
         } else {
             1.0
         };
         // Extremes count most: a sum changes its sign there first.
-        turned * FACTOR.powf(random.between(-2.0, 2.0).clamp(-1.0, 1.0))
+        turned * FACTOR.powf(random.uniform(-2.0, 2.0).clamp(-1.0, 1.0))
     };
     (0..TRIED).all(|_| {
         let parameters = (0..mechanism.parameters.len()).map(|i| size(i) * factor(i));

@@ -1,7 +1,7 @@
 //! Places at which effects of a kind may act, alone, in pairs, and alike at several.
 
 use modelmill_spec::{
-    ActsOn, Carries, DriveIdx, DriveKind, EffectKind, Mechanics, Mechanism, PartIdx, Place,
+    ActsOn, PlaceLoad, DriveIdx, DriveKind, EffectKind, Mechanics, Mechanism, PartIdx, EffectPlace,
     PointIdx,
 };
 
@@ -9,16 +9,16 @@ use crate::recording::free::free_bodies;
 
 /// A place with its name and what it carries.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Spot {
+pub(crate) struct CandidatePlace {
     pub name: String,
-    pub carries: Carries,
+    pub carries: PlaceLoad,
     pub sort: ActsOn,
-    pub place: Place,
+    pub place: EffectPlace,
 }
 
 /// All places of a mechanism.
-pub(crate) fn spots(mechanism: &Mechanism) -> Vec<Spot> {
-    let spot = |name: &str, carries: Carries, sort: ActsOn, place: Place| Spot {
+pub(crate) fn candidate_places(mechanism: &Mechanism) -> Vec<CandidatePlace> {
+    let spot = |name: &str, carries: PlaceLoad, sort: ActsOn, place: EffectPlace| CandidatePlace {
         name: name.to_owned(),
         carries,
         sort,
@@ -35,32 +35,32 @@ pub(crate) fn spots(mechanism: &Mechanism) -> Vec<Spot> {
         if let DriveKind::Joint(i) = drive.kind {
             driven.push(i.0);
         }
-        let carries = drive.kind.carries(&mechanism.coordinates);
-        let place = Place::Drive(DriveIdx(d));
+        let carries = drive.kind.place_load(&mechanism.coordinates);
+        let place = EffectPlace::Drive(DriveIdx(d));
         spots.push(spot(&drive.name, carries, ActsOn::Drive, place));
     }
     // A joint with a drive of its own is the same place.
     for (i, coordinate) in mechanism.coordinates.iter().enumerate() {
         if !driven.contains(&i) && !is_free(mechanism, i) {
-            let place = Place::Coordinate(modelmill_spec::CoordinateIdx(i));
-            let carries = coordinate.motion.carries();
+            let place = EffectPlace::Coordinate(modelmill_spec::CoordinateIdx(i));
+            let carries = coordinate.motion.place_load();
             spots.push(spot(&coordinate.name, carries, ActsOn::Coordinate, place));
         }
     }
     for (i, point) in mechanism.points.iter().enumerate() {
-        let place = Place::Point(PointIdx(i));
-        spots.push(spot(&point.name, Carries::Mass, ActsOn::Point, place));
+        let place = EffectPlace::Point(PointIdx(i));
+        spots.push(spot(&point.name, PlaceLoad::Mass, ActsOn::Point, place));
     }
     for (i, part) in mechanism.parts.iter().enumerate() {
-        let place = Place::Part(PartIdx(i));
-        spots.push(spot(&part.name, Carries::Elsewhere, ActsOn::Part, place));
+        let place = EffectPlace::Part(PartIdx(i));
+        spots.push(spot(&part.name, PlaceLoad::Elsewhere, ActsOn::Part, place));
     }
-    spots.push(spot("base", Carries::Elsewhere, ActsOn::Base, Place::Base));
+    spots.push(spot("base", PlaceLoad::Elsewhere, ActsOn::Base, EffectPlace::Base));
     spots.push(spot(
         "force",
-        Carries::Elsewhere,
+        PlaceLoad::Elsewhere,
         ActsOn::Force,
-        Place::Force,
+        EffectPlace::Force,
     ));
     spots
 }
@@ -75,14 +75,14 @@ pub(crate) fn is_free(mechanism: &Mechanism, coordinate: usize) -> bool {
 }
 
 /// Whether a kind may act at a place and could say something there.
-pub(crate) fn fits(mechanism: &Mechanism, kind: &EffectKind, spot: &Spot) -> bool {
-    let has_unit = |units: &[(Carries, String)]| units.iter().any(|(c, _)| *c == spot.carries);
+pub(crate) fn is_applicable(mechanism: &Mechanism, kind: &EffectKind, spot: &CandidatePlace) -> bool {
+    let has_unit = |units: &[(PlaceLoad, String)]| units.iter().any(|(c, _)| *c == spot.carries);
     let has_units = kind.parameters.iter().all(|p| has_unit(&p.units));
     if !kind.on.contains(&spot.sort) {
         return false;
     }
     let joins_points = |mechanics: Mechanics| mechanics.pairs(mechanism).is_some();
-    if let Place::Point(point) = spot.place
+    if let EffectPlace::Point(point) = spot.place
         && mechanism.points[point.0].frame.0 == 0
         && !kind.mechanics.is_some_and(joins_points)
     {
@@ -94,22 +94,22 @@ pub(crate) fn fits(mechanism: &Mechanism, kind: &EffectKind, spot: &Spot) -> boo
     }
     match spot.place {
         // Of the points that a loop joins one is enough.
-        Place::Point(p) => {
+        EffectPlace::Point(p) => {
             let mut loops = mechanism.loops.iter();
             has_units && loops.all(|l| l.joins[1] != p)
         }
         // Waves along the travel come from drives.
-        Place::Coordinate(_) => has_units && !is_wave(kind),
+        EffectPlace::Coordinate(_) => has_units && !is_wave(kind),
         _ => has_units,
     }
 }
 
 /// Whether a kind repeats itself along the travel of its place, several times at least where it is shortest.
 pub(crate) fn is_wave(kind: &EffectKind) -> bool {
-    use modelmill_spec::{Scale, Search};
+    use modelmill_spec::{Scale, ConstantSearch};
     const SEVERAL: f64 = 0.5;
     kind.constants.iter().any(|c| match c.search {
-        Some(Search::Range { from, of, .. }) => of == Scale::Travel && from < SEVERAL,
+        Some(ConstantSearch::Range { from, of, .. }) => of == Scale::Travel && from < SEVERAL,
         _ => false,
     })
 }
@@ -119,31 +119,31 @@ pub(crate) fn is_wave(kind: &EffectKind) -> bool {
 ///
 /// Each place alone; pairs for kinds that need two; and in machines with loops, whose sides are often alike, all drives, all
 /// passive joints and all active ones.
-pub(crate) fn sets<'a>(
+pub(crate) fn place_sets<'a>(
     mechanism: &Mechanism,
     kind: &EffectKind,
-    spots: &[&'a Spot],
-    all: &'a [Spot],
-) -> (Vec<Vec<&'a Spot>>, Vec<Vec<usize>>) {
+    spots: &[&'a CandidatePlace],
+    all: &'a [CandidatePlace],
+) -> (Vec<Vec<&'a CandidatePlace>>, Vec<Vec<usize>>) {
     if let Some(motion) = kind.other {
-        let moves = |spot: &&&Spot| {
+        let moves = |spot: &&&CandidatePlace| {
             matches!(spot.sort, ActsOn::Drive | ActsOn::Coordinate)
-                && spot.carries == motion.carries()
+                && spot.carries == motion.place_load()
         };
-        let others: Vec<&Spot> = all.iter().filter(|spot| moves(&spot)).collect();
-        let with_others = |one: &&'a Spot| {
+        let others: Vec<&CandidatePlace> = all.iter().filter(|spot| moves(&spot)).collect();
+        let with_others = |one: &&'a CandidatePlace| {
             let one = *one;
             let apart = others.iter().filter(move |other| other.place != one.place);
             apart.map(|other| vec![one, *other]).collect::<Vec<_>>()
         };
-        let pairs: Vec<Vec<&Spot>> = spots.iter().flat_map(with_others).collect();
+        let pairs: Vec<Vec<&CandidatePlace>> = spots.iter().flat_map(with_others).collect();
         let sets = (0..pairs.len()).map(|k| vec![k]).collect();
         return (pairs, sets);
     }
     if let Some(joined) = kind.mechanics.and_then(|one| one.pairs(mechanism)) {
-        let at = |point: PointIdx| spots.iter().find(|spot| spot.place == Place::Point(point));
+        let at = |point: PointIdx| spots.iter().find(|spot| spot.place == EffectPlace::Point(point));
         let pair = |[one, other]: [PointIdx; 2]| Some(vec![*at(one)?, *at(other)?]);
-        let pairs: Vec<Vec<&Spot>> = joined.into_iter().filter_map(pair).collect();
+        let pairs: Vec<Vec<&CandidatePlace>> = joined.into_iter().filter_map(pair).collect();
         let sets = (0..pairs.len()).map(|k| vec![k]).collect();
         return (pairs, sets);
     }
@@ -160,25 +160,25 @@ pub(crate) fn sets<'a>(
         let sets = (0..pairs.len()).map(|k| vec![k]).collect();
         return (pairs, sets);
     }
-    let places: Vec<Place> = spots.iter().map(|spot| spot.place).collect();
+    let places: Vec<EffectPlace> = spots.iter().map(|spot| spot.place).collect();
     if let Some(groups) = (kind.mechanics).and_then(|one| one.groups(mechanism, &places)) {
         let sets = (0..groups.len()).map(|k| vec![k]).collect();
         let of_group = |group: Vec<usize>| group.into_iter().map(|i| spots[i]).collect();
         return (groups.into_iter().map(of_group).collect(), sets);
     }
-    let singles: Vec<Vec<&Spot>> = spots.iter().map(|spot| vec![*spot]).collect();
+    let singles: Vec<Vec<&CandidatePlace>> = spots.iter().map(|spot| vec![*spot]).collect();
     let mut sets: Vec<Vec<usize>> = (0..singles.len()).map(|k| vec![k]).collect();
     // Waves along the travel differ in their phase, even at places that are alike otherwise.
     if mechanism.loops.is_empty() || is_wave(kind) {
         return (singles, sets);
     }
-    let is_passive = |spot: &Spot| match spot.place {
-        Place::Coordinate(i) => mechanism.coordinates[i.0].passive,
+    let is_passive = |spot: &CandidatePlace| match spot.place {
+        EffectPlace::Coordinate(i) => mechanism.coordinates[i.0].passive,
         _ => false,
     };
     for sort in [ActsOn::Drive, ActsOn::Coordinate] {
         for passive in [false, true] {
-            for carries in [Carries::Force, Carries::Torque] {
+            for carries in [PlaceLoad::Force, PlaceLoad::Torque] {
                 let alike: Vec<usize> = (0..spots.len())
                     .filter(|k| {
                         let s = spots[*k];

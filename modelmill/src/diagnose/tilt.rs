@@ -1,28 +1,28 @@
 //! What forces change by with gravity along each axis of the base, for a base that may be tilted.
 
-use modelmill_codegen::{Derivation, Evaluator};
-use modelmill_identify::diagnose::{Column, Sensitivity, Tilt};
+use modelmill_codegen::{Derivation, ModelEvaluator};
+use modelmill_identify::diagnose::{ForceColumn, ForceSensitivity, TiltCandidate};
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
 use crate::error::Outcome;
 use crate::model::Model;
 
-use crate::regressors::{Runs, regressor};
+use crate::regressors::{SegmentList, regressor};
 
 /// Constants of a tilt, about x, y and z.
 pub(crate) const TILTS: [&str; 3] = ["tx", "ty", "tz"];
 
 /// What each base column changes by with gravity along each axis of the base, those of known parameters included, and the
 /// axes about which a tilt is felt. Gravity is turned into each axis, both ways: forces are linear in it.
-pub(crate) fn tilt(derivation: &Derivation, model: &Model, all: &Runs<'_>) -> Outcome<Tilt> {
+pub(crate) fn tilt(derivation: &Derivation, model: &Model, all: &SegmentList<'_>) -> Outcome<TiltCandidate> {
     let mechanism = &derivation.mechanism;
     let usual: Vec<f64> = mechanism.constants.iter().map(|c| c.value).collect();
     let gravity = model.gravity();
     let size = gravity.iter().map(|g| g * g).sum::<f64>().sqrt();
-    let mut tilt = Tilt {
+    let mut tilt = TiltCandidate {
         gravity,
         axes: Vec::new(),
-        components: std::array::from_fn(|_| Sensitivity::default()),
+        components: std::array::from_fn(|_| ForceSensitivity::default()),
     };
     if size == 0.0 {
         return Ok(tilt);
@@ -40,12 +40,12 @@ pub(crate) fn tilt(derivation: &Derivation, model: &Model, all: &Runs<'_>) -> Ou
             }
             regressor(
                 all,
-                &Evaluator::with_constants(derivation, constants),
+                &ModelEvaluator::with_constants(derivation, constants),
                 model,
             )
         };
         let [before, after] = [along(-1.0)?, along(1.0)?];
-        component.held = Column(vec![None; model.drives().len()]);
+        component.fixed = ForceColumn(vec![None; model.drives().len()]);
         // The base columns in the order of the model.
         for retained in &own.retained {
             let product = &own.products[*retained];
@@ -54,7 +54,7 @@ pub(crate) fn tilt(derivation: &Derivation, model: &Model, all: &Runs<'_>) -> Ou
                 .retained
                 .iter()
                 .position(|p| reduction.products[*p] == *product);
-            let mut change = Column(vec![None; model.drives().len()]);
+            let mut change = ForceColumn(vec![None; model.drives().len()]);
             if let Some(place) = place {
                 change.add(0.5 / size, &after[place]);
                 change.add(-0.5 / size, &before[place]);
@@ -62,13 +62,13 @@ pub(crate) fn tilt(derivation: &Derivation, model: &Model, all: &Runs<'_>) -> Ou
             component.base.push(change);
         }
     }
-    let every = Tilt {
+    let every = TiltCandidate {
         axes: vec![0, 1, 2],
         ..tilt.clone()
     };
     for (axis, direction) in every.directions(&[0.0; 3]).into_iter().enumerate() {
         let is_felt = (0..own.retained.len()).any(|k| {
-            let mut change = Column(vec![None; model.drives().len()]);
+            let mut change = ForceColumn(vec![None; model.drives().len()]);
             for (share, component) in direction.iter().zip(&tilt.components) {
                 change.add(*share, &component.base[k]);
             }

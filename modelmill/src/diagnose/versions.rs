@@ -1,27 +1,27 @@
 //! The model as it is and with what was found, each identified and run along all recordings.
 
 use crate::along;
-use crate::diagnose::Held;
+use crate::diagnose::FixedParameters;
 use crate::error::Outcome;
 use crate::identify::{self, Identification};
-use crate::identify::{Estimation, Weights};
+use crate::identify::{EstimatorOptions, EquationWeights};
 use crate::model::Model;
-use crate::stretch::Stretch;
+use crate::stretch::RecordingSegment;
 
 /// A model along the recordings.
-pub struct Version {
+pub struct ModelVersion {
     /// The model.
     pub model: Model,
     /// How it was identified; `None` where all parameters are held.
     pub identified: Option<Identification>,
     /// The recordings of the fit, then those of the check.
-    pub runs: Vec<Along>,
+    pub runs: Vec<ForceComparison>,
     /// The recordings themselves.
-    pub data: Vec<Stretch>,
+    pub data: Vec<RecordingSegment>,
 }
 
 /// Forces along a recording, `[drive][sample]`.
-pub struct Along {
+pub struct ForceComparison {
     /// The recording's name.
     pub name: String,
     /// Whether it was kept for the check.
@@ -34,7 +34,7 @@ pub struct Along {
     pub forces: Vec<Vec<f64>>,
 }
 
-impl Along {
+impl ForceComparison {
     /// What is measured and not said by the model.
     pub fn error(&self, drive: usize) -> Vec<f64> {
         let pairs = self.measured[drive].iter().zip(&self.forces[drive]);
@@ -42,16 +42,16 @@ impl Along {
     }
 }
 
-impl Version {
+impl ModelVersion {
     /// Identifies a model from the recordings of the fit, as the diagnosis does: drives of different size count alike. With
     /// held parameters the nominal values are taken.
-    pub fn new(model: Model, fit: Vec<Stretch>, check: Vec<Stretch>, held: Held) -> Outcome<Self> {
+    pub fn new(model: Model, fit: Vec<RecordingSegment>, check: Vec<RecordingSegment>, held: FixedParameters) -> Outcome<Self> {
         let identified = match held {
-            Held::All => None,
-            Held::Known => {
-                let estimators = Estimation {
-                    weights: Weights::Channels,
-                    ..Estimation::default()
+            FixedParameters::All => None,
+            FixedParameters::Known => {
+                let estimators = EstimatorOptions {
+                    weights: EquationWeights::Channels,
+                    ..EstimatorOptions::default()
                 };
                 Some(identify::identify(&model, &fit, &[], &check, &estimators)?)
             }
@@ -61,15 +61,15 @@ impl Version {
             None => model.nominal.clone(),
         };
         let n_fit = fit.len();
-        let data: Vec<Stretch> = fit.into_iter().chain(check).collect();
+        let data: Vec<RecordingSegment> = fit.into_iter().chain(check).collect();
         let mut runs = Vec::new();
         for (k, one) in data.iter().enumerate() {
-            runs.push(Along {
+            runs.push(ForceComparison {
                 name: one.run.file.clone(),
                 is_check: k >= n_fit,
                 time: one.time(),
-                measured: along::measured(one)?,
-                forces: along::decimated(along::forces(&model, one, &values)?, one)?,
+                measured: along::measured_forces(one)?,
+                forces: along::filter_and_decimate(along::forces(&model, one, &values)?, one)?,
             });
         }
         Ok(Self {
@@ -81,7 +81,7 @@ impl Version {
     }
 
     /// The recordings on which errors are judged: those of the check, or those of the fit if there are none.
-    pub fn judged(&self) -> Vec<usize> {
+    pub fn validation_runs(&self) -> Vec<usize> {
         let has_check = self.runs.iter().any(|run| run.is_check);
         (0..self.runs.len())
             .filter(|k| self.runs[*k].is_check == has_check)

@@ -1,6 +1,6 @@
 //! What was found, in sentences.
 
-use modelmill_identify::diagnose::{Diagnosis, Disturbance, Effect, Rung, Verdict};
+use modelmill_identify::diagnose::{ModelDiagnosis, Disturbance, LocatedEffect, SelectionStep, DiagnosisVerdict};
 
 use crate::audit::SUSPICIONS;
 use crate::text::table::{number, percent, significant};
@@ -11,16 +11,16 @@ const HARDLY: f64 = 0.99;
 
 /// Where errors are judged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Judged {
+pub enum ValidationMethod {
     /// On recordings that were kept for it.
     Check,
     /// On blocks of the fit that take turns.
     CrossValidation,
 }
 
-impl Judged {
+impl ValidationMethod {
     /// For a sentence: `on ...`.
-    pub fn words(self) -> &'static str {
+    pub fn phrase(self) -> &'static str {
         match self {
             Self::Check => "on the check run",
             Self::CrossValidation => "in cross-validation",
@@ -28,7 +28,7 @@ impl Judged {
     }
 
     /// For a column.
-    pub fn short(self) -> &'static str {
+    pub fn label(self) -> &'static str {
         match self {
             Self::Check => "check",
             Self::CrossValidation => "cross",
@@ -42,12 +42,12 @@ pub fn kind(name: &str) -> String {
 }
 
 /// A kind with its places.
-pub fn effect(effect: &Effect) -> String {
+pub fn effect(effect: &LocatedEffect) -> String {
     format!("{} ({})", kind(&effect.kind), effect.at.join(", "))
 }
 
 /// Effects in a row.
-pub fn effects(effects: &[Effect]) -> String {
+pub fn effects(effects: &[LocatedEffect]) -> String {
     let all: Vec<String> = effects.iter().map(effect).collect();
     match all.as_slice() {
         [] => "nothing".to_owned(),
@@ -57,7 +57,7 @@ pub fn effects(effects: &[Effect]) -> String {
 }
 
 /// What a step of the ladder did.
-pub fn rung(rung: &Rung) -> String {
+pub fn rung(rung: &SelectionStep) -> String {
     if rung.added.is_empty() && rung.dropped.is_empty() {
         return "the model as it is".to_owned();
     }
@@ -68,7 +68,7 @@ pub fn rung(rung: &Rung) -> String {
 }
 
 /// What the errors are held against: the noise in the forces, or rounding where there is none.
-pub fn floor(diagnosis: &Diagnosis) -> String {
+pub fn noise_floor_text(diagnosis: &ModelDiagnosis) -> String {
     let floor = percent(Some(diagnosis.noise_floor));
     if diagnosis.noise_floor <= 2.0 * ROUNDING {
         format!("there is no noise in the forces, and what is below {floor} is rounding")
@@ -78,28 +78,28 @@ pub fn floor(diagnosis: &Diagnosis) -> String {
 }
 
 /// The verdict with figures, what may be wrong with the input first of all, then success first: what was found, what is left and of which kind, what the recordings have besides.
-pub fn verdict(diagnosis: &Diagnosis, channels: &[String], judged: Judged) -> String {
-    let ladder = &diagnosis.ladder;
+pub fn verdict(diagnosis: &ModelDiagnosis, channels: &[String], judged: ValidationMethod) -> String {
+    let ladder = &diagnosis.steps;
     let (Some(first), Some(last)) = (ladder.first(), ladder.last()) else {
         return String::new();
     };
-    let noise = floor(diagnosis);
-    let found: Vec<Effect> = diagnosis.effects.iter().map(|f| f.effect.clone()).collect();
-    let falls = falls(first, last, channels, judged);
+    let noise = noise_floor_text(diagnosis);
+    let found: Vec<LocatedEffect> = diagnosis.effects.iter().map(|f| f.effect.clone()).collect();
+    let falls = error_reduction_text(first, last, channels, judged);
     let them = if found.len() == 1 { "it" } else { "them" };
     let says = match diagnosis.verdict {
-        Verdict::Adequate => format!(
+        DiagnosisVerdict::Adequate => format!(
             "The model is adequate: it misses the forces by {} {}; {noise}. No effect of the library would lower that where it \
              was not fitted.",
             percent(Some(last.check)),
-            judged.words()
+            judged.phrase()
         ),
-        Verdict::MissingEffect => format!(
+        DiagnosisVerdict::MissingEffect => format!(
             "The model lacks {}. With {them} {falls}; {noise}.",
             effects(&found)
         ),
-        Verdict::Unexplained => {
-            let of = |d: &usize| 100.0 * diagnosis.reproducible[*d];
+        DiagnosisVerdict::Unexplained => {
+            let of = |d: &usize| 100.0 * diagnosis.repeatable_share[*d];
             let sits: Vec<String> = (diagnosis.unexplained.iter())
                 .map(|d| {
                     format!(
@@ -115,7 +115,7 @@ pub fn verdict(diagnosis: &Diagnosis, channels: &[String], judged: Judged) -> St
                     "Something is missing that no effect of the library explains, in {sits}. The model misses the forces by {} \
                      {}; {noise}.",
                     percent(Some(last.check)),
-                    judged.words()
+                    judged.phrase()
                 )
             } else {
                 format!(
@@ -126,12 +126,12 @@ pub fn verdict(diagnosis: &Diagnosis, channels: &[String], judged: Judged) -> St
             }
         }
     };
-    let all = [first_of_all(diagnosis), Some(says), besides(diagnosis)];
+    let all = [suspicion_text(diagnosis), Some(says), disturbances_text(diagnosis)];
     all.into_iter().flatten().collect::<Vec<_>>().join(" ")
 }
 
 /// How the error falls: of all drives, or where that hardly does, of the drive whose error falls most, since the others hide it.
-fn falls(first: &Rung, last: &Rung, channels: &[String], judged: Judged) -> String {
+fn error_reduction_text(first: &SelectionStep, last: &SelectionStep, channels: &[String], judged: ValidationMethod) -> String {
     let pairs = first.check_by_channel.iter().zip(&last.check_by_channel);
     let most = (channels.iter().zip(pairs)).min_by(|(_, a), (_, b)| {
         let share = |(before, after): &(&f64, &f64)| **after / before.max(f64::MIN_POSITIVE);
@@ -145,16 +145,16 @@ fn falls(first: &Rung, last: &Rung, channels: &[String], judged: Judged) -> Stri
     };
     format!(
         "the error{of} {} falls from {} to {}",
-        judged.words(),
+        judged.phrase(),
         percent(Some(before)),
         percent(Some(after))
     )
 }
 
 /// What is to be cleared up before anything else is believed.
-fn first_of_all(diagnosis: &Diagnosis) -> Option<String> {
+fn suspicion_text(diagnosis: &ModelDiagnosis) -> Option<String> {
     let suspicions = (diagnosis.disturbances.iter()).filter(|one| is_suspicion(one));
-    let says: Vec<&str> = suspicions.filter_map(|one| one.says.as_deref()).collect();
+    let says: Vec<&str> = suspicions.filter_map(|one| one.description.as_deref()).collect();
     (!says.is_empty()).then(|| {
         format!(
             "Look first at what may be wrong with the recording or the model: {}.",
@@ -164,7 +164,7 @@ fn first_of_all(diagnosis: &Diagnosis) -> Option<String> {
 }
 
 /// Whether something is: until then no effect is worth adding.
-pub(crate) fn is_to_be_cleared_up(diagnosis: &Diagnosis) -> bool {
+pub(crate) fn has_suspicion(diagnosis: &ModelDiagnosis) -> bool {
     diagnosis.disturbances.iter().any(is_suspicion)
 }
 
@@ -173,7 +173,7 @@ fn is_suspicion(one: &Disturbance) -> bool {
 }
 
 /// What the recordings have besides, by name.
-fn besides(diagnosis: &Diagnosis) -> Option<String> {
+fn disturbances_text(diagnosis: &ModelDiagnosis) -> Option<String> {
     let mut kinds: Vec<(&str, Vec<&str>)> = Vec::new();
     for one in diagnosis.disturbances.iter().filter(|d| !is_suspicion(d)) {
         let places = one.at.iter().map(String::as_str);
@@ -215,7 +215,7 @@ pub fn disturbance(one: &Disturbance) -> String {
     };
     let all: Vec<String> = (one.estimates.iter())
         .map(|q| {
-            let deviation = q.deviation;
+            let deviation = q.standard_deviation;
             let deviation =
                 deviation.map_or_else(String::new, |std| format!(" ± {}", significant(std, 2)));
             let said = format!("{} {}{deviation} {}", q.name, number(q.value), q.unit);

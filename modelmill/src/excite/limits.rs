@@ -1,26 +1,26 @@
 //! Limits on the command line, which join those of the model file or replace them: `theta1=1.5:2.1`, `theta1_d=1.2`,
 //! `spindle_left=1500`, `R3m.x=0.2:0.7`, `singularity=0.3`.
 
-use modelmill_identify::Note;
-use modelmill_identify::excite::CoordinateLimits;
-use modelmill_spec::{CoordinateIdx, DriveIdx, Limits, PointIdx};
+use modelmill_identify::RecordingNote;
+use modelmill_identify::excite::ExcitationLimits;
+use modelmill_spec::{CoordinateIdx, DriveIdx, MotionLimits, PointIdx};
 
 use crate::error::{Error, Outcome};
 use crate::excite::plant::AXES;
 use crate::model::Model;
-use crate::recording::{self, Recording};
+use crate::recording::{self, PreparedRecording};
 use crate::text::table::significant;
 
 /// One limit of the command line.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Limit {
+pub struct TrajectoryLimit {
     name: String,
     /// As it is written.
     value: f64,
     ends: [f64; 2],
 }
 
-impl Limit {
+impl TrajectoryLimit {
     /// Reads `NAME=SIZE` or `NAME=LOW:HIGH`.
     pub fn parse(text: &str) -> Result<Self, String> {
         let expected = || {
@@ -52,7 +52,7 @@ impl Limit {
 }
 
 /// The model file's limits with those of the command line put in.
-pub fn limits(model: &Model, given: &[Limit]) -> Outcome<Limits> {
+pub fn merged_limits(model: &Model, given: &[TrajectoryLimit]) -> Outcome<MotionLimits> {
     let mechanism = &model.derivation.mechanism;
     let mut limits = mechanism.limits.clone();
     for limit in given {
@@ -82,13 +82,13 @@ pub fn limits(model: &Model, given: &[Limit]) -> Outcome<Limits> {
             limits.forces.retain(|(d, _)| d.0 != i);
             limits.forces.push((DriveIdx(i), limit.ends));
         } else {
-            coordinate(model, &mut limits, limit)?;
+            set_coordinate_limit(model, &mut limits, limit)?;
         }
     }
     Ok(limits)
 }
 
-fn coordinate(model: &Model, limits: &mut Limits, limit: &Limit) -> Outcome {
+fn set_coordinate_limit(model: &Model, limits: &mut MotionLimits, limit: &TrajectoryLimit) -> Outcome {
     let coordinates = &model.derivation.mechanism.coordinates;
     let name = limit.name.as_str();
     let (stem, derivative) = match (name.strip_suffix("_dd"), name.strip_suffix("_d")) {
@@ -123,7 +123,7 @@ fn coordinate(model: &Model, limits: &mut Limits, limit: &Limit) -> Outcome {
     let k = position.unwrap_or_else(|| {
         limits.coordinates.push((
             CoordinateIdx(i),
-            modelmill_spec::CoordinateLimits::default(),
+            modelmill_spec::CoordinateBounds::default(),
         ));
         limits.coordinates.len() - 1
     });
@@ -134,12 +134,12 @@ fn coordinate(model: &Model, limits: &mut Limits, limit: &Limit) -> Outcome {
 
 /// Limits in which active coordinates without a range of positions have that of recordings, with the rates and accelerations
 /// there: what a machine has done it can do again. A note says so.
-pub(crate) fn with_recorded(
+pub(crate) fn with_recorded_ranges(
     model: &Model,
-    mut limits: Limits,
-    recordings: &[&Recording],
-) -> (Limits, Option<Note>) {
-    let [recordings, _] = recording::stretches(model, recordings, &[]);
+    mut limits: MotionLimits,
+    recordings: &[&PreparedRecording],
+) -> (MotionLimits, Option<RecordingNote>) {
+    let [recordings, _] = recording::segments(model, recordings, &[]);
     let (active, _) = model.derivation.coordinates();
     let coordinates = &model.derivation.mechanism.coordinates;
     let mut says = Vec::new();
@@ -182,7 +182,7 @@ pub(crate) fn with_recorded(
         ));
     }
     let note = (!says.is_empty()).then(|| {
-        Note::info(format!(
+        RecordingNote::info(format!(
             "{} has no limits for positions; motion keeps within what was recorded: {}, and within the largest rates and \
              accelerations there. Option `limits`, or `[limits.coordinates]` in the model file, allows more.",
             model.path,
@@ -196,13 +196,13 @@ pub(crate) fn with_recorded(
 }
 
 /// Limits of the active coordinates, in their order; each must have a range of positions.
-pub fn of_active(model: &Model, limits: &Limits) -> Outcome<Vec<CoordinateLimits>> {
+pub fn active_limits(model: &Model, limits: &MotionLimits) -> Outcome<Vec<ExcitationLimits>> {
     let (active, _) = model.derivation.coordinates();
     let coordinates = &model.derivation.mechanism.coordinates;
     let of_one = |i: &usize| {
         let found = limits.coordinates.iter().find(|(c, _)| c.0 == *i);
         let limits = found.map(|(_, limits)| *limits).unwrap_or_default();
-        Some(CoordinateLimits {
+        Some(ExcitationLimits {
             name: coordinates[*i].name.clone(),
             position: limits.position?,
             rate: limits.rate,
@@ -232,11 +232,11 @@ mod tests {
 
     #[test]
     fn ranges_are_read_and_nonsense_is_refused() {
-        let ends = |text: &str| Limit::parse(text).unwrap().ends.to_vec();
+        let ends = |text: &str| TrajectoryLimit::parse(text).unwrap().ends.to_vec();
         assert_eq!(ends("q=1:2"), [1.0, 2.0]);
         assert_eq!(ends("q_d = 3"), [-3.0, 3.0]);
         for text in ["q", "q=", "q=2:1", "q=-1", "q=1:x", "q=nan", "q=1:inf"] {
-            assert!(Limit::parse(text).is_err(), "{text}");
+            assert!(TrajectoryLimit::parse(text).is_err(), "{text}");
         }
     }
 }

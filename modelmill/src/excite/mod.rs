@@ -6,39 +6,39 @@ pub mod plant;
 mod separate;
 mod separated;
 
-use modelmill_identify::Note;
+use modelmill_identify::RecordingNote;
 use modelmill_identify::excite::{
-    Excitation, Motion, Plant, excite, scaled_condition_number, steps,
+    ExcitationTrajectory, ExcitationMotion, ExcitationPlant, excite, scaled_condition_number, max_progress_steps,
 };
 
-use crate::diagnose::Named;
+use crate::diagnose::NamedEffect;
 use crate::error::{Error, Outcome};
 use crate::model::Model;
-use crate::recording::Recording;
+use crate::recording::PreparedRecording;
 use crate::recording::free::free_bodies;
 use crate::text::csv::csv;
-use crate::text::svg::Figure;
+use crate::text::svg::SvgFigure;
 use crate::text::table::significant;
 
-pub use limits::Limit;
-pub use modelmill_identify::excite::{Criterion, Options};
+pub use limits::TrajectoryLimit;
+pub use modelmill_identify::excite::{ExcitationCriterion, Options};
 use plant::ModelPlant;
-pub use separated::Separated;
+pub use separated::SeparationResult;
 
 /// What is asked of an excitation; [`Request::default`] is the paper's, with samples at 500 Hz.
 #[derive(Clone, Debug)]
-pub struct Request {
+pub struct ExcitationRequest {
     /// The search: harmonics, period, criterion, how many trajectories are tried, seed.
     pub options: Options,
     /// Samples per second of the trajectory, Hz.
     pub rate: f64,
     /// Limits beside those of the model file, or in their place.
-    pub limits: Vec<Limit>,
+    pub limits: Vec<TrajectoryLimit>,
     /// Instead of exciting the base parameters, tell effects apart.
-    pub separate: Option<Separate>,
+    pub separate: Option<SeparationRequest>,
 }
 
-impl Default for Request {
+impl Default for ExcitationRequest {
     fn default() -> Self {
         Self {
             options: Options::default(),
@@ -51,39 +51,39 @@ impl Default for Request {
 
 /// Effects that are to be told apart.
 #[derive(Clone, Debug)]
-pub struct Separate {
+pub struct SeparationRequest {
     /// The effect that is to differ most, with values of its parameters and constants, SI units.
-    pub effect: Named,
+    pub effect: NamedEffect,
     /// What it may be taken for. Constants without a value are fitted like parameters.
-    pub from: Vec<Named>,
+    pub from: Vec<NamedEffect>,
     /// What is there in either case and the model file lacks.
-    pub beside: Vec<Named>,
+    pub common_effects: Vec<NamedEffect>,
     /// Standard deviation of the noise in the forces, N or N m, against which the difference is held.
     pub noise: Option<f64>,
 }
 
 /// A trajectory that was found.
-pub struct Excited {
+pub struct ExcitationResult {
     /// What the JSON calls the model.
     pub model: String,
     /// Coefficients, condition numbers, and how close the trajectory comes to its limits.
-    pub found: Excitation,
+    pub found: ExcitationTrajectory,
     /// How it was searched for.
     pub options: Options,
     /// By how much effects differ along it, where that was asked for.
-    pub separated: Option<Separated>,
+    pub separated: Option<SeparationResult>,
     /// Condition number with columns of equal norm.
     pub scaled: Option<f64>,
     /// Times of one period, s.
     pub time: Vec<f64>,
     /// Positions, rates and accelerations of the active coordinates at these times.
-    pub motion: Motion,
+    pub motion: ExcitationMotion,
     /// Names of the active coordinates, in their order.
     pub coordinates: Vec<String>,
     /// A picture of the trajectory (SVG).
     pub picture: String,
     /// Remarks.
-    pub notes: Vec<Note>,
+    pub notes: Vec<RecordingNote>,
 }
 
 impl Model {
@@ -91,7 +91,7 @@ impl Model {
     /// are compared with when effects are told apart, and give their size and the noise where these are not given.
     ///
     /// Fails when a coordinate has no limits, when no trajectory keeps them, or when no motion tells the effects apart.
-    pub fn excite(&self, request: &Request, recordings: &[&Recording]) -> Outcome<Excited> {
+    pub fn excite(&self, request: &ExcitationRequest, recordings: &[&PreparedRecording]) -> Outcome<ExcitationResult> {
         if free_bodies(&self.derivation.mechanism).next().is_some() {
             return Err(Error::input(format!(
                 "{}: motion is planned for joints, and this model has a body that hangs on nothing; plan with the body held, \
@@ -100,12 +100,12 @@ impl Model {
             )));
         }
         let (all_limits, as_recorded) =
-            limits::with_recorded(self, limits::limits(self, &request.limits)?, recordings);
-        let coordinates = limits::of_active(self, &all_limits)?;
+            limits::with_recorded_ranges(self, limits::merged_limits(self, &request.limits)?, recordings);
+        let coordinates = limits::active_limits(self, &all_limits)?;
         let mut options = request.options.clone();
         let plant = ModelPlant::new(self, &all_limits);
         let asked = match &request.separate {
-            Some(asked) => Some(separated::ask(
+            Some(asked) => Some(separated::prepare_separation(
                 self,
                 &plant,
                 &coordinates,
@@ -119,32 +119,32 @@ impl Model {
         let notes = as_recorded.into_iter().chain(of_asked).collect();
         let separating = asked.as_ref().map(|asked| asked.plant(&plant, self));
         if separating.is_some() {
-            options.criterion = Criterion::Separation;
+            options.criterion = ExcitationCriterion::Separation;
         } else if !plant.has_unknowns() {
             return Err(Error::input(format!(
                 "{}: no base parameter is unknown, so there is nothing to excite",
                 self.path
             )));
         }
-        let searched: &dyn Plant = match &separating {
+        let searched: &dyn ExcitationPlant = match &separating {
             Some(separating) => separating,
             None => &plant,
         };
         let found = self
             .host()
-            .watched("searching for a trajectory", steps(&options), |job| {
+            .run_job("searching for a trajectory", max_progress_steps(&options), |job| {
                 excite(searched, &coordinates, &options, &|more| job.flow(more))
             })?
             .map_err(|error| Error::input(format!("{}: {error}", self.path)))?;
-        let samples = samples(request.rate, options.period);
-        let motion = Motion::sample(&found.series, samples);
+        let samples = samples_per_period(request.rate, options.period);
+        let motion = ExcitationMotion::sample(&found.series, samples);
         let time: Vec<f64> = (0..samples)
             // Picoseconds are enough, and 7.288 reads better than 7.287999999999999.
             .map(|i| (1e12 * i as f64 * options.period / samples as f64).round() / 1e12)
             .collect();
         let apart = match &separating {
             Some(separating) => {
-                let apart = separating.along(&motion, &separating.which);
+                let apart = separating.distance_along(&motion, &separating.which);
                 Some(apart.ok_or_else(|| {
                     Error::input(format!(
                         "{}: nothing is left of the difference at {} samples per second; give a higher rate (option `rate`)",
@@ -156,19 +156,19 @@ impl Model {
         };
         drop(separating);
         let separated = match (asked, apart) {
-            (Some(asked), Some(apart)) => Some(Separated {
-                apart,
-                random: (-found.first).exp(),
-                before: asked.before(self)?,
-                unit: separated::unit(self),
+            (Some(asked), Some(apart)) => Some(SeparationResult {
+                distance: apart,
+                random: (-found.start_value).exp(),
+                before: asked.distance_along_recordings(self)?,
+                unit: separated::common_force_unit(self),
                 drives: self.drives().len(),
                 samples,
-                asked,
+                task: asked,
             }),
             _ => None,
         };
         let title = match &separated {
-            Some(separated) => format!("{}: tells {}", self.name, separated.asked.words()),
+            Some(separated) => format!("{}: tells {}", self.name, separated.task.description()),
             None => format!(
                 "{}: excitation with condition number {}",
                 self.name,
@@ -180,7 +180,7 @@ impl Model {
             .filter(|w| w.ncols() > 0)
             .map(|w| scaled_condition_number(&w))
             .filter(|c| c.is_finite());
-        Ok(Excited {
+        Ok(ExcitationResult {
             model: self.name.clone(),
             picture: picture(self, &plant, &found, &title, &time, &motion),
             found,
@@ -189,14 +189,14 @@ impl Model {
             scaled,
             time,
             motion,
-            coordinates: self.active(),
+            coordinates: self.active_coordinates(),
             notes,
         })
     }
 }
 
 /// Samples over one period.
-fn samples(rate: f64, period: f64) -> usize {
+fn samples_per_period(rate: f64, period: f64) -> usize {
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
@@ -206,7 +206,7 @@ fn samples(rate: f64, period: f64) -> usize {
     samples.max(1)
 }
 
-impl Excited {
+impl ExcitationResult {
     /// The trajectory as a recording without forces (CSV): `t`, positions, rates and accelerations.
     pub fn csv(&self) -> String {
         let motion = [
@@ -231,13 +231,13 @@ impl Excited {
 fn picture(
     model: &Model,
     plant: &ModelPlant<'_>,
-    found: &Excitation,
+    found: &ExcitationTrajectory,
     title: &str,
     time: &[f64],
-    motion: &Motion,
+    motion: &ExcitationMotion,
 ) -> String {
-    let names = model.active();
-    let mut figure = Figure::new(title, time);
+    let names = model.active_coordinates();
+    let mut figure = SvgFigure::new(title, time);
     let around: Vec<Vec<f64>> = motion
         .q
         .iter()

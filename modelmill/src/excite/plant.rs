@@ -1,8 +1,8 @@
 //! A model as excitation sees it: regressor, and limits beyond those of the active coordinates.
 
-use modelmill_codegen::{Evaluator, States};
-use modelmill_identify::excite::{Margin, Motion, Plant, least_singular_value};
-use modelmill_spec::{Kinematics, Limits, PointIdx};
+use modelmill_codegen::{ModelEvaluator, MotionStates};
+use modelmill_identify::excite::{LimitMargin, ExcitationMotion, ExcitationPlant, least_singular_value};
+use modelmill_spec::{Kinematics, MotionLimits, PointIdx};
 use nalgebra::DMatrix;
 
 use crate::model::Model;
@@ -15,7 +15,7 @@ const SINGULARITIES: [&str; 2] = ["singularity of the loops", "singularity of th
 
 /// The part of a limit that a trajectory uses, 1 at the limit. Most excesses count from the middle of a range; those of
 /// least singular values from their limit, which is the part of the least value along the trajectory.
-pub fn used(margin: &Margin) -> f64 {
+pub fn used_fraction(margin: &LimitMargin) -> f64 {
     if SINGULARITIES.contains(&margin.name.as_str()) {
         1.0 / (1.0 - margin.excess).max(0.0)
     } else {
@@ -26,9 +26,9 @@ pub fn used(margin: &Margin) -> f64 {
 /// A model with limits.
 pub struct ModelPlant<'a> {
     model: &'a Model,
-    evaluator: Evaluator<'a>,
+    evaluator: ModelEvaluator<'a>,
     kinematics: Kinematics,
-    limits: &'a Limits,
+    limits: &'a MotionLimits,
     active: Vec<usize>,
     passive: Vec<usize>,
     /// Columns of the regressor that are to be found.
@@ -43,7 +43,7 @@ pub struct ModelPlant<'a> {
 
 impl<'a> ModelPlant<'a> {
     /// A model with the limits that its motion keeps.
-    pub fn new(model: &'a Model, limits: &'a Limits) -> Self {
+    pub fn new(model: &'a Model, limits: &'a MotionLimits) -> Self {
         let mechanism = &model.derivation.mechanism;
         let (active, passive) = model.derivation.coordinates();
         let passive_ranges = limits
@@ -64,7 +64,7 @@ impl<'a> ModelPlant<'a> {
             .collect();
         let mut plant = Self {
             model,
-            evaluator: Evaluator::new(&model.derivation),
+            evaluator: ModelEvaluator::new(&model.derivation),
             kinematics: Kinematics::new(mechanism),
             limits,
             active,
@@ -78,7 +78,7 @@ impl<'a> ModelPlant<'a> {
         };
         if let Some(share) = limits.singularity {
             let still = |i: &usize| vec![mechanism.coordinates[*i].nominal];
-            let nominal = Motion {
+            let nominal = ExcitationMotion {
                 q: plant.active.iter().map(still).collect(),
                 qd: vec![vec![0.0]; plant.active.len()],
                 qdd: vec![vec![0.0]; plant.active.len()],
@@ -97,28 +97,28 @@ impl<'a> ModelPlant<'a> {
     }
 
     /// Forces of the nominal model along a motion, `[drive][sample]`.
-    pub fn forces(&self, motion: &Motion) -> Option<Vec<Vec<f64>>> {
-        let still = self.no_load(motion);
+    pub fn forces(&self, motion: &ExcitationMotion) -> Option<Vec<Vec<f64>>> {
+        let still = self.zero_load(motion);
         let states = states(motion, &still);
         self.evaluator
             .inverse_dynamics(&states, &self.model.nominal)
             .ok()
     }
 
-    fn no_load(&self, motion: &Motion) -> Vec<Vec<f64>> {
+    fn zero_load(&self, motion: &ExcitationMotion) -> Vec<Vec<f64>> {
         let samples = motion.q.first().map_or(0, Vec::len);
         vec![vec![0.0; samples]; self.model.derivation.mechanism.drives.len()]
     }
 
     /// All coordinates along a motion, `[coordinate][sample]`.
-    fn coordinates(&self, motion: &Motion) -> Option<Vec<Vec<f64>>> {
+    fn coordinates(&self, motion: &ExcitationMotion) -> Option<Vec<Vec<f64>>> {
         let mut all = vec![Vec::new(); self.active.len() + self.passive.len()];
         for (i, column) in self.active.iter().zip(&motion.q) {
             all[*i].clone_from(column);
         }
         if !self.passive.is_empty() {
-            let still = self.no_load(motion);
-            let columns = self.evaluator.passive(&states(motion, &still)).ok()?;
+            let still = self.zero_load(motion);
+            let columns = self.evaluator.passive_motion(&states(motion, &still)).ok()?;
             for (i, column) in self.passive.iter().zip(columns) {
                 all[*i] = column;
             }
@@ -127,7 +127,7 @@ impl<'a> ModelPlant<'a> {
     }
 
     /// For each sample, of the loops' Jacobian by the passive and of the drives' by the active coordinates.
-    fn least_singular_values(&self, motion: &Motion) -> Option<[Vec<f64>; 2]> {
+    fn least_singular_values(&self, motion: &ExcitationMotion) -> Option<[Vec<f64>; 2]> {
         let all = self.coordinates(motion)?;
         let samples = motion.q.first().map_or(0, Vec::len);
         let mut of_loops = vec![f64::INFINITY; samples];
@@ -142,8 +142,8 @@ impl<'a> ModelPlant<'a> {
                 *least = least_singular_value(&rows);
             }
         }
-        let still = self.no_load(motion);
-        let columns = self.evaluator.drives(&states(motion, &still)).ok()?;
+        let still = self.zero_load(motion);
+        let columns = self.evaluator.drive_motion(&states(motion, &still)).ok()?;
         let n = self.active.len();
         let jacobian = &columns[columns.len() - n * n..];
         let of_drives = (0..samples).map(|sample| {
@@ -158,11 +158,11 @@ impl<'a> ModelPlant<'a> {
     }
 }
 
-impl Plant for ModelPlant<'_> {
-    fn regressor(&self, motion: &Motion) -> Option<DMatrix<f64>> {
+impl ExcitationPlant for ModelPlant<'_> {
+    fn regressor(&self, motion: &ExcitationMotion) -> Option<DMatrix<f64>> {
         // Effects that depend on the load see the force of the nominal model.
-        let load = if self.model.load_dependent().is_empty() {
-            self.no_load(motion)
+        let load = if self.model.load_dependent_effects().is_empty() {
+            self.zero_load(motion)
         } else {
             self.forces(motion)?
         };
@@ -195,7 +195,7 @@ impl Plant for ModelPlant<'_> {
         names
     }
 
-    fn excess(&self, motion: &Motion) -> Option<Vec<Vec<f64>>> {
+    fn excess(&self, motion: &ExcitationMotion) -> Option<Vec<Vec<f64>>> {
         let mut all = Vec::new();
         let beyond = |value: f64, [low, high]: [f64; 2]| {
             (value - 0.5 * (low + high)).abs() / (0.5 * (high - low)) - 1.0
@@ -223,7 +223,7 @@ impl Plant for ModelPlant<'_> {
                 let at: Vec<f64> = coordinates.iter().map(|column| column[sample]).collect();
                 let poses = self.kinematics.poses(&at);
                 for (column, (point, axis, range)) in columns.iter_mut().zip(&self.point_ranges) {
-                    column.push(beyond(self.kinematics.point(&poses, *point)[*axis], *range));
+                    column.push(beyond(self.kinematics.point_position(&poses, *point)[*axis], *range));
                 }
             }
             all.append(&mut columns);
@@ -245,11 +245,11 @@ impl Plant for ModelPlant<'_> {
     }
 }
 
-fn states<'m>(motion: &'m Motion, load: &'m [Vec<f64>]) -> States<'m> {
+fn states<'m>(motion: &'m ExcitationMotion, load: &'m [Vec<f64>]) -> MotionStates<'m> {
     fn slices(columns: &[Vec<f64>]) -> Vec<&[f64]> {
         columns.iter().map(Vec::as_slice).collect()
     }
-    States {
+    MotionStates {
         q: slices(&motion.q),
         qd: slices(&motion.qd),
         qdd: slices(&motion.qdd),
@@ -266,7 +266,7 @@ mod tests {
     fn what_is_used_of_a_limit_is_never_negative() {
         let used = |name: &str, excess: f64| {
             let name = name.to_owned();
-            used(&Margin {
+            used_fraction(&LimitMargin {
                 name,
                 excess,
                 proven: false,

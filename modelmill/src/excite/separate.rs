@@ -3,30 +3,30 @@
 //!
 //! Columns come from where the diagnosis has them, so that kinds of one's own are told apart like all others.
 
-use modelmill_identify::diagnose::{Candidate, Choice, Column, Effect, Sign, white_noise};
-use modelmill_identify::excite::separate::{Question, Separation, fit, separation};
-use modelmill_identify::excite::{Motion, Plant};
-use modelmill_identify::{PreparedAs, Run};
+use modelmill_identify::diagnose::{CandidateEffect, ColumnChoice, ForceColumn, LocatedEffect, SignConstraint, white_noise};
+use modelmill_identify::excite::separate::{SeparationProblem, SeparationMeasure, fit_coefficients, measure_separation};
+use modelmill_identify::excite::{ExcitationMotion, ExcitationPlant};
+use modelmill_identify::{PreparationRecord, PreparedRun};
 use nalgebra::DMatrix;
 
 use crate::diagnose::words;
-use crate::diagnose::{Chosen, Constants, Named, base, choose};
+use crate::diagnose::{ChosenEffect, ConstantPolicy, NamedEffect, base_columns, derive_effect};
 use crate::error::{Error, Outcome};
 use crate::excite::plant::ModelPlant;
 use crate::model::Model;
-use crate::stretch::Stretch;
+use crate::stretch::RecordingSegment;
 use modelmill_identify::diagnose::ROUNDING;
 
 /// What is to be told apart, derived.
-pub(crate) struct Pair {
+pub(crate) struct SeparationSetup {
     /// The effect with its constants.
-    truth: Chosen,
+    truth: ChosenEffect,
     /// The effect as it would be fitted, where constants of it are searched for.
-    fitted: Option<Chosen>,
+    fitted: Option<ChosenEffect>,
     /// What it may be taken for.
-    pub rivals: Vec<Rival>,
+    pub rivals: Vec<RivalEffect>,
     /// What is there in either case.
-    beside: Vec<Chosen>,
+    common_effects: Vec<ChosenEffect>,
     /// Values of the effect's parameters by symbol; of either sign if none is given.
     sizes: Vec<(String, f64)>,
     /// Noise of each drive's force; all alike if it is not known.
@@ -34,22 +34,22 @@ pub(crate) struct Pair {
 }
 
 /// What an effect may be taken for.
-pub(crate) struct Rival {
-    chosen: Chosen,
+pub(crate) struct RivalEffect {
+    chosen: ChosenEffect,
     /// Whether the effect holds it as a special case, so that nothing tells when the rival is true.
-    pub is_held: bool,
+    pub is_special_case: bool,
 }
 
-impl Rival {
-    pub(crate) fn effect(&self) -> &Effect {
+impl RivalEffect {
+    pub(crate) fn effect(&self) -> &LocatedEffect {
         &self.chosen.named.effect
     }
 }
 
 /// How far effects are apart along a motion.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Apart {
-    pub figures: Separation,
+pub struct EffectDistance {
+    pub figures: SeparationMeasure,
     /// The rival that is nearest, by its position, and its constants.
     pub rival: usize,
     pub constants: Vec<(String, f64)>,
@@ -57,28 +57,28 @@ pub struct Apart {
     pub force: f64,
 }
 
-impl Pair {
+impl SeparationSetup {
     /// Derives what the command line names.
     pub(crate) fn new(
         model: &Model,
-        separate: &Named,
-        from: &[Named],
-        beside: &[Named],
+        separate: &NamedEffect,
+        from: &[NamedEffect],
+        beside: &[NamedEffect],
     ) -> Outcome<Self> {
-        let all: Vec<&Named> = std::iter::once(separate)
+        let all: Vec<&NamedEffect> = std::iter::once(separate)
             .chain(from)
             .chain(beside)
             .collect();
         for (k, one) in all.iter().enumerate() {
-            if all[..k].iter().any(|known| is_same(known, one)) {
+            if all[..k].iter().any(|known| is_same_effect(known, one)) {
                 return Err(Error::input(format!(
                     "{} is named twice; option `separate`, option `from` and option `beside` take different effects",
                     words::effect(&one.effect)
                 )));
             }
         }
-        let choose = |named: &Named, constants: Constants| choose(model, named, constants);
-        let truth = choose(separate, Constants::Usual)?;
+        let choose = |named: &NamedEffect, constants: ConstantPolicy| derive_effect(model, named, constants);
+        let truth = choose(separate, ConstantPolicy::Usual)?;
         let parameters = &truth.kind.parameters;
         let is_size = |symbol: &str| {
             truth.kind.mechanics == Some(modelmill_spec::Mechanics::Tilt)
@@ -87,7 +87,7 @@ impl Pair {
         let constants = &truth.kind.constants;
         let is_linear = |symbol: &str| {
             let mut of = constants.iter().filter(|c| c.symbol == symbol);
-            of.any(|c| c.search == Some(modelmill_spec::Search::Linear))
+            of.any(|c| c.search == Some(modelmill_spec::ConstantSearch::Linear))
         };
         let mut sizes: Vec<(String, f64)> = separate.values.clone();
         // A constant beside which the effect is linear is found as a product with its parameter.
@@ -100,41 +100,41 @@ impl Pair {
         }
         sizes.retain(|(symbol, _)| is_size(symbol) || symbol.contains('*'));
         let is_searched = |c: &modelmill_spec::KindConstant| {
-            matches!(c.search, Some(modelmill_spec::Search::Range { .. }))
+            matches!(c.search, Some(modelmill_spec::ConstantSearch::Range { .. }))
         };
-        let free = Named {
+        let free = NamedEffect {
             effect: separate.effect.clone(),
             values: Vec::new(),
         };
         let is_tilt = truth.kind.mechanics == Some(modelmill_spec::Mechanics::Tilt);
         let fitted = (!is_tilt && truth.kind.constants.iter().any(is_searched))
-            .then(|| choose(&free, Constants::Searched))
+            .then(|| choose(&free, ConstantPolicy::Searched))
             .transpose()?;
         let rivals = from
             .iter()
             .map(|named| {
-                Ok(Rival {
-                    chosen: choose(named, Constants::Searched)?,
-                    is_held: false,
+                Ok(RivalEffect {
+                    chosen: choose(named, ConstantPolicy::Searched)?,
+                    is_special_case: false,
                 })
             })
-            .collect::<Outcome<Vec<Rival>>>()?;
+            .collect::<Outcome<Vec<RivalEffect>>>()?;
         let beside = beside
             .iter()
-            .map(|named| choose(named, Constants::Usual))
-            .collect::<Outcome<Vec<Chosen>>>()?;
+            .map(|named| choose(named, ConstantPolicy::Usual))
+            .collect::<Outcome<Vec<ChosenEffect>>>()?;
         Ok(Self {
             truth,
             fitted,
             rivals,
-            beside,
+            common_effects: beside,
             sizes,
             noise: None,
         })
     }
 
     /// The effect that is to be told from the others.
-    pub(crate) fn effect(&self) -> &Effect {
+    pub(crate) fn effect(&self) -> &LocatedEffect {
         &self.truth.named.effect
     }
 
@@ -144,8 +144,8 @@ impl Pair {
     }
 
     /// Effects that are there in either case.
-    pub(crate) fn beside(&self) -> impl Iterator<Item = &Effect> {
-        self.beside.iter().map(|one| &one.named.effect)
+    pub(crate) fn common_effects(&self) -> impl Iterator<Item = &LocatedEffect> {
+        self.common_effects.iter().map(|one| &one.named.effect)
     }
 
     /// One noise for all drives.
@@ -161,10 +161,10 @@ impl Pair {
     }
 
     /// Takes from recordings what is not known: the noise, and the size of the effect by a fit beside the base.
-    pub(crate) fn learn(&mut self, model: &Model, data: &[Stretch]) -> Outcome {
+    pub(crate) fn estimate_from_recordings(&mut self, model: &Model, data: &[RecordingSegment]) -> Outcome {
         let mut measured: Vec<Vec<f64>> = Vec::new();
         for one in data {
-            let forces = crate::along::measured(one)?;
+            let forces = crate::along::measured_forces(one)?;
             measured.resize(forces.len(), Vec::new());
             for (whole, force) in measured.iter_mut().zip(forces) {
                 whole.extend(force);
@@ -182,19 +182,19 @@ impl Pair {
         if !self.sizes.is_empty() {
             return Ok(());
         }
-        let runs: Vec<(&Stretch, bool)> = data.iter().map(|one| (one, false)).collect();
+        let runs: Vec<(&RecordingSegment, bool)> = data.iter().map(|one| (one, false)).collect();
         let samples = measured.first().map_or(0, Vec::len);
-        let Some(terms) = self.terms(model, &runs)? else {
+        let Some(terms) = self.separation_columns(model, &runs)? else {
             return Ok(());
         };
         let weights = self.weights(model.drives().len());
         // What is known is taken off.
-        let mut forces = Column::new(measured);
+        let mut forces = ForceColumn::new(measured);
         forces.add(-1.0, &terms.known);
         let forces = matrix(&[forces], &weights, samples);
         let base = matrix(&terms.base, &weights, samples);
         let effect = matrix(&terms.truth.1, &weights, samples);
-        let found = fit(&base, &effect, forces.as_slice());
+        let found = fit_coefficients(&base, &effect, forces.as_slice());
         let found = &found[base.ncols()..];
         self.sizes = terms
             .truth
@@ -216,12 +216,12 @@ impl Pair {
     }
 
     /// Columns along recordings; `None` if the effect has none.
-    fn terms(&self, model: &Model, runs: &[(&Stretch, bool)]) -> Outcome<Option<Terms>> {
-        let (mut columns, load, known) = base(model, runs)?;
+    fn separation_columns(&self, model: &Model, runs: &[(&RecordingSegment, bool)]) -> Outcome<Option<SeparationColumns>> {
+        let (mut columns, load, known) = base_columns(model, runs)?;
         let Some((candidate, choices)) = self.truth.candidate(model, runs, &load)? else {
             return Ok(None);
         };
-        for one in &self.beside {
+        for one in &self.common_effects {
             if let Some((_, choices)) = one.candidate(model, runs, &load)? {
                 columns.extend(choices.into_iter().flat_map(|choice| choice.columns));
             }
@@ -229,7 +229,7 @@ impl Pair {
         let Some(truth) = choices.into_iter().next() else {
             return Ok(None);
         };
-        Ok(Some(Terms {
+        Ok(Some(SeparationColumns {
             base: columns,
             load,
             known,
@@ -239,19 +239,19 @@ impl Pair {
 
     /// How far the effects are apart along recordings, from the rivals of some positions; `None` if the effect has no force
     /// there.
-    pub(crate) fn along(
+    pub(crate) fn distance_along(
         &self,
         model: &Model,
-        data: &[Stretch],
+        data: &[RecordingSegment],
         which: &[usize],
-    ) -> Outcome<Option<Apart>> {
-        let runs: Vec<(&Stretch, bool)> = data.iter().map(|one| (one, false)).collect();
+    ) -> Outcome<Option<EffectDistance>> {
+        let runs: Vec<(&RecordingSegment, bool)> = data.iter().map(|one| (one, false)).collect();
         let samples: usize = data.iter().map(|one| one.time().len()).sum();
-        let Some(terms) = self.terms(model, &runs)? else {
+        let Some(terms) = self.separation_columns(model, &runs)? else {
             return Ok(None);
         };
         let weights = self.weights(model.drives().len());
-        let of = |columns: &[Column]| matrix(columns, &weights, samples);
+        let of = |columns: &[ForceColumn]| matrix(columns, &weights, samples);
         let (candidate, columns) = &terms.truth;
         let fitted = match &self.fitted {
             Some(fitted) => fitted.candidate(model, &runs, &terms.load)?,
@@ -269,7 +269,7 @@ impl Pair {
             // What has no effect mimics nothing.
             let choices = found.map_or_else(
                 || {
-                    vec![Choice {
+                    vec![ColumnChoice {
                         constants: Vec::new(),
                         columns: Vec::new(),
                     }]
@@ -281,7 +281,7 @@ impl Pair {
                 owners.push((*k, choice.constants));
             }
         }
-        let figures = separation(&Question {
+        let figures = measure_separation(&SeparationProblem {
             base: of(&terms.base),
             effect: self.force(candidate, &of(columns)),
             fitted,
@@ -289,12 +289,12 @@ impl Pair {
         });
         Ok(figures.map(|figures| {
             let (rival, constants) = owners[figures.rival].clone();
-            let force = if self.rivals[rival].is_held {
-                figures.left
+            let force = if self.rivals[rival].is_special_case {
+                figures.residual
             } else {
-                figures.left.min(figures.reverse)
+                figures.residual.min(figures.reverse_residual)
             };
-            Apart {
+            EffectDistance {
                 figures,
                 rival,
                 constants,
@@ -304,7 +304,7 @@ impl Pair {
     }
 
     /// The effect's force: its columns times their values, or each by itself in units where no value is known.
-    fn force(&self, candidate: &Candidate, columns: &DMatrix<f64>) -> DMatrix<f64> {
+    fn force(&self, candidate: &CandidateEffect, columns: &DMatrix<f64>) -> DMatrix<f64> {
         if self.sizes.is_empty() {
             return columns.clone();
         }
@@ -327,8 +327,8 @@ impl Pair {
                 .map(|p| p.sign)
                 .next();
             match sign.map(crate::diagnose::sign) {
-                Some(Sign::Positive) => value < 0.0,
-                Some(Sign::Negative) => value > 0.0,
+                Some(SignConstraint::Positive) => value < 0.0,
+                Some(SignConstraint::Negative) => value > 0.0,
                 _ => false,
             }
         };
@@ -344,13 +344,13 @@ impl Pair {
         let rivals = self.rivals.iter().map(|rival| &rival.chosen);
         std::iter::once(&self.truth)
             .chain(rivals)
-            .chain(&self.beside)
-            .any(Chosen::needs_nominal)
+            .chain(&self.common_effects)
+            .any(ChosenEffect::needs_nominal)
     }
 }
 
 /// Whether both are one effect at the same places.
-fn is_same(one: &Named, other: &Named) -> bool {
+fn is_same_effect(one: &NamedEffect, other: &NamedEffect) -> bool {
     one.effect.kind == other.effect.kind
         && one.effect.at.len() == other.effect.at.len()
         && one
@@ -361,18 +361,18 @@ fn is_same(one: &Named, other: &Named) -> bool {
 }
 
 /// Columns of a pair.
-struct Terms {
+struct SeparationColumns {
     /// Of all that is fitted in any case.
-    base: Vec<Column>,
+    base: Vec<ForceColumn>,
     /// What the drives carry.
-    load: Column,
+    load: ForceColumn,
     /// What the model's known parameters say.
-    known: Column,
-    truth: (Candidate, Vec<Column>),
+    known: ForceColumn,
+    truth: (CandidateEffect, Vec<ForceColumn>),
 }
 
 /// Columns with one drive below the other.
-fn matrix(columns: &[Column], weights: &[f64], samples: usize) -> DMatrix<f64> {
+fn matrix(columns: &[ForceColumn], weights: &[f64], samples: usize) -> DMatrix<f64> {
     let mut matrix = DMatrix::zeros(weights.len() * samples, columns.len());
     for (k, column) in columns.iter().enumerate() {
         for (d, (values, weight)) in column.0.iter().zip(weights).enumerate() {
@@ -390,21 +390,21 @@ fn matrix(columns: &[Column], weights: &[f64], samples: usize) -> DMatrix<f64> {
 pub(crate) struct SeparatingPlant<'a> {
     pub inner: &'a ModelPlant<'a>,
     pub model: &'a Model,
-    pub pair: &'a Pair,
+    pub pair: &'a SeparationSetup,
     /// Rivals that can be told apart at all.
     pub which: Vec<usize>,
 }
 
 impl SeparatingPlant<'_> {
     /// How far the effects are apart along a motion.
-    pub(crate) fn along(&self, motion: &Motion, which: &[usize]) -> Option<Apart> {
+    pub(crate) fn distance_along(&self, motion: &ExcitationMotion, which: &[usize]) -> Option<EffectDistance> {
         let data = [recording(self.inner, motion)?];
-        self.pair.along(self.model, &data, which).ok()?
+        self.pair.distance_along(self.model, &data, which).ok()?
     }
 }
 
-impl Plant for SeparatingPlant<'_> {
-    fn regressor(&self, motion: &Motion) -> Option<DMatrix<f64>> {
+impl ExcitationPlant for SeparatingPlant<'_> {
+    fn regressor(&self, motion: &ExcitationMotion) -> Option<DMatrix<f64>> {
         // Without anything to find there is no condition.
         self.inner
             .regressor(motion)
@@ -415,20 +415,20 @@ impl Plant for SeparatingPlant<'_> {
         self.inner.limits()
     }
 
-    fn excess(&self, motion: &Motion) -> Option<Vec<Vec<f64>>> {
+    fn excess(&self, motion: &ExcitationMotion) -> Option<Vec<Vec<f64>>> {
         self.inner.excess(motion)
     }
 
-    fn apart(&self, motion: &Motion) -> Option<f64> {
-        self.along(motion, &self.which).map(|apart| apart.force)
+    fn separation(&self, motion: &ExcitationMotion) -> Option<f64> {
+        self.distance_along(motion, &self.which).map(|apart| apart.force)
     }
 }
 
 /// A motion as a recording with the forces of the nominal model.
-fn recording(plant: &ModelPlant<'_>, motion: &Motion) -> Option<Stretch> {
+fn recording(plant: &ModelPlant<'_>, motion: &ExcitationMotion) -> Option<RecordingSegment> {
     let samples = motion.q.first().map_or(0, Vec::len);
-    Some(Stretch {
-        run: Run {
+    Some(RecordingSegment {
+        run: PreparedRun {
             file: "the trajectory".to_owned(),
             time: (0..samples).map(|i| i as f64).collect(),
             q: motion.q.clone(),
@@ -438,10 +438,10 @@ fn recording(plant: &ModelPlant<'_>, motion: &Motion) -> Option<Stretch> {
             missing_force: Vec::new(),
             left_out: Vec::new(),
             lines: Vec::new(),
-            repeats: None,
-            prepared: PreparedAs {
+            repeatability: None,
+            prepared: PreparationRecord {
                 decimate: 1,
-                ..PreparedAs::default()
+                ..PreparationRecord::default()
             },
             notes: Vec::new(),
         },

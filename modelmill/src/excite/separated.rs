@@ -3,22 +3,22 @@
 
 use std::fmt::Write as _;
 
-use modelmill_identify::Note;
-use modelmill_identify::diagnose::Effect;
-use modelmill_identify::excite::{CoordinateLimits, Options, random_motions};
-use modelmill_spec::Carries;
+use modelmill_identify::RecordingNote;
+use modelmill_identify::diagnose::LocatedEffect;
+use modelmill_identify::excite::{ExcitationLimits, Options, random_motions};
+use modelmill_spec::PlaceLoad;
 use serde_json::{Map, Value, json};
 
 use crate::diagnose::words;
 use crate::error::{Error, Outcome};
 use crate::model::Model;
-use crate::recording::{self, Recording};
-use crate::stretch::Stretch;
-use crate::text::table::{Align, count, significant, table};
+use crate::recording::{self, PreparedRecording};
+use crate::stretch::RecordingSegment;
+use crate::text::table::{ColumnAlignment, count, significant, table};
 
-use super::Separate;
+use super::SeparationRequest;
 use super::plant::ModelPlant;
-use super::separate::{Apart, Pair, SeparatingPlant};
+use super::separate::{EffectDistance, SeparationSetup, SeparatingPlant};
 
 /// Motions that are looked at before the search, for what no motion can tell.
 const LOOKED_AT: usize = 24;
@@ -27,26 +27,26 @@ const LOOKED_AT: usize = 24;
 const PLAIN: f64 = 5.0;
 
 /// Effects that are to be told apart, ready for the search.
-pub(crate) struct Asked {
-    pub(crate) pair: Pair,
+pub(crate) struct SeparationTask {
+    pub(crate) pair: SeparationSetup,
     /// Recordings to compare with.
-    data: Vec<Stretch>,
+    data: Vec<RecordingSegment>,
     /// Rivals that can be told apart at all.
     pub(crate) which: Vec<usize>,
     /// Remarks.
-    pub(crate) notes: Vec<Note>,
+    pub(crate) notes: Vec<RecordingNote>,
 }
 
 /// By how much effects differ along a trajectory.
-pub struct Separated {
+pub struct SeparationResult {
     /// The effects.
-    pub(crate) asked: Asked,
+    pub(crate) task: SeparationTask,
     /// Along the trajectory, with the samples of the file.
-    pub apart: Apart,
+    pub distance: EffectDistance,
     /// Along the best of the random trajectories.
     pub random: f64,
     /// Along the recordings that were given.
-    pub before: Option<Apart>,
+    pub before: Option<EffectDistance>,
     /// What forces are measured in.
     pub unit: &'static str,
     /// How many drives there are.
@@ -56,30 +56,30 @@ pub struct Separated {
 }
 
 /// Derives what is asked and looks at random motions for what cannot be told at all.
-pub(crate) fn ask(
+pub(crate) fn prepare_separation(
     model: &Model,
     plant: &ModelPlant<'_>,
-    limits: &[CoordinateLimits],
+    limits: &[ExcitationLimits],
     options: &Options,
-    asked: &Separate,
-    recordings: &[&Recording],
-) -> Outcome<Asked> {
+    asked: &SeparationRequest,
+    recordings: &[&PreparedRecording],
+) -> Outcome<SeparationTask> {
     let mut notes = Vec::new();
     // Whoever watches hears a remark even where there is no answer in the end.
-    let mut note = |note: Note| {
+    let mut note = |note: RecordingNote| {
         model.host().note(&note);
         notes.push(note);
     };
-    let mut pair = Pair::new(model, &asked.effect, &asked.from, &asked.beside)?;
+    let mut pair = SeparationSetup::new(model, &asked.effect, &asked.from, &asked.common_effects)?;
     if let Some(size) = asked.noise {
         pair.set_noise(size, model.drives().len());
     }
-    let [data, _] = recording::stretches(model, recordings, &[]);
+    let [data, _] = recording::segments(model, recordings, &[]);
     if !data.is_empty() {
-        pair.learn(model, &data)?;
+        pair.estimate_from_recordings(model, &data)?;
     }
     if let [first, ..] = pair.wrong_signs()[..] {
-        note(Note::warning(format!(
+        note(RecordingNote::warning(format!(
             "the value of `{first}` has a sign that makes no sense for `{}`",
             pair.effect().kind
         )));
@@ -94,9 +94,9 @@ pub(crate) fn ask(
             pair: &pair,
             which: vec![k],
         };
-        let all: Vec<Apart> = motions
+        let all: Vec<EffectDistance> = motions
             .iter()
-            .filter_map(|m| probe.along(m, &[k]))
+            .filter_map(|m| probe.distance_along(m, &[k]))
             .collect();
         let name = words::effect(pair.effect());
         if all.is_empty() {
@@ -119,10 +119,10 @@ pub(crate) fn ask(
         }
         if all.iter().all(|one| one.figures.is_mimicked()) {
             let rival = words::effect(pair.rivals[k].effect());
-            note(Note::warning(format!(
+            note(RecordingNote::warning(format!(
                 "no motion tells {name} from {rival}, which can say all that it says beside the base parameters{}; it is left \
                  out",
-                if pair.beside().next().is_some() {
+                if pair.common_effects().next().is_some() {
                     " and the effects of option `beside`"
                 } else {
                     ""
@@ -130,7 +130,7 @@ pub(crate) fn ask(
             )));
             continue;
         }
-        pair.rivals[k].is_held = all.iter().all(|one| one.figures.holds_rival());
+        pair.rivals[k].is_special_case = all.iter().all(|one| one.figures.can_explain_rival());
         which.push(k);
     }
     if which.is_empty() {
@@ -148,7 +148,7 @@ pub(crate) fn ask(
             ),
         )));
     }
-    Ok(Asked {
+    Ok(SeparationTask {
         pair,
         data,
         which,
@@ -156,7 +156,7 @@ pub(crate) fn ask(
     })
 }
 
-impl Asked {
+impl SeparationTask {
     /// The plant for the search.
     pub(crate) fn plant<'a>(
         &'a self,
@@ -172,11 +172,11 @@ impl Asked {
     }
 
     /// How far the effects are apart along the recordings.
-    pub(crate) fn before(&self, model: &Model) -> Outcome<Option<Apart>> {
+    pub(crate) fn distance_along_recordings(&self, model: &Model) -> Outcome<Option<EffectDistance>> {
         if self.data.is_empty() {
             return Ok(None);
         }
-        self.pair.along(model, &self.data, &self.which)
+        self.pair.distance_along(model, &self.data, &self.which)
     }
 
     /// Samples of the recordings.
@@ -184,13 +184,13 @@ impl Asked {
         self.data.iter().map(|one| one.time().len()).sum()
     }
 
-    fn rivals(&self) -> Vec<Effect> {
+    fn rivals(&self) -> Vec<LocatedEffect> {
         let of = |k: &usize| self.pair.rivals[*k].effect().clone();
         self.which.iter().map(of).collect()
     }
 
     /// Both sides in words.
-    pub(crate) fn words(&self) -> String {
+    pub(crate) fn description(&self) -> String {
         format!(
             "{} from {}",
             words::effect(self.pair.effect()),
@@ -200,13 +200,13 @@ impl Asked {
 }
 
 /// What forces of a model are measured in.
-pub(crate) fn unit(model: &Model) -> &'static str {
+pub(crate) fn common_force_unit(model: &Model) -> &'static str {
     let mechanism = &model.derivation.mechanism;
-    let carries = |drive: &modelmill_spec::Drive| drive.kind.carries(&mechanism.coordinates);
+    let carries = |drive: &modelmill_spec::ModelDrive| drive.kind.place_load(&mechanism.coordinates);
     let forces = mechanism
         .drives
         .iter()
-        .filter(|drive| carries(drive) == Carries::Force)
+        .filter(|drive| carries(drive) == PlaceLoad::Force)
         .count();
     match forces {
         0 => "N m",
@@ -215,32 +215,32 @@ pub(crate) fn unit(model: &Model) -> &'static str {
     }
 }
 
-impl Separated {
+impl SeparationResult {
     /// The difference in standard deviations of the white noise, over some samples of each drive; `None` where the noise is
     /// not known.
-    fn deviations(&self, apart: &Apart, samples: usize) -> Option<f64> {
-        let noise = self.asked.pair.noise()?;
+    fn deviations(&self, apart: &EffectDistance, samples: usize) -> Option<f64> {
+        let noise = self.task.pair.noise()?;
         Some(apart.force / noise * ((samples * self.drives) as f64).sqrt())
     }
 
     /// Periods of the trajectory until the difference is plain, at least one.
     fn periods(&self) -> Option<f64> {
-        let one = self.deviations(&self.apart, self.samples)?;
+        let one = self.deviations(&self.distance, self.samples)?;
         Some((PLAIN / one).powi(2).ceil().max(1.0))
     }
 
     /// All of it as one JSON object.
     pub fn json(&self) -> Value {
-        let pair = &self.asked.pair;
-        let one = |apart: &Apart, samples: usize| {
+        let pair = &self.task.pair;
+        let one = |apart: &EffectDistance, samples: usize| {
             let constants = apart.constants.iter().map(|(s, v)| (s.clone(), json!(v)));
-            let is_held = pair.rivals[apart.rival].is_held;
+            let is_held = pair.rivals[apart.rival].is_special_case;
             json!({
                 "apart": apart.force,
                 "effect": apart.figures.effect,
-                "beyond_base": apart.figures.beyond,
-                "left": apart.figures.left,
-                "reverse": (!is_held).then_some(apart.figures.reverse),
+                "beyond_base": apart.figures.outside_base,
+                "left": apart.figures.residual,
+                "reverse": (!is_held).then_some(apart.figures.reverse_residual),
                 "nearest": {
                     "kind": pair.rivals[apart.rival].effect().kind,
                     "at": pair.rivals[apart.rival].effect().at,
@@ -250,31 +250,31 @@ impl Separated {
                 "deviations": self.deviations(apart, samples),
             })
         };
-        let left_out: Vec<&Effect> = (0..pair.rivals.len())
-            .filter(|k| !self.asked.which.contains(k))
+        let left_out: Vec<&LocatedEffect> = (0..pair.rivals.len())
+            .filter(|k| !self.task.which.contains(k))
             .map(|k| pair.rivals[k].effect())
             .collect();
         let values = pair.sizes().iter().map(|(s, v)| (s.clone(), json!(v)));
         json!({
             "effect": pair.effect(),
             "values": values.collect::<Map<_, _>>(),
-            "from": self.asked.rivals(),
+            "from": self.task.rivals(),
             "inseparable": left_out,
-            "beside": pair.beside().collect::<Vec<_>>(),
+            "beside": pair.common_effects().collect::<Vec<_>>(),
             "noise": pair.noise(),
             "unit": self.unit,
-            "trajectory": one(&self.apart, self.samples),
+            "trajectory": one(&self.distance, self.samples),
             "best_random": self.random,
             "periods_needed": self.periods(),
-            "recordings": self.before.as_ref().map(|before| one(before, self.asked.samples())),
+            "recordings": self.before.as_ref().map(|before| one(before, self.task.samples())),
         })
     }
 
     /// For people.
     pub fn text(&self, evaluations: usize, random: usize) -> Vec<String> {
-        let pair = &self.asked.pair;
-        let mut lines = vec![format!("  tells {}", self.asked.words())];
-        let beside: Vec<Effect> = pair.beside().cloned().collect();
+        let pair = &self.task.pair;
+        let mut lines = vec![format!("  tells {}", self.task.description())];
+        let beside: Vec<LocatedEffect> = pair.common_effects().cloned().collect();
         if !beside.is_empty() {
             lines.push(format!("  beside {}", words::effects(&beside)));
         }
@@ -289,7 +289,7 @@ impl Separated {
         });
         lines.push(String::new());
         let force = |value: f64| self.force(value);
-        let row = |name: &str, apart: &Apart, samples: usize| {
+        let row = |name: &str, apart: &EffectDistance, samples: usize| {
             let nearest = pair.rivals[apart.rival].effect();
             let constants = apart.constants.iter();
             let constants: Vec<String> = constants
@@ -310,7 +310,7 @@ impl Separated {
         };
         let mut rows: Vec<Vec<String>> = Vec::new();
         if let Some(before) = &self.before {
-            rows.push(row("the recordings", before, self.asked.samples()));
+            rows.push(row("the recordings", before, self.task.samples()));
         }
         rows.push(vec![
             format!(
@@ -324,21 +324,21 @@ impl Separated {
         ]);
         rows.push(row(
             "one period of this trajectory",
-            &self.apart,
+            &self.distance,
             self.samples,
         ));
         lines.extend(table(
             2,
             &[
-                ("root mean square, all drives", Align::Left),
-                ("effect", Align::Right),
-                ("apart", Align::Right),
-                ("in deviations", Align::Right),
-                ("nearest", Align::Left),
+                ("root mean square, all drives", ColumnAlignment::Left),
+                ("effect", ColumnAlignment::Right),
+                ("apart", ColumnAlignment::Right),
+                ("in deviations", ColumnAlignment::Right),
+                ("nearest", ColumnAlignment::Left),
             ],
             &rows,
         ));
-        let gain = self.apart.force / self.random;
+        let gain = self.distance.force / self.random;
         let mut says = format!(
             "{} times as far apart as along the best random trajectory",
             significant(gain, 3)
@@ -349,7 +349,7 @@ impl Separated {
             let _ = write!(
                 says,
                 ", and {} times as far as in the recordings",
-                significant(self.apart.force / before.force, 3)
+                significant(self.distance.force / before.force, 3)
             );
         }
         lines.push(format!(
@@ -366,8 +366,8 @@ impl Separated {
 
     /// What the figures mean.
     fn remarks(&self) -> Vec<String> {
-        let pair = &self.asked.pair;
-        let mut lines = indented(&match (pair.noise(), self.periods()) {
+        let pair = &self.task.pair;
+        let mut lines = indent_lines(&match (pair.noise(), self.periods()) {
             (Some(noise), Some(periods)) => format!(
                 "Against white noise of {} it takes {} for {PLAIN} standard deviations of all samples together; noise that \
                  resembles itself takes longer, and `diagnose` tells what a recording is worth.",
@@ -380,10 +380,10 @@ impl Separated {
             ),
             _ => "With option `noise` = `SIZE`, or option `data` = `RUN`, it says how many periods it takes.".to_owned(),
         });
-        for k in &self.asked.which {
+        for k in &self.task.which {
             let rival = &pair.rivals[*k];
-            if rival.is_held {
-                lines.extend(indented(&format!(
+            if rival.is_special_case {
+                lines.extend(indent_lines(&format!(
                     "{} is a special case of {} here: if it is the true one, nothing but its simplicity tells.",
                     words::effect(rival.effect()),
                     words::effect(pair.effect())
@@ -395,7 +395,7 @@ impl Separated {
 }
 
 /// A sentence in lines.
-fn indented(says: &str) -> Vec<String> {
+fn indent_lines(says: &str) -> Vec<String> {
     let lines = words::lines(says, 98);
     lines.iter().map(|line| format!("  {line}")).collect()
 }

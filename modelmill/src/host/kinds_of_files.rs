@@ -2,15 +2,15 @@
 
 use std::path::Path;
 
-use modelmill_boundary::files::Kind;
+use modelmill_boundary::files::PathKind;
 
 use crate::host::Host;
 
 /// What kind of file of ours this is, in words with an article; `None` where it is none.
-pub(crate) fn kind(host: &Host, path: &Path) -> Option<&'static str> {
+pub(crate) fn file_kind(host: &Host, path: &Path) -> Option<&'static str> {
     // Anything else may be a pipe, which cannot be read twice, or too large to be one of these.
     let files = host.files();
-    if files.kind(path) != Kind::File {
+    if files.kind(path) != PathKind::File {
         return None;
     }
     let starts_as_json = || {

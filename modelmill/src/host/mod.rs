@@ -5,13 +5,13 @@ pub(crate) mod kinds_of_files;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use modelmill_boundary::files::{Disk, Files};
-use modelmill_identify::{FitFile, Note};
-use modelmill_spec::edit::{EditFailure, Edited, NewEffect, add_to_model};
-use modelmill_spec::{EffectKind, Loaded};
+use modelmill_boundary::files::{DiskFiles, FileSource};
+use modelmill_identify::{FitFile, RecordingNote};
+use modelmill_spec::edit::{EditFailure, EditedModel, NewEffect, add_to_model};
+use modelmill_spec::{EffectKind, LoadedModel};
 
 use crate::error::{Error, Outcome};
-use crate::progress::{Job, Progress, Silent, watched};
+use crate::progress::{JobHandle, ProgressListener, SilentProgress, run_job};
 
 /// Where files come from, which kinds of effects there are besides the library's, and who hears what goes on.
 ///
@@ -19,19 +19,19 @@ use crate::progress::{Job, Progress, Silent, watched};
 /// comes from the same place.
 #[derive(Clone)]
 pub struct Host {
-    files: Arc<dyn Files>,
+    files: Arc<dyn FileSource>,
     libraries: Vec<PathBuf>,
     is_at_values: bool,
-    progress: Arc<dyn Progress>,
+    progress: Arc<dyn ProgressListener>,
 }
 
 impl Default for Host {
     fn default() -> Self {
         Self {
-            files: Arc::new(Disk::default()),
+            files: Arc::new(DiskFiles::default()),
             libraries: Vec::new(),
             is_at_values: false,
-            progress: Arc::new(Silent),
+            progress: Arc::new(SilentProgress),
         }
     }
 }
@@ -44,13 +44,13 @@ impl Host {
 
     /// With files from elsewhere, such as memory.
     #[must_use]
-    pub fn with_files(mut self, files: Arc<dyn Files>) -> Self {
+    pub fn with_files(mut self, files: Arc<dyn FileSource>) -> Self {
         self.files = files;
         self
     }
 
     /// Where files come from.
-    pub fn files(&self) -> &dyn Files {
+    pub fn files(&self) -> &dyn FileSource {
         &*self.files
     }
 
@@ -63,7 +63,7 @@ impl Host {
 
     /// With somebody who hears what goes on and may stop it.
     #[must_use]
-    pub fn with_progress(mut self, progress: Arc<dyn Progress>) -> Self {
+    pub fn with_progress(mut self, progress: Arc<dyn ProgressListener>) -> Self {
         self.progress = progress;
         self
     }
@@ -96,14 +96,14 @@ impl Host {
     /// Reads a model file and validates it, without deriving it.
     ///
     /// Fails with every finding about the files, each with its place.
-    pub fn load(&self, path: &Path) -> Outcome<Loaded> {
-        watched(
+    pub fn load(&self, path: &Path) -> Outcome<LoadedModel> {
+        run_job(
             &*self.progress,
             &format!("reading {}", path.display()),
             0,
             |_| modelmill_spec::load_file_with(path, &self.libraries, self.files()),
         )?
-        .map_err(|failure| match kinds_of_files::kind(self, path) {
+        .map_err(|failure| match kinds_of_files::file_kind(self, path) {
             Some(kind) => Error::input(format!(
                 "{} is {kind}; a model file (TOML) is expected, such as those in model-spec/models{}",
                 path.display(),
@@ -120,7 +120,7 @@ impl Host {
     /// Validates the text of a model file; `path` is what messages call it, and where the paths in it start.
     ///
     /// Fails with every finding about the files, each with its place.
-    pub fn load_text(&self, path: &Path, text: &str) -> Outcome<Loaded> {
+    pub fn load_text(&self, path: &Path, text: &str) -> Outcome<LoadedModel> {
         let name = path.to_string_lossy();
         Ok(modelmill_spec::load_with(
             &name,
@@ -133,7 +133,7 @@ impl Host {
     /// Adds an effect to the text of a model file, keeping its comments and layout; the result is validated.
     ///
     /// Fails when the file with the effect has no meaning: unknown kind or place, a value that is missing, an effect twice.
-    pub fn edit(&self, path: &str, text: &str, effect: &NewEffect) -> Outcome<Edited> {
+    pub fn edit(&self, path: &str, text: &str, effect: &NewEffect) -> Outcome<EditedModel> {
         add_to_model(path, text, effect, &self.libraries, self.files()).map_err(|failure| {
             match failure {
                 EditFailure::Effect(says) => Error::input(format!("{path}: {says}")),
@@ -145,8 +145,8 @@ impl Host {
     /// Runs a job that somebody may watch and stop.
     ///
     /// Fails with [`Error::Cancelled`] if somebody asked it to stop.
-    pub fn watched<T>(&self, what: &str, total: usize, work: impl FnOnce(&Job) -> T) -> Outcome<T> {
-        watched(&*self.progress, what, total, work)
+    pub fn run_job<T>(&self, what: &str, total: usize, work: impl FnOnce(&JobHandle) -> T) -> Outcome<T> {
+        run_job(&*self.progress, what, total, work)
     }
 
     /// Reads a fit, as [`crate::identify::Identification::json`] wrote it.
@@ -164,7 +164,7 @@ impl Host {
     }
 
     /// Passes a remark on to whoever watches.
-    pub(crate) fn note(&self, note: &Note) {
-        self.progress.notes(note);
+    pub(crate) fn note(&self, note: &RecordingNote) {
+        self.progress.on_note(note);
     }
 }

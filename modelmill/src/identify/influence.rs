@@ -1,42 +1,42 @@
 //! What faults of sensors would have done to a fit, had they been left in: recordings go in, a sentence comes out.
 
-use modelmill_identify::{Note, ParameterInfo};
+use modelmill_identify::{RecordingNote, ParameterInfo};
 
-use super::options::Estimation;
-use super::regression::{self, Identified};
+use super::options::EstimatorOptions;
+use super::regression::{self, RegressionEstimate};
 use super::standstill;
 use crate::model::Model;
-use crate::recording::Recording;
-use crate::stretch::Stretch;
+use crate::recording::PreparedRecording;
+use crate::stretch::RecordingSegment;
 use crate::text::table::{number, significant};
 
 /// The base parameter that faults move most, in its deviations, by fitting once more with the faults left in; `None` where no
 /// fault was taken out, or no fit comes of it.
-pub(super) fn of_faults(
+pub(super) fn fault_influence(
     model: &Model,
-    recordings: &[&Recording],
-    found: &Identified,
-    options: &Estimation,
-) -> Option<Note> {
+    recordings: &[&PreparedRecording],
+    found: &RegressionEstimate,
+    options: &EstimatorOptions,
+) -> Option<RecordingNote> {
     let mut files = Vec::new();
-    let mut data: Vec<Stretch> = Vec::new();
+    let mut data: Vec<RecordingSegment> = Vec::new();
     for one in recordings {
         match one.with_faults(model) {
             Some(faulty) => {
                 files.push(one.file());
                 data.extend(faulty);
             }
-            None => data.extend(one.stretches.iter().cloned()),
+            None => data.extend(one.segments.iter().cloned()),
         }
     }
     if files.is_empty() {
         return None;
     }
     if let Some(part) = options.standstill {
-        standstill::leave_out(model, &mut data, part).ok()?;
+        standstill::exclude_standstill(model, &mut data, part).ok()?;
     }
     let faulty = regression::identify(model, &data, &[], options).ok()?;
-    let infos = model.infos();
+    let infos = model.parameter_infos();
     let pairs = found.solution.values.iter().zip(&faulty.solution.values);
     let moved = pairs
         .zip(&found.deviations.std)
@@ -65,5 +65,5 @@ pub(super) fn of_faults(
             significant(deviations, 3)
         )
     };
-    Some(Note::info(says))
+    Some(RecordingNote::info(says))
 }

@@ -1,11 +1,11 @@
 //! Instruments for recordings: the motion that was asked for, or the same motion one period later.
 
-use modelmill_identify::place_word;
+use modelmill_identify::sample_place_word;
 
 use crate::error::{Error, Outcome};
-use crate::identify::options::{Estimation, Weights};
-use crate::recording::Recording;
-use crate::stretch::Stretch;
+use crate::identify::options::{EstimatorOptions, EquationWeights};
+use crate::recording::PreparedRecording;
+use crate::stretch::RecordingSegment;
 
 /// What stands in for the states against noise that runs through the controller.
 #[derive(Clone, Copy, Default)]
@@ -16,19 +16,19 @@ pub enum Instruments<'a> {
     /// The states one period later, s.
     Period(f64),
     /// Recordings of the motion that was asked for, one for each of the fit, in step with it.
-    Recordings(&'a [&'a Recording]),
+    Recordings(&'a [&'a PreparedRecording]),
 }
 
 /// One stretch of instruments for each of `data`; none if none are asked for.
-pub(crate) fn along(
-    data: &[Stretch],
+pub(crate) fn instrument_segments(
+    data: &[RecordingSegment],
     instruments: &Instruments<'_>,
-    options: &Estimation,
-) -> Outcome<Vec<Stretch>> {
+    options: &EstimatorOptions,
+) -> Outcome<Vec<RecordingSegment>> {
     if matches!(instruments, Instruments::None) {
         return Ok(Vec::new());
     }
-    if options.weights == Weights::Channels {
+    if options.weights == EquationWeights::Channels {
         return Err(Error::options(
             "option `instruments` goes with option `weights` = `none` or `variance`: weights from residuals would depend on the estimate that \
              the instruments are to mend",
@@ -36,20 +36,20 @@ pub(crate) fn along(
     }
     match instruments {
         Instruments::None => Ok(Vec::new()),
-        Instruments::Period(period) => data.iter().map(|one| shifted(one, *period)).collect(),
+        Instruments::Period(period) => data.iter().map(|one| shift_by_period(one, *period)).collect(),
         Instruments::Recordings(recordings) => {
-            let all: Vec<Stretch> = recordings
+            let all: Vec<RecordingSegment> = recordings
                 .iter()
-                .flat_map(|one| one.stretches.clone())
+                .flat_map(|one| one.segments.clone())
                 .collect();
-            in_step(data, &all)?;
+            check_same_times(data, &all)?;
             Ok(all)
         }
     }
 }
 
 /// Fails unless instruments have the same times as the recordings.
-fn in_step(data: &[Stretch], instruments: &[Stretch]) -> Outcome {
+fn check_same_times(data: &[RecordingSegment], instruments: &[RecordingSegment]) -> Outcome {
     if data.len() != instruments.len() {
         return Err(Error::options(format!(
             "option `instruments` gives {} for {} of option `data` (recordings count once for each stretch between gaps); give one for \
@@ -72,7 +72,7 @@ fn in_step(data: &[Stretch], instruments: &[Stretch]) -> Outcome {
             return Err(Error::input(format!(
                 "{}, {} {}: t = {} s, but t = {} s in the recording {}; instruments must have the same times",
                 theirs.run.file,
-                place_word(&theirs.run.file),
+                sample_place_word(&theirs.run.file),
                 theirs.run.lines.get(sample).copied().unwrap_or(0),
                 b[sample],
                 a[sample],
@@ -93,7 +93,7 @@ fn in_step(data: &[Stretch], instruments: &[Stretch]) -> Outcome {
 }
 
 /// The same recording with the states of the next period, at its end with those of the one before.
-fn shifted(data: &Stretch, period: f64) -> Outcome<Stretch> {
+fn shift_by_period(data: &RecordingSegment, period: f64) -> Outcome<RecordingSegment> {
     let time = &data.run.time;
     let n = time.len();
     let span = time

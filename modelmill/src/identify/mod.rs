@@ -10,7 +10,7 @@ mod standstill;
 use modelmill_identify::estimate::FEWEST_ROWS;
 use modelmill_identify::fit_parameters;
 use modelmill_identify::{
-    Estimator, Figures, FitFile, FitParameter, Note, ParameterInfo, Repeats, Status,
+    EstimatorOutput, ErrorFigures, FitFile, FitParameter, RecordingNote, ParameterInfo, RunRepeatability, ParameterStatus,
 };
 use modelmill_spec::Sign;
 
@@ -18,15 +18,15 @@ use crate::along;
 use crate::compare;
 use crate::error::{Error, Outcome};
 use crate::model::Model;
-use crate::recording::{self, Recording};
-use crate::stretch::Stretch;
+use crate::recording::{self, PreparedRecording};
+use crate::stretch::RecordingSegment;
 use crate::text::table::{count, number};
 
 pub use instruments::Instruments;
 pub use modelmill_identify::estimate::HUBER_BOUND;
-pub use options::{Estimation, Weights};
-pub use refine::{Refined, Refinement};
-use regression::{Identified, InstrumentsFound};
+pub use options::{EstimatorOptions, EquationWeights};
+pub use refine::{RefinementResult, EstimateRefinement};
+use regression::{RegressionEstimate, InstrumentStatistics};
 
 /// Instruments whose smallest canonical correlation with the regressor is below this deserve a warning.
 const WEAK_INSTRUMENTS: f64 = 0.2;
@@ -36,17 +36,17 @@ pub struct Identification {
     /// The fit, as `--parameters` reads it.
     pub fit: FitFile,
     /// Figures with nominal parameters on the recordings of the fit.
-    pub nominal_fit: Figures,
+    pub nominal_fit: ErrorFigures,
     /// The same on the recordings of the check.
-    pub nominal_check: Option<Figures>,
+    pub nominal_check: Option<ErrorFigures>,
     /// What the estimator found.
-    pub found: Identified,
+    pub found: RegressionEstimate,
     /// How it was asked.
-    pub options: Estimation,
+    pub options: EstimatorOptions,
     /// What the user should know about the result; the fit holds it too.
-    pub notes: Vec<Note>,
+    pub notes: Vec<RecordingNote>,
     /// Periods and noise floors of periodic recordings, by their names.
-    pub repeats: Vec<(String, Repeats)>,
+    pub repeats: Vec<(String, RunRepeatability)>,
 }
 
 impl Model {
@@ -56,9 +56,9 @@ impl Model {
     /// mechanism cannot stand.
     pub fn identify(
         &self,
-        fit: &[&Recording],
-        check: &[&Recording],
-        options: &Estimation,
+        fit: &[&PreparedRecording],
+        check: &[&PreparedRecording],
+        options: &EstimatorOptions,
     ) -> Outcome<Identification> {
         self.identify_with(fit, &Instruments::None, check, options)
     }
@@ -66,24 +66,24 @@ impl Model {
     /// As [`Model::identify`], by instrumental variables against noise that runs through the controller.
     pub fn identify_with(
         &self,
-        fit: &[&Recording],
+        fit: &[&PreparedRecording],
         instruments: &Instruments<'_>,
-        check: &[&Recording],
-        options: &Estimation,
+        check: &[&PreparedRecording],
+        options: &EstimatorOptions,
     ) -> Outcome<Identification> {
         let recordings = fit;
-        let [mut fit, check] = recording::stretches(self, fit, check);
+        let [mut fit, check] = recording::segments(self, fit, check);
         if let Some(part) = options.standstill {
-            standstill::leave_out(self, &mut fit, part)?;
+            standstill::exclude_standstill(self, &mut fit, part)?;
         }
-        let instruments = instruments::along(&fit, instruments, options)?;
-        let options = Estimation {
-            weights: settled(self, &fit, &instruments, options.weights),
+        let instruments = instruments::instrument_segments(&fit, instruments, options)?;
+        let options = EstimatorOptions {
+            weights: resolve_weights(self, &fit, &instruments, options.weights),
             ..options.clone()
         };
         let mut found = identify(self, &fit, &instruments, &check, &options)?;
         if instruments.is_empty()
-            && let Some(note) = influence::of_faults(self, recordings, &found.found, &options)
+            && let Some(note) = influence::fault_influence(self, recordings, &found.found, &options)
         {
             found.fit.data.push(note.clone());
             found.notes.push(note);
@@ -97,39 +97,39 @@ impl Model {
 
 /// What equations count where that is left open: each drive by its own residuals, where squares of different units would add
 /// up, and where nobody has said how a recording is prepared. Instruments do without.
-fn settled(model: &Model, data: &[Stretch], instruments: &[Stretch], weights: Weights) -> Weights {
-    if weights != Weights::Automatic {
+fn resolve_weights(model: &Model, data: &[RecordingSegment], instruments: &[RecordingSegment], weights: EquationWeights) -> EquationWeights {
+    if weights != EquationWeights::Automatic {
         return weights;
     }
     let drives = model.drives().len();
     let differ = (1..drives).any(|d| model.force_unit(d) != model.force_unit(0));
     let chosen = data.iter().any(|one| one.run.prepared.decimate_chosen);
     if instruments.is_empty() && drives > 1 && (differ || chosen) {
-        Weights::Channels
+        EquationWeights::Channels
     } else {
-        Weights::None
+        EquationWeights::None
     }
 }
 
 /// Identifies a model from some recordings and holds it against others.
 pub fn identify(
     model: &Model,
-    data: &[Stretch],
-    instruments: &[Stretch],
-    check: &[Stretch],
-    options: &Estimation,
+    data: &[RecordingSegment],
+    instruments: &[RecordingSegment],
+    check: &[RecordingSegment],
+    options: &EstimatorOptions,
 ) -> Outcome<Identification> {
     let found = regression::identify(model, data, instruments, options)?;
     let solution = &found.solution;
-    let infos = model.infos();
+    let infos = model.parameter_infos();
     let unknown: Vec<ParameterInfo> = found.unknown.iter().map(|k| infos[*k].clone()).collect();
     let mut parameters = fit_parameters(&unknown, solution, &found.deviations);
-    for one in found.refined.left_out() {
-        parameters[one].status = Status::NotEssential;
+    for one in found.refined.removed_parameters() {
+        parameters[one].status = ParameterStatus::NotEssential;
     }
     for (k, info) in infos.iter().enumerate() {
         if model.is_known(k) {
-            parameters.insert(k, known(info, model.nominal[k]));
+            parameters.insert(k, known_parameter(info, model.nominal[k]));
         }
     }
     let notes = remarks(model, &found, &parameters);
@@ -141,7 +141,7 @@ pub fn identify(
     let recordings = data.iter().chain(check);
     let repeats = recordings
         .clone()
-        .filter_map(|one| Some((one.run.file.clone(), one.run.repeats.clone()?)))
+        .filter_map(|one| Some((one.run.file.clone(), one.run.repeatability.clone()?)))
         .collect();
     let (check, nominal_check) = if check.is_empty() {
         (None, None)
@@ -150,8 +150,8 @@ pub fn identify(
         (Some(identified), Some(nominal))
     };
     let finite = |value: f64| value.is_finite().then_some(value);
-    let of_recordings = recordings.flat_map(Stretch::notes).cloned();
-    let mut all_notes: Vec<Note> = model.caution().into_iter().chain(of_recordings).collect();
+    let of_recordings = recordings.flat_map(RecordingSegment::notes).cloned();
+    let mut all_notes: Vec<RecordingNote> = model.caution().into_iter().chain(of_recordings).collect();
     all_notes.extend(notes.iter().cloned());
     let constants = &model.derivation.mechanism.constants;
     Ok(Identification {
@@ -170,7 +170,7 @@ pub fn identify(
             fit,
             check,
             data: all_notes,
-            estimator: Estimator::default(),
+            estimator: EstimatorOutput::default(),
         },
         nominal_fit,
         nominal_check,
@@ -182,7 +182,7 @@ pub fn identify(
 }
 
 /// The covariance of all base parameters, of which the known ones have none.
-fn covariance(found: &Identified, n: usize) -> Option<Vec<Vec<f64>>> {
+fn covariance(found: &RegressionEstimate, n: usize) -> Option<Vec<Vec<f64>>> {
     let mut rows = vec![vec![0.0; n]; n];
     for (a, i) in found.unknown.iter().enumerate() {
         for (b, j) in found.unknown.iter().enumerate() {
@@ -195,7 +195,7 @@ fn covariance(found: &Identified, n: usize) -> Option<Vec<Vec<f64>>> {
 }
 
 /// A parameter that is a number of the model file.
-fn known(info: &ParameterInfo, value: f64) -> FitParameter {
+fn known_parameter(info: &ParameterInfo, value: f64) -> FitParameter {
     FitParameter {
         name: info.name.clone(),
         expression: info.expression.clone(),
@@ -205,16 +205,16 @@ fn known(info: &ParameterInfo, value: f64) -> FitParameter {
         effective_samples: None,
         unit: info.unit.clone(),
         nominal: info.nominal,
-        status: Status::Known,
+        status: ParameterStatus::Known,
     }
 }
 
 /// What is not as one would wish: known parameters, undetermined ones, no deviations, impossible values.
-fn remarks(model: &Model, found: &Identified, parameters: &[FitParameter]) -> Vec<Note> {
+fn remarks(model: &Model, found: &RegressionEstimate, parameters: &[FitParameter]) -> Vec<RecordingNote> {
     let solution = &found.solution;
     let mut notes = Vec::new();
-    for p in parameters.iter().filter(|p| p.status == Status::Known) {
-        notes.push(Note::info(format!(
+    for p in parameters.iter().filter(|p| p.status == ParameterStatus::Known) {
+        notes.push(RecordingNote::info(format!(
             "{} = {} holds numbers of the model file only: it is known, its force is taken off the measured one, and it is \
              not identified.",
             p.name, p.expression
@@ -222,10 +222,10 @@ fn remarks(model: &Model, found: &Identified, parameters: &[FitParameter]) -> Ve
     }
     let unknown: Vec<&FitParameter> = found.unknown.iter().map(|k| &parameters[*k]).collect();
     let names: Vec<String> = unknown.iter().map(|p| p.expression.clone()).collect();
-    if let Some(InstrumentsFound { strength, .. }) = &found.instruments
+    if let Some(InstrumentStatistics { strength, .. }) = &found.instruments
         && *strength < WEAK_INSTRUMENTS
     {
-        notes.push(Note::warning(format!(
+        notes.push(RecordingNote::warning(format!(
             "The instruments say little: their smallest correlation with the regressor is {}. Are they of the same motion, \
              and in step with the recording?",
             number(*strength)
@@ -234,9 +234,9 @@ fn remarks(model: &Model, found: &Identified, parameters: &[FitParameter]) -> Ve
     if found
         .weighting
         .as_ref()
-        .is_some_and(|weighting| !weighting.settled)
+        .is_some_and(|weighting| !weighting.converged)
     {
-        notes.push(Note::warning(
+        notes.push(RecordingNote::warning(
             "The weights have not settled: residuals depend on the weights from one solution to the next; leave out \
              option `weights` or option `robust`.",
         ));
@@ -245,21 +245,21 @@ fn remarks(model: &Model, found: &Identified, parameters: &[FitParameter]) -> Ve
         let kept: Vec<String> = direction
             .changes
             .iter()
-            .map(|(i, _)| kept(unknown[*i]))
+            .map(|(i, _)| undetermined_text(unknown[*i]))
             .collect();
         let how = if kept.len() == 1 {
             "it stays at"
         } else {
             "of all values that fit equally well those nearest to the nominal ones are taken:"
         };
-        notes.push(Note::warning(format!(
+        notes.push(RecordingNote::warning(format!(
             "{}; {how} {}.",
             direction.describe(&names),
             kept.join(", ")
         )));
     }
     if solution.rows <= solution.rank {
-        notes.push(Note::warning(format!(
+        notes.push(RecordingNote::warning(format!(
             "There {} for as many unknown base parameters: no degree of freedom is left for the residuals, so neither \
              standard deviations nor the error of the fit say anything; use a longer recording.",
             match solution.rows {
@@ -268,7 +268,7 @@ fn remarks(model: &Model, found: &Identified, parameters: &[FitParameter]) -> Ve
             }
         )));
     } else if found.deviations.few_samples {
-        notes.push(Note::warning(format!(
+        notes.push(RecordingNote::warning(format!(
             "There are only {} equations for {}: standard deviations take the residuals for independent and are too small \
              if they are not, and the error of the fit says little; use a longer recording (at least {FEWEST_ROWS} \
              equations for each parameter).",
@@ -287,8 +287,8 @@ fn remarks(model: &Model, found: &Identified, parameters: &[FitParameter]) -> Ve
             Sign::Negative => (p.value > slack, "negative"),
             Sign::Any => continue,
         };
-        if wrong && p.status == Status::Identified {
-            notes.push(Note::warning(format!(
+        if wrong && p.status == ParameterStatus::Identified {
+            notes.push(RecordingNote::warning(format!(
                 "{} = {} comes out as {} {}, but must be {expected} to make physical sense: the model lacks something, or \
                  the recording excites it too little.",
                 p.name,
@@ -302,7 +302,7 @@ fn remarks(model: &Model, found: &Identified, parameters: &[FitParameter]) -> Ve
 }
 
 /// The value of an undetermined parameter beside its nominal one.
-fn kept(p: &FitParameter) -> String {
+fn undetermined_text(p: &FitParameter) -> String {
     let value = number(p.value);
     match p.nominal {
         Some(nominal) if number(nominal) == value => {
@@ -324,10 +324,10 @@ fn kept(p: &FitParameter) -> String {
 /// Figures with identified and with nominal values.
 fn both_figures(
     model: &Model,
-    data: &[Stretch],
+    data: &[RecordingSegment],
     values: &[f64],
     band_hz: Option<f64>,
-) -> Outcome<(Figures, Figures)> {
+) -> Outcome<(ErrorFigures, ErrorFigures)> {
     let figures_of = |values: &[f64]| {
         let forces = data
             .iter()

@@ -1,17 +1,17 @@
 //! Least squares over recordings: rows of the regressor are made block by block and kept only if
 //! they fit a modest memory; else they are made again for every pass.
 
-use modelmill_codegen::{Evaluator, PoseFault, States};
-use modelmill_identify::estimate::{EstimateOptions, Visit, Weighting, estimate, instrumental};
-use modelmill_identify::{Deviations, FilterError, LeastSquaresError, Solution, decimate_table};
+use modelmill_codegen::{ModelEvaluator, PoseFault, MotionStates};
+use modelmill_identify::estimate::{EstimateOptions, RowVisitor, RowWeighting, estimate, estimate_with_instruments};
+use modelmill_identify::{ParameterUncertainty, FilterError, LeastSquaresError, RegressionSolution, decimate_table};
 
-use crate::along::{counted, interleaved};
+use crate::along::{included_forces, interleave};
 use crate::error::{Error, Outcome};
-use crate::identify::options::{Estimation, Weights};
-use crate::identify::refine::{Refined, refine};
+use crate::identify::options::{EstimatorOptions, EquationWeights};
+use crate::identify::refine::{RefinementResult, refine};
 use crate::model::Model;
-use crate::progress::Job;
-use crate::stretch::Stretch;
+use crate::progress::JobHandle;
+use crate::stretch::RecordingSegment;
 use crate::stretch::variances;
 use crate::text::table::count;
 
@@ -23,23 +23,23 @@ const KEPT: usize = 1 << 22;
 const REACH: usize = 120;
 
 /// What least squares found.
-pub struct Identified {
+pub struct RegressionEstimate {
     /// The solution.
-    pub solution: Solution,
+    pub solution: RegressionSolution,
     /// What it is worth.
-    pub deviations: Deviations,
+    pub deviations: ParameterUncertainty,
     /// The base parameters that solution and deviations are about, by position.
     pub unknown: Vec<usize>,
     /// What the rows were multiplied by.
-    pub weighting: Option<Weighting>,
+    pub weighting: Option<RowWeighting>,
     /// What came of refining them.
-    pub refined: Refined,
+    pub refined: RefinementResult,
     /// Instruments, if any were used.
-    pub instruments: Option<InstrumentsFound>,
+    pub instruments: Option<InstrumentStatistics>,
 }
 
 /// What instrumental variables say beside the solution.
-pub struct InstrumentsFound {
+pub struct InstrumentStatistics {
     /// The smallest canonical correlation between instruments and regressor, 0 to 1.
     pub strength: f64,
     /// What least squares finds on the same rows.
@@ -50,10 +50,10 @@ pub struct InstrumentsFound {
 /// its force is taken off the measured one. `instruments` has one recording for each of `data`, or none.
 pub fn identify(
     model: &Model,
-    data: &[Stretch],
-    instruments: &[Stretch],
-    args: &Estimation,
-) -> Outcome<Identified> {
+    data: &[RecordingSegment],
+    instruments: &[RecordingSegment],
+    args: &EstimatorOptions,
+) -> Outcome<RegressionEstimate> {
     if model.base.is_empty() {
         return Err(Error::input(format!(
             "{}: no parameter has an effect on the drives, so there is nothing to identify",
@@ -71,12 +71,12 @@ pub fn identify(
     }
     let known: Vec<(usize, f64)> = known.into_iter().map(|k| (k, model.nominal[k])).collect();
     let nominal: Vec<f64> = unknown.iter().map(|k| model.nominal[*k]).collect();
-    let samples: usize = data.iter().map(Stretch::samples).sum();
+    let samples: usize = data.iter().map(RecordingSegment::samples).sum();
     let mut runs = data
         .iter()
         .enumerate()
         .map(|(k, one)| {
-            Rows::new(
+            RegressionRows::new(
                 model,
                 one,
                 instruments.get(k),
@@ -85,33 +85,33 @@ pub fn identify(
                 args.weights,
             )
         })
-        .collect::<Outcome<Vec<Rows<'_>>>>()?;
-    enough(data, &runs, unknown.len(), model)?;
-    not_idle(data, &runs)?;
+        .collect::<Outcome<Vec<RegressionRows<'_>>>>()?;
+    check_equation_count(data, &runs, unknown.len(), model)?;
+    check_forces_nonzero(data, &runs)?;
     // Plain least squares: one pass for the solution, two for the deviations. How often rows are reweighted nobody knows.
-    let by_channel = args.weights == Weights::Channels;
+    let by_channel = args.weights == EquationWeights::Channels;
     let reweighted = by_channel || args.robust.is_some();
     let passes = if reweighted { 0 } else { 3 };
     model
         .host()
-        .watched("identifying", passes * samples, |job| {
+        .run_job("identifying", passes * samples, |job| {
             for run in &mut runs {
                 run.keep_if_small(job)?;
             }
             let channels = model.drives().len();
-            let show = |visit: &mut Visit<'_>| -> Outcome {
+            let show = |visit: &mut RowVisitor<'_>| -> Outcome {
                 runs.iter()
-                    .try_for_each(|run| run.show::<Error>(job, visit))
+                    .try_for_each(|run| run.visit_rows::<Error>(job, visit))
             };
             if !instruments.is_empty() {
-                let found = instrumental(unknown.len(), channels, show)?;
-                return Ok(Identified {
+                let found = estimate_with_instruments(unknown.len(), channels, show)?;
+                return Ok(RegressionEstimate {
                     solution: found.solution,
-                    deviations: found.deviations,
+                    deviations: found.uncertainty,
                     unknown: unknown.clone(),
                     weighting: None,
-                    refined: Refined::Nothing,
-                    instruments: Some(InstrumentsFound {
+                    refined: RefinementResult::Nothing,
+                    instruments: Some(InstrumentStatistics {
                         strength: found.strength,
                         least_squares: found.least_squares.values,
                     }),
@@ -126,9 +126,9 @@ pub fn identify(
             let refined = refine(model, &mut found, &unknown, &nominal, args.refinement)?;
             let weighting = found.weighting;
             let is_weighted = weighting.by_channel || weighting.huber.is_some();
-            Ok(Identified {
+            Ok(RegressionEstimate {
                 solution: found.solution,
-                deviations: found.deviations,
+                deviations: found.uncertainty,
                 unknown: unknown.clone(),
                 weighting: is_weighted.then_some(weighting),
                 refined,
@@ -138,7 +138,7 @@ pub fn identify(
 }
 
 /// Fails when there are fewer equations than unknown parameters.
-fn enough(data: &[Stretch], runs: &[Rows<'_>], unknown: usize, model: &Model) -> Outcome {
+fn check_equation_count(data: &[RecordingSegment], runs: &[RegressionRows<'_>], unknown: usize, model: &Model) -> Outcome {
     let equations: usize = runs.iter().map(|run| run.measured.len()).sum();
     if equations >= unknown {
         return Ok(());
@@ -161,17 +161,17 @@ fn enough(data: &[Stretch], runs: &[Rows<'_>], unknown: usize, model: &Model) ->
 }
 
 /// Fails when all measured forces are zero: everything would fit them with zeros, without any doubt.
-fn not_idle(data: &[Stretch], runs: &[Rows<'_>]) -> Outcome {
-    let is_idle = |run: &Rows<'_>| run.measured.iter().all(|force| *force == 0.0);
+fn check_forces_nonzero(data: &[RecordingSegment], runs: &[RegressionRows<'_>]) -> Outcome {
+    let is_idle = |run: &RegressionRows<'_>| run.measured.iter().all(|force| *force == 0.0);
     if !runs.iter().all(is_idle) {
         return Ok(());
     }
     let files: Vec<&str> = data.iter().map(|one| one.run.file.as_str()).collect();
-    Err(Error::input(nothing_measured(&files.join(", "))))
+    Err(Error::input(zero_force_message(&files.join(", "))))
 }
 
 /// What is wrong with recordings whose forces are zero throughout.
-pub fn nothing_measured(files: &str) -> String {
+pub fn zero_force_message(files: &str) -> String {
     format!(
         "{files}: the measured forces are zero throughout, so that there is nothing to explain; record the forces of the \
          drives, or name their columns with option `columns`"
@@ -179,10 +179,10 @@ pub fn nothing_measured(files: &str) -> String {
 }
 
 /// The rows of one recording: regressors of the instruments, if there are any, and of the recording itself.
-struct Rows<'a> {
+struct RegressionRows<'a> {
     model: &'a Model,
-    data: &'a Stretch,
-    instruments: Option<&'a Stretch>,
+    data: &'a RecordingSegment,
+    instruments: Option<&'a RecordingSegment>,
     /// Columns that are known, with their parameters' values.
     known: &'a [(usize, f64)],
     /// The other columns.
@@ -194,17 +194,17 @@ struct Rows<'a> {
     kept: Option<Vec<f64>>,
 }
 
-impl<'a> Rows<'a> {
+impl<'a> RegressionRows<'a> {
     fn new(
         model: &'a Model,
-        data: &'a Stretch,
-        instruments: Option<&'a Stretch>,
+        data: &'a RecordingSegment,
+        instruments: Option<&'a RecordingSegment>,
         known: &'a [(usize, f64)],
         unknown: &'a [usize],
-        weights: Weights,
+        weights: EquationWeights,
     ) -> Outcome<Self> {
         let drives = model.drives();
-        let spread = if weights == Weights::Variance {
+        let spread = if weights == EquationWeights::Variance {
             let Some(variance) = &data.variance else {
                 let columns: Vec<String> = drives
                     .iter()
@@ -226,14 +226,14 @@ impl<'a> Rows<'a> {
         } else {
             None
         };
-        let factors = product(spread, data.weights.as_deref());
+        let factors = combined_factors(spread, data.weights.as_deref());
         Ok(Self {
             model,
             data,
             instruments,
             known,
             unknown,
-            measured: interleaved(&counted(data)?),
+            measured: interleave(&included_forces(data)?),
             factors,
             kept: None,
         })
@@ -245,7 +245,7 @@ impl<'a> Rows<'a> {
     }
 
     /// Decimation needs neighbours of all rows at hand; else they are kept if they are not too many.
-    fn keep_if_small(&mut self, job: &Job) -> Outcome {
+    fn keep_if_small(&mut self, job: &JobHandle) -> Outcome {
         let width = self.width() * self.model.drives().len();
         let decimation = self.data.decimation();
         let samples = self.data.samples();
@@ -253,7 +253,7 @@ impl<'a> Rows<'a> {
             return Ok(());
         }
         let mut kept = Vec::with_capacity(samples.div_ceil(decimation) * width);
-        let mut window = Window {
+        let mut window = DecimationWindow {
             first: 0,
             next: 0,
             table: Vec::new(),
@@ -273,7 +273,7 @@ impl<'a> Rows<'a> {
                 window
                     .decimate(width, decimation, have - reach, &mut kept)
                     .map_err(failed)?;
-                window.forget(width, decimation, reach);
+                window.drop_passed_rows(width, decimation, reach);
             }
             Ok(())
         })?;
@@ -288,20 +288,20 @@ impl<'a> Rows<'a> {
     }
 
     /// Shows all rows with the measured values.
-    fn show<E: From<Error> + From<LeastSquaresError>>(
+    fn visit_rows<E: From<Error> + From<LeastSquaresError>>(
         &self,
-        job: &Job,
-        visit: &mut Visit<'_>,
+        job: &JobHandle,
+        visit: &mut RowVisitor<'_>,
     ) -> Result<(), E> {
         if let Some(table) = &self.kept {
-            self.show_unknown(table, 0, visit)?;
+            self.visit_unknown(table, 0, visit)?;
             job.add(self.data.samples());
             return Ok(());
         }
         let mut row = 0;
         self.blocks::<E>(&mut |w| {
             let rows = w.len() / self.width();
-            self.show_unknown(w, row, visit)?;
+            self.visit_unknown(w, row, visit)?;
             row += rows;
             job.add(rows / self.model.drives().len().max(1));
             Ok(())
@@ -310,11 +310,11 @@ impl<'a> Rows<'a> {
 
     /// Shows rows of the unknown columns, with what the known ones make taken off the measured values, and weighed;
     /// `first` is the first of the rows.
-    fn show_unknown(
+    fn visit_unknown(
         &self,
         w: &[f64],
         first: usize,
-        visit: &mut Visit<'_>,
+        visit: &mut RowVisitor<'_>,
     ) -> Result<(), LeastSquaresError> {
         let at = first..first + w.len() / self.width();
         let measured = &self.measured[at.clone()];
@@ -342,7 +342,7 @@ impl<'a> Rows<'a> {
         &self,
         visit: &mut dyn FnMut(&[f64]) -> Result<(), E>,
     ) -> Result<(), E> {
-        let evaluator = Evaluator::new(&self.model.derivation);
+        let evaluator = ModelEvaluator::new(&self.model.derivation);
         let drives = self.model.drives().len();
         let width = self.width();
         let (mut rows, mut start) = (Vec::new(), 0);
@@ -352,7 +352,7 @@ impl<'a> Rows<'a> {
             if let Some(instruments) = self.instruments {
                 let theirs = instruments.states(start, start + states.len());
                 fill(&evaluator, &theirs, drives, width, 0, &mut rows)
-                    .map_err(|fault| instruments.fault(self.model, fault, start))?;
+                    .map_err(|fault| instruments.pose_error(self.model, fault, start))?;
             }
             start += states.len();
             let place = width - self.model.base.len();
@@ -372,7 +372,7 @@ impl<'a> Rows<'a> {
 }
 
 /// Some rows in a row while they are decimated: all of them, unless they are too many to be held at once.
-struct Window {
+struct DecimationWindow {
     /// The first sample of the table, one of those that are kept.
     first: usize,
     /// The first sample that is not yet decimated.
@@ -380,7 +380,7 @@ struct Window {
     table: Vec<f64>,
 }
 
-impl Window {
+impl DecimationWindow {
     /// Decimates what stands before `end`, counted from the first sample of the table.
     fn decimate(
         &mut self,
@@ -399,7 +399,7 @@ impl Window {
     }
 
     /// Lets rows go that the filter does not reach from those that are to come.
-    fn forget(&mut self, width: usize, decimation: usize, reach: usize) {
+    fn drop_passed_rows(&mut self, width: usize, decimation: usize, reach: usize) {
         let from = self.next.saturating_sub(reach).max(self.first) / decimation * decimation;
         self.table.drain(..(from - self.first) * width);
         self.first = from;
@@ -407,7 +407,7 @@ impl Window {
 }
 
 /// What rows are multiplied by when both the variances and the equations left out have their say.
-fn product(spread: Option<Vec<f64>>, weights: Option<&[f64]>) -> Option<Vec<f64>> {
+fn combined_factors(spread: Option<Vec<f64>>, weights: Option<&[f64]>) -> Option<Vec<f64>> {
     match (spread, weights) {
         (Some(spread), Some(weights)) => {
             Some(spread.iter().zip(weights).map(|(s, w)| s * w).collect())
@@ -418,8 +418,8 @@ fn product(spread: Option<Vec<f64>>, weights: Option<&[f64]>) -> Option<Vec<f64>
 
 /// Writes the regressor of some states into rows of `width` numbers, from `place` on.
 fn fill(
-    evaluator: &Evaluator<'_>,
-    states: &States<'_>,
+    evaluator: &ModelEvaluator<'_>,
+    states: &MotionStates<'_>,
     drives: usize,
     width: usize,
     place: usize,

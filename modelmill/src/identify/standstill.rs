@@ -1,18 +1,18 @@
 //! Equations at standstill: while a drive hardly moves its friction takes any value, and the sign of its rate is noise,
 //! so that they may be left out of a fit.
 
-use modelmill_identify::Note;
+use modelmill_identify::RecordingNote;
 
 use crate::along::drive_rates;
 use crate::error::{Error, Outcome};
 use crate::model::Model;
-use crate::stretch::Stretch;
+use crate::stretch::RecordingSegment;
 use crate::text::table::count;
 
 /// Gives equations at standstill the weight 0, and says how many there are.
 ///
 /// `part` is the share of a drive's fastest rate below which it stands still.
-pub(crate) fn leave_out(model: &Model, data: &mut [Stretch], part: f64) -> Outcome {
+pub(crate) fn exclude_standstill(model: &Model, data: &mut [RecordingSegment], part: f64) -> Outcome {
     let drives = model.drives();
     let rates: Vec<Vec<Vec<f64>>> = data
         .iter()
@@ -53,7 +53,7 @@ pub(crate) fn leave_out(model: &Model, data: &mut [Stretch], part: f64) -> Outco
             )));
         }
         if out > 0 {
-            data[0].note(model, Note::info(format!(
+            data[0].note(model, RecordingNote::info(format!(
                 "Of the {} of `{drive}` {out} are left out of the fit: it is slower there than {part} of its fastest \
                  (option `standstill`). Error figures count them.",
                 count(of, "equation", "equations"),

@@ -1,14 +1,14 @@
 //! `diff`: what a variant changes, for people who review it.
 
-use modelmill_codegen::review::Equations;
-use modelmill_codegen::{OperationCount, Stage};
+use modelmill_codegen::review::ReducedEquations;
+use modelmill_codegen::{OperationCount, ProgramStage};
 
 use crate::model::Model;
 use crate::model::entries::entries;
 
 /// A named entry before and after; equal ones are left out.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Change {
+pub struct EntryChange {
     /// What it is called: its table and its own name, or a product of parameters.
     pub name: String,
     /// What it was; `None` if it is new.
@@ -18,7 +18,7 @@ pub struct Change {
 }
 
 /// Named entries that differ, in the order of the first list, then of the second.
-fn changed(before: &[(String, String)], after: &[(String, String)]) -> Vec<Change> {
+fn changed_entries(before: &[(String, String)], after: &[(String, String)]) -> Vec<EntryChange> {
     let find = |list: &[(String, String)], name: &str| {
         list.iter()
             .find(|(n, _)| n == name)
@@ -30,20 +30,20 @@ fn changed(before: &[(String, String)], after: &[(String, String)]) -> Vec<Chang
     before
         .iter()
         .chain(added)
-        .map(|(name, _)| Change {
+        .map(|(name, _)| EntryChange {
             name: name.clone(),
             before: find(before, name),
             after: find(after, name),
         })
         .filter(|change| match (&change.before, &change.after) {
-            (Some(before), Some(after)) => !is_same(before, after),
+            (Some(before), Some(after)) => !is_equal_but_for_rounding(before, after),
             (before, after) => before != after,
         })
         .collect()
 }
 
 /// Whether two texts are the same but for rounding in the last places of their numbers.
-fn is_same(a: &str, b: &str) -> bool {
+fn is_equal_but_for_rounding(a: &str, b: &str) -> bool {
     /// A few roundings of a number of the machine.
     const ROUNDING: f64 = 2e-15;
     let (mut a, mut b) = (pieces(a), pieces(b));
@@ -76,22 +76,22 @@ fn pieces(text: &str) -> impl Iterator<Item = &str> {
 
 /// Everything that differs between two models.
 #[derive(Clone, Debug)]
-pub struct Changes {
+pub struct ModelChanges {
     /// Entries of the model files.
-    pub entries: Vec<Change>,
+    pub entries: Vec<EntryChange>,
     /// p_g, eq. (5): which products are in it, or without effect.
-    pub products: Vec<Change>,
+    pub products: Vec<EntryChange>,
     /// Dependences of columns, eq. (6).
-    pub dependencies: Vec<Change>,
+    pub dependencies: Vec<EntryChange>,
     /// p_min, eq. (16), by retained products.
-    pub base: Vec<Change>,
+    pub base: Vec<EntryChange>,
     /// Operations of a call by the name of the function, before and after.
     pub operations: Vec<(&'static str, OperationCount, OperationCount)>,
 }
 
-impl Changes {
+impl ModelChanges {
     /// What changes from one model to another.
-    pub fn between(before: &Model, after: &Model) -> Self {
+    pub fn from_models(before: &Model, after: &Model) -> Self {
         let products = |model: &Model| -> Vec<(String, String)> {
             let reduction = &model.derivation.reduction;
             let mechanism = &model.derivation.mechanism;
@@ -110,16 +110,16 @@ impl Changes {
                 .collect()
         };
         let count = |pick: &dyn Fn(&Model) -> OperationCount| (pick(before), pick(after));
-        let regressor = count(&|m| m.derivation.programs.regressor.count(Stage::State));
-        let dynamics = count(&|m| m.derivation.programs.inverse_dynamics.count(Stage::State));
+        let regressor = count(&|m| m.derivation.programs.regressor.count_operations(ProgramStage::State));
+        let dynamics = count(&|m| m.derivation.programs.inverse_dynamics.count_operations(ProgramStage::State));
         Self {
-            entries: changed(
+            entries: changed_entries(
                 &entries(&before.derivation.mechanism),
                 &entries(&after.derivation.mechanism),
             ),
-            products: changed(&products(before), &products(after)),
-            dependencies: changed(&dependencies(before), &dependencies(after)),
-            base: changed(&base(before), &base(after)),
+            products: changed_entries(&products(before), &products(after)),
+            dependencies: changed_entries(&dependencies(before), &dependencies(after)),
+            base: changed_entries(&base(before), &base(after)),
             operations: vec![
                 ("regressor", regressor.0, regressor.1),
                 ("inverse dynamics", dynamics.0, dynamics.1),
@@ -130,7 +130,7 @@ impl Changes {
 
 /// The dependencies by product: `d1*h[m1*dc1] + d1^2*h[m1*dc1^2]`.
 fn dependencies(model: &Model) -> Vec<(String, String)> {
-    let equations = Equations::new(&model.derivation, None);
+    let equations = ReducedEquations::new(&model.derivation, None);
     equations
         .dependencies
         .into_iter()
@@ -156,18 +156,18 @@ fn dependencies(model: &Model) -> Vec<(String, String)> {
 
 #[cfg(test)]
 mod tests {
-    use super::is_same;
+    use super::is_equal_but_for_rounding;
 
     #[test]
     fn rounding_is_no_change() {
-        assert!(is_same(
+        assert!(is_equal_but_for_rounding(
             "link: -2.138038093018084",
             "link: -2.1380380930180856"
         ));
-        assert!(!is_same("link: -2.138038093018084", "link: -2.13803809301"));
-        assert!(!is_same("a: 1", "b: 1"));
-        assert!(!is_same("a: 1", "a: -1"));
-        assert!(!is_same("a: 1", "a: 1 m"));
-        assert!(!is_same("p = d1*m2", "p = d1*m3"));
+        assert!(!is_equal_but_for_rounding("link: -2.138038093018084", "link: -2.13803809301"));
+        assert!(!is_equal_but_for_rounding("a: 1", "b: 1"));
+        assert!(!is_equal_but_for_rounding("a: 1", "a: -1"));
+        assert!(!is_equal_but_for_rounding("a: 1", "a: 1 m"));
+        assert!(!is_equal_but_for_rounding("p = d1*m2", "p = d1*m3"));
     }
 }

@@ -1,15 +1,15 @@
 //! The entries of a model as pairs of a name and a text, so that two models can be compared.
 
 use modelmill_spec::{
-    Angle, Axis, Convention, CoordinateIdx, DriveKind, Effect, Exact, Inertial, Length, Mechanism,
-    Place, PlaceQuantity, Step, Symbol, TwistAxes,
+    ExactAngle, FrameAxis, FrameConvention, CoordinateIdx, DriveKind, ModelEffect, ExactExpression, PartInertia, ExactLength, Mechanism,
+    EffectPlace, PlaceQuantity, FrameStep, ModelSymbol, TwistAxes,
 };
 
 /// Entries as they are collected.
 #[derive(Default)]
-struct Entries(Vec<(String, String)>);
+struct ModelEntries(Vec<(String, String)>);
 
-impl Entries {
+impl ModelEntries {
     /// Entries of the same name are told apart by their place in the file.
     fn add(&mut self, kind: &str, name: &str, text: String) {
         let mut key = format!("{kind} {name}").trim().to_owned();
@@ -24,7 +24,7 @@ impl Entries {
 
 /// All entries in the order of the file, each named by its table and its own name.
 pub(crate) fn entries(m: &Mechanism) -> Vec<(String, String)> {
-    let mut entries = Entries::default();
+    let mut entries = ModelEntries::default();
     quantities(m, &mut entries);
     geometry(m, &mut entries);
     bodies(m, &mut entries);
@@ -32,7 +32,7 @@ pub(crate) fn entries(m: &Mechanism) -> Vec<(String, String)> {
     entries.0
 }
 
-fn quantities(m: &Mechanism, entries: &mut Entries) {
+fn quantities(m: &Mechanism, entries: &mut ModelEntries) {
     entries.add("gravity", "", triple(m, &m.gravity));
     for c in &m.constants {
         entries.add("constant", &c.name, format!("{} {}", c.value, c.unit));
@@ -48,9 +48,9 @@ fn quantities(m: &Mechanism, entries: &mut Entries) {
     }
 }
 
-fn geometry(m: &Mechanism, entries: &mut Entries) {
+fn geometry(m: &Mechanism, entries: &mut ModelEntries) {
     for f in &m.frames {
-        if f.convention == Convention::Base {
+        if f.convention == FrameConvention::Base {
             continue;
         }
         let steps: Vec<String> = f.steps.iter().map(|s| step(m, s)).collect();
@@ -68,10 +68,10 @@ fn geometry(m: &Mechanism, entries: &mut Entries) {
     }
 }
 
-fn bodies(m: &Mechanism, entries: &mut Entries) {
+fn bodies(m: &Mechanism, entries: &mut ModelEntries) {
     for p in &m.parts {
         let inertial = match &p.inertial {
-            Inertial::AboutCentre {
+            PartInertia::AboutCentre {
                 mass,
                 centre,
                 inertia,
@@ -81,7 +81,7 @@ fn bodies(m: &Mechanism, entries: &mut Entries) {
                 triple(m, centre),
                 tensor(m, inertia)
             ),
-            Inertial::Linear {
+            PartInertia::Linear {
                 mass,
                 first_moment,
                 inertia,
@@ -111,7 +111,7 @@ fn bodies(m: &Mechanism, entries: &mut Entries) {
     }
 }
 
-fn actuation(m: &Mechanism, entries: &mut Entries) {
+fn actuation(m: &Mechanism, entries: &mut ModelEntries) {
     for l in &m.loops {
         let [a, b] = l.joins.map(|p| m.points[p.0].name.clone());
         entries.add("loop", &l.name, format!("joins {a} and {b}"));
@@ -148,12 +148,12 @@ fn actuation(m: &Mechanism, entries: &mut Entries) {
     }
 }
 
-fn triple(m: &Mechanism, vector: &[Exact; 3]) -> String {
+fn triple(m: &Mechanism, vector: &[ExactExpression; 3]) -> String {
     let entries: Vec<String> = vector.iter().map(|e| text(m, e)).collect();
     format!("({})", entries.join(", "))
 }
 
-fn text(m: &Mechanism, exact: &Exact) -> String {
+fn text(m: &Mechanism, exact: &ExactExpression) -> String {
     exact.to_text(&|symbol| m.symbol_name(symbol).to_owned())
 }
 
@@ -168,7 +168,7 @@ fn product(m: &Mechanism, powers: &[(modelmill_spec::ParameterIdx, u32)]) -> Str
     factors.join("*")
 }
 
-fn tensor(m: &Mechanism, inertia: &[Exact; 6]) -> String {
+fn tensor(m: &Mechanism, inertia: &[ExactExpression; 6]) -> String {
     let entries: Vec<String> = ["xx", "xy", "xz", "yy", "yz", "zz"]
         .iter()
         .zip(inertia)
@@ -182,16 +182,16 @@ fn tensor(m: &Mechanism, inertia: &[Exact; 6]) -> String {
     }
 }
 
-fn step(m: &Mechanism, step: &Step) -> String {
-    let letter = |axis: &Axis| match axis {
-        Axis::X => "x",
-        Axis::Y => "y",
-        Axis::Z => "z",
+fn step(m: &Mechanism, step: &FrameStep) -> String {
+    let letter = |axis: &FrameAxis| match axis {
+        FrameAxis::X => "x",
+        FrameAxis::Y => "y",
+        FrameAxis::Z => "z",
     };
     match step {
-        Step::Rotate(axis, angle) => format!("R{}({})", letter(axis), angle_text(m, angle)),
-        Step::Translate(axis, length) => format!("T{}({})", letter(axis), length_text(m, length)),
-        Step::Free(body) => {
+        FrameStep::Rotate(axis, angle) => format!("R{}({})", letter(axis), angle_text(m, angle)),
+        FrameStep::Translate(axis, length) => format!("T{}({})", letter(axis), length_text(m, length)),
+        FrameStep::Free(body) => {
             let names = |all: &[CoordinateIdx]| {
                 let names = all.iter().map(|i| m.coordinates[i.0].name.as_str());
                 names.collect::<Vec<_>>().join(", ")
@@ -211,7 +211,7 @@ fn step(m: &Mechanism, step: &Step) -> String {
     }
 }
 
-fn angle_text(m: &Mechanism, angle: &Angle) -> String {
+fn angle_text(m: &Mechanism, angle: &ExactAngle) -> String {
     let mut terms: Vec<String> = angle
         .terms
         .iter()
@@ -224,11 +224,11 @@ fn angle_text(m: &Mechanism, angle: &Angle) -> String {
     join(&terms)
 }
 
-fn length_text(m: &Mechanism, length: &Length) -> String {
+fn length_text(m: &Mechanism, length: &ExactLength) -> String {
     let mut terms: Vec<String> = length
         .coordinates
         .iter()
-        .map(|(i, factor)| times(&factor.to_string(), m.symbol_name(Symbol::Coordinate(*i))))
+        .map(|(i, factor)| times(&factor.to_string(), m.symbol_name(ModelSymbol::Coordinate(*i))))
         .collect();
     if !length.offset.is_zero() {
         terms.push(text(m, &length.offset));
@@ -251,24 +251,24 @@ fn join(terms: &[String]) -> String {
     terms.join(" + ").replace("+ -", "- ")
 }
 
-fn places(m: &Mechanism, effect: &Effect) -> String {
+fn places(m: &Mechanism, effect: &ModelEffect) -> String {
     let names = effect.places.iter().map(|place| m.place_name(*place));
     names.collect::<Vec<_>>().join(", ")
 }
 
 /// The name of a symbol of an effect. Where there is only one place, its quantities are called as the columns of a
 /// recording are.
-fn at_place(m: &Mechanism, effect: &Effect, symbol: Symbol) -> String {
-    let (Symbol::Place(quantity), [place]) = (symbol, effect.places.as_slice()) else {
+fn symbol_name_at_place(m: &Mechanism, effect: &ModelEffect, symbol: ModelSymbol) -> String {
+    let (ModelSymbol::Place(quantity), [place]) = (symbol, effect.places.as_slice()) else {
         return m.symbol_name(symbol).to_owned();
     };
     let (name, position) = match place {
-        Place::Coordinate(i) => (&m.coordinates[i.0].name, ""),
-        Place::Drive(d) => match m.drives[d.0].kind {
+        EffectPlace::Coordinate(i) => (&m.coordinates[i.0].name, ""),
+        EffectPlace::Drive(d) => match m.drives[d.0].kind {
             DriveKind::Joint(i) => (&m.coordinates[i.0].name, ""),
             DriveKind::Linear { .. } => (&m.drives[d.0].name, "_length"),
         },
-        Place::Point(_) | Place::Part(_) | Place::Base | Place::Force => {
+        EffectPlace::Point(_) | EffectPlace::Part(_) | EffectPlace::Base | EffectPlace::Force => {
             return m.symbol_name(symbol).to_owned();
         }
     };
@@ -280,7 +280,7 @@ fn at_place(m: &Mechanism, effect: &Effect, symbol: Symbol) -> String {
     }
 }
 
-fn terms(m: &Mechanism, effect: &Effect) -> String {
+fn terms(m: &Mechanism, effect: &ModelEffect) -> String {
     if effect.mechanics.is_some() {
         let names = effect.terms.iter().map(|term| {
             let parameter = &m.parameters[term.parameter.0];
@@ -297,7 +297,7 @@ fn terms(m: &Mechanism, effect: &Effect) -> String {
             let name = &m.parameters[term.parameter.0].name;
             let expression = term
                 .expression
-                .to_text(&|symbol| at_place(m, effect, symbol));
+                .to_text(&|symbol| symbol_name_at_place(m, effect, symbol));
             match expression.as_str() {
                 "1" => name.clone(),
                 expression if expression.contains([' ', '/']) => format!("{name}*({expression})"),

@@ -11,24 +11,24 @@ use std::path::Path;
 use std::sync::Arc;
 
 use modelmill_codegen::review::base_expression;
-use modelmill_codegen::{BaseParameter, Dependency, Derivation, Monomial};
-use modelmill_identify::estimate::Belief;
-use modelmill_identify::{Note, ParameterInfo};
+use modelmill_codegen::{BaseParameterEntry, ColumnDependency, Derivation, ParameterMonomial};
+use modelmill_identify::estimate::ParameterPrior;
+use modelmill_identify::{RecordingNote, ParameterInfo};
 use modelmill_spec::{
-    EffectKind, Exact, Inertial, Mechanism, ParameterIdx, PlaceQuantity, Sign, Symbol,
+    EffectKind, ExactExpression, PartInertia, Mechanism, ParameterIdx, PlaceQuantity, Sign, ModelSymbol,
 };
 use nalgebra::DMatrix;
 
 use crate::error::{Error, Outcome};
 use crate::host::Host;
 
-pub use changes::{Change, Changes};
-pub use equations::Written;
-pub use modelmill_codegen::review::Format;
-pub use modelmill_spec::Loaded;
+pub use changes::{EntryChange, ModelChanges};
+pub use equations::EquationsText;
+pub use modelmill_codegen::review::PageFormat;
+pub use modelmill_spec::LoadedModel;
 pub use sampled_rank::SampledRank;
-pub use summary::{Checked, Summary};
-pub use values::Values;
+pub use summary::{ModelCheck, ModelSummary};
+pub use values::BaseParameterValues;
 
 /// A model file that was read and derived. A clone shares what was derived.
 #[derive(Clone)]
@@ -38,15 +38,15 @@ pub struct Model {
     /// What messages call the file.
     pub path: String,
     /// What the file says.
-    pub loaded: Arc<Loaded>,
+    pub loaded: Arc<LoadedModel>,
     /// Everything the mill knows about it.
     pub derivation: Arc<Derivation>,
     /// The base parameters.
-    pub base: Vec<BaseParameter>,
+    pub base: Vec<BaseParameterEntry>,
     /// Their values from the file's nominal values.
     pub nominal: Vec<f64>,
     /// What was found on the way that may not be intended, beside the warnings of `loaded`.
-    pub notes: Vec<Note>,
+    pub notes: Vec<RecordingNote>,
     /// Covariance of the values in `nominal`, where they are those of a fit that tells it.
     covariance: Option<Arc<DMatrix<f64>>>,
     /// Whether the value in `nominal` was identified, in the file or in a fit that was given.
@@ -88,19 +88,19 @@ impl Host {
     /// Derives a model that was read from `path`.
     ///
     /// Fails with the reason why it cannot be derived.
-    pub fn derive(&self, path: &str, mut loaded: Loaded) -> Outcome<Model> {
+    pub fn derive(&self, path: &str, mut loaded: LoadedModel) -> Outcome<Model> {
         if self.is_at_values() {
-            loaded.mechanism = loaded.mechanism.at_values();
+            loaded.mechanism = loaded.mechanism.with_numeric_constants();
         }
         let mechanism = &loaded.mechanism;
         let derivation = self
-            .watched(&format!("deriving {}", mechanism.name), 0, |_| {
+            .run_job(&format!("deriving {}", mechanism.name), 0, |_| {
                 modelmill_codegen::derive(mechanism)
             })?
             .map_err(|error| Error::derivation(path, error))?;
         let mut notes = Vec::new();
         notes.extend(caution(&derivation, path));
-        for (k, says) in retained_in_vain(&derivation) {
+        for (k, says) in ineffective_retained(&derivation) {
             let place = loaded.retain.get(k).map(|span| {
                 let (line, column) = loaded.sources.line_and_column(*span);
                 let file = loaded.sources.files.get(span.file);
@@ -108,12 +108,12 @@ impl Host {
                 format!("{file}:{line}:{column}")
             });
             let place = place.unwrap_or_else(|| path.to_owned());
-            notes.push(Note::warning(format!("{place}: {says}")));
+            notes.push(RecordingNote::warning(format!("{place}: {says}")));
         }
         let found = derivation.identified_base();
         let said = derivation.mechanism.identified_base.len();
         if found.len() < said {
-            notes.push(Note::warning(format!(
+            notes.push(RecordingNote::warning(format!(
                 "{path}: {} of the {said} values of `identified.base` are of no base parameter of this model and left aside; \
                  identify it again and let verb `adopt` write the values",
                 said - found.len()
@@ -144,7 +144,7 @@ impl Host {
 }
 
 /// The base parameters, with expressions as the page of equations writes them out.
-fn base(derivation: &Derivation) -> Vec<BaseParameter> {
+fn base(derivation: &Derivation) -> Vec<BaseParameterEntry> {
     let mut base = derivation.base_parameters();
     for (k, one) in base.iter_mut().enumerate() {
         one.expression = base_expression(derivation, k).text();
@@ -153,18 +153,18 @@ fn base(derivation: &Derivation) -> Vec<BaseParameter> {
 }
 
 /// What must be known of a base that holds for one geometry only.
-fn caution(derivation: &Derivation, path: &str) -> Option<Note> {
+fn caution(derivation: &Derivation, path: &str) -> Option<RecordingNote> {
     let says = derivation.reduction.method.caution()?;
-    Some(Note::warning(format!("{path}: {says}")))
+    Some(RecordingNote::warning(format!("{path}: {says}")))
 }
 
 /// What `retain` asks for that cannot be, in words, by its place in the list.
-pub fn retained_in_vain(derivation: &Derivation) -> Vec<(usize, String)> {
+pub fn ineffective_retained(derivation: &Derivation) -> Vec<(usize, String)> {
     let reduction = &derivation.reduction;
     let mechanism = &derivation.mechanism;
     let mut says = Vec::new();
     for (k, powers) in mechanism.retain.iter().enumerate() {
-        let wanted = Monomial(powers.iter().map(|(p, n)| (p.0, *n)).collect());
+        let wanted = ParameterMonomial(powers.iter().map(|(p, n)| (p.0, *n)).collect());
         let name = wanted.text(mechanism);
         let why = match reduction.products.iter().position(|p| *p == wanted) {
             Some(at) if reduction.retained.contains(&at) => continue,
@@ -182,13 +182,13 @@ pub fn retained_in_vain(derivation: &Derivation) -> Vec<(usize, String)> {
 /// The sign that each dynamic parameter must have: masses, moments of inertia, and what kinds of effects say.
 fn signs(mechanism: &Mechanism, kinds: &[EffectKind]) -> Vec<Sign> {
     let mut signs = vec![Sign::Any; mechanism.parameters.len()];
-    let mut positive = |exact: &Exact| {
+    let mut positive = |exact: &ExactExpression| {
         if let Some(p) = multiple_of(exact) {
             signs[p.0] = Sign::Positive;
         }
     };
     for part in &mechanism.parts {
-        let (Inertial::AboutCentre { mass, inertia, .. } | Inertial::Linear { mass, inertia, .. }) =
+        let (PartInertia::AboutCentre { mass, inertia, .. } | PartInertia::Linear { mass, inertia, .. }) =
             &part.inertial;
         positive(mass);
         for i in [0, 3, 5] {
@@ -213,16 +213,16 @@ fn signs(mechanism: &Mechanism, kinds: &[EffectKind]) -> Vec<Sign> {
 }
 
 /// The parameter of which an expression is a positive rational multiple.
-fn multiple_of(exact: &Exact) -> Option<ParameterIdx> {
-    let is_positive = |exact: &Exact| {
+fn multiple_of(exact: &ExactExpression) -> Option<ParameterIdx> {
+    let is_positive = |exact: &ExactExpression| {
         let mut free = true;
         exact.for_each_symbol(&mut |_| free = false);
         free && exact.evaluate(&|_| 0.0) > 0.0
     };
     match exact {
-        Exact::Symbol(Symbol::Parameter(p)) => Some(*p),
-        Exact::Quotient(above, below) if is_positive(below) => multiple_of(above),
-        Exact::Product(factors) => {
+        ExactExpression::Symbol(ModelSymbol::Parameter(p)) => Some(*p),
+        ExactExpression::Quotient(above, below) if is_positive(below) => multiple_of(above),
+        ExactExpression::Product(factors) => {
             let mut others = factors.iter().filter(|factor| !is_positive(factor));
             let one = others.next()?;
             others.next().is_none().then(|| multiple_of(one))?
@@ -252,7 +252,7 @@ impl Model {
     }
 
     /// What must be known of base parameters that were found numerically, for this geometry only.
-    pub fn caution(&self) -> Option<Note> {
+    pub fn caution(&self) -> Option<RecordingNote> {
         caution(&self.derivation, &self.path)
     }
 
@@ -260,7 +260,7 @@ impl Model {
     pub fn gravity(&self) -> [f64; 3] {
         let mechanism = &self.derivation.mechanism;
         let value = |symbol| match symbol {
-            Symbol::Constant(c) => mechanism.constants[c.0].value,
+            ModelSymbol::Constant(c) => mechanism.constants[c.0].value,
             _ => 0.0,
         };
         mechanism.gravity.each_ref().map(|g| g.evaluate(&value))
@@ -276,7 +276,7 @@ impl Model {
     }
 
     /// Products that a base parameter consists of, with what they are multiplied by for the file's constants.
-    pub fn products_of(&self, k: usize) -> Vec<(&Monomial, f64)> {
+    pub fn products_of(&self, k: usize) -> Vec<(&ParameterMonomial, f64)> {
         let reduction = &self.derivation.reduction;
         let constants = &self.derivation.mechanism.constants;
         let constants: Vec<f64> = constants.iter().map(|c| c.value).collect();
@@ -300,7 +300,7 @@ impl Model {
 
     /// What the nominal values say beforehand of some base parameters, each product of parameters with the relative standard
     /// deviation `sigma`; nothing of those that the file gives no value for.
-    pub fn beliefs(&self, among: &[usize], sigma: f64) -> Vec<Belief> {
+    pub fn beliefs(&self, among: &[usize], sigma: f64) -> Vec<ParameterPrior> {
         let parameters = &self.derivation.mechanism.parameters;
         let values: Vec<f64> = parameters.iter().map(|p| p.nominal).collect();
         let believed = among.iter().enumerate().filter_map(|(i, k)| {
@@ -310,7 +310,7 @@ impl Model {
                 .iter()
                 .map(|(product, factor)| (factor * product.value(&values)).powi(2))
                 .sum::<f64>();
-            (squares > 0.0).then(|| Belief {
+            (squares > 0.0).then(|| ParameterPrior {
                 parameter: i,
                 value: self.nominal[*k],
                 std: sigma * squares.sqrt(),
@@ -335,7 +335,7 @@ impl Model {
 
     /// The sign that a base parameter must have, where all of its summands must have the same.
     pub fn sign(&self, k: usize) -> Sign {
-        let sign_of = |(product, factor): &(&Monomial, f64)| {
+        let sign_of = |(product, factor): &(&ParameterMonomial, f64)| {
             let mut is_positive = *factor > 0.0;
             for (p, power) in &product.0 {
                 match self.signs[*p] {
@@ -365,12 +365,12 @@ impl Model {
     }
 
     /// Names of the active coordinates, in the order of the file.
-    pub fn active(&self) -> Vec<String> {
+    pub fn active_coordinates(&self) -> Vec<String> {
         self.coordinates(false)
     }
 
     /// Names of the passive coordinates, in the order of the file.
-    pub fn passive(&self) -> Vec<String> {
+    pub fn passive_coordinates(&self) -> Vec<String> {
         self.coordinates(true)
     }
 
@@ -389,7 +389,7 @@ impl Model {
     }
 
     /// Names of the rows on which no drive acts, among [`Model::drives`].
-    pub fn undriven(&self) -> Vec<String> {
+    pub fn undriven_rows(&self) -> Vec<String> {
         let drives = self.derivation.mechanism.drives.iter();
         let undriven = drives.filter(|drive| !drive.is_driven);
         undriven.map(|drive| drive.name.clone()).collect()
@@ -404,7 +404,7 @@ impl Model {
     }
 
     /// The base parameters as a fit describes them.
-    pub fn infos(&self) -> Vec<ParameterInfo> {
+    pub fn parameter_infos(&self) -> Vec<ParameterInfo> {
         self.base
             .iter()
             .enumerate()
@@ -436,7 +436,7 @@ impl Model {
     /// The model with the values of a fit, see [`Model::values_of`]. Where the fit tells how well it knows them, what
     /// [`Model::diagnose`] holds may be off by as much.
     #[must_use]
-    pub fn with_fit(&self, fit: &Values) -> Self {
+    pub fn with_fit(&self, fit: &BaseParameterValues) -> Self {
         Self {
             covariance: fit.covariance.clone().map(Arc::new),
             ..self.with_values(&fit.values)
@@ -486,7 +486,7 @@ impl Model {
         }
         let reduction = &self.derivation.reduction;
         let parameters = &self.derivation.mechanism.parameters;
-        let is_in = |line: &&Dependency| line.equals.iter().any(|(at, _)| *at == k);
+        let is_in = |line: &&ColumnDependency| line.equals.iter().any(|(at, _)| *at == k);
         let mut lumped: Vec<usize> = (reduction.dependencies.iter().filter(is_in))
             .map(|line| line.product)
             .collect();
@@ -507,7 +507,7 @@ impl Model {
     }
 
     /// Whether passive coordinates are followed from state to state by Newton's method, for want of a closed form.
-    pub fn follows_loops(&self) -> bool {
+    pub fn has_iterative_loops(&self) -> bool {
         matches!(
             self.derivation.programs.passive_position,
             modelmill_codegen::PassivePosition::Newton(_)
@@ -515,13 +515,13 @@ impl Model {
     }
 
     /// Effects whose force depends on the load of the drive.
-    pub fn load_dependent(&self) -> Vec<&str> {
+    pub fn load_dependent_effects(&self) -> Vec<&str> {
         let effects = self.derivation.mechanism.effects.iter();
         effects
             .filter(|effect| {
                 effect.terms.iter().any(|term| {
                     term.expression
-                        .mentions(&|symbol| symbol == Symbol::Place(PlaceQuantity::Load))
+                        .mentions(&|symbol| symbol == ModelSymbol::Place(PlaceQuantity::Load))
                 })
             })
             .map(|effect| effect.kind.as_str())

@@ -5,7 +5,7 @@
 use std::cmp::Ordering;
 
 use modelmill_codegen::review::NumericRank;
-use modelmill_codegen::{Evaluator, Method, PoseFault, PoseReason, States};
+use modelmill_codegen::{ModelEvaluator, ReductionMethod, PoseFault, PoseReason, MotionStates};
 use modelmill_identify::estimate::{condition_number, numeric_rank};
 use nalgebra::DMatrix;
 
@@ -30,7 +30,7 @@ const HIGH_CONDITION: f64 = 1e6;
 /// A numeric rank with what a reader needs to judge it.
 pub struct SampledRank {
     /// What the pages of equations print.
-    pub shown: NumericRank,
+    pub numeric_rank: NumericRank,
     /// Ratio of the last singular value that counts to the first that does not, or to the level of rounding.
     pub gap: f64,
     /// How many random states were left out since the model is singular or undefined there.
@@ -38,7 +38,7 @@ pub struct SampledRank {
 }
 
 /// The numeric rank, and what is to be said about it.
-pub(crate) struct Judged {
+pub(crate) struct RankJudgement {
     /// The rank, if one was found.
     pub found: Option<SampledRank>,
     /// Where it says something else than exact reduction, or nothing that one can rely on.
@@ -52,15 +52,15 @@ impl SampledRank {
             0 => String::new(),
             n => format!(" ({n} more left out, where the model is singular or undefined)"),
         };
-        let condition = self.shown.condition;
+        let condition = self.numeric_rank.condition;
         let condition = condition.map_or_else(
             || ", condition number infinite to rounding".to_owned(),
             |c| format!(", condition number {}", significant(c, 3)),
         );
         format!(
             "{} over {}{left_out}{condition}, {}",
-            self.shown.rank,
-            count(self.shown.samples, "random state", "random states"),
+            self.numeric_rank.rank,
+            count(self.numeric_rank.samples, "random state", "random states"),
             self.gap_text()
         )
     }
@@ -74,38 +74,38 @@ impl SampledRank {
 
     /// What the pages of equations leave out: states that were not used, and the gap where the condition is poor.
     pub fn remark(&self) -> Option<String> {
-        let is_poor = self.shown.condition.is_none_or(|c| c > HIGH_CONDITION);
+        let is_poor = self.numeric_rank.condition.is_none_or(|c| c > HIGH_CONDITION);
         (self.left_out > 0 || is_poor).then(|| format!("the numeric rank is {}", self.text()))
     }
 
     /// The same as JSON.
     pub fn json(&self) -> serde_json::Value {
         serde_json::json!({
-            "rank": self.shown.rank,
-            "samples": self.shown.samples,
+            "rank": self.numeric_rank.rank,
+            "samples": self.numeric_rank.samples,
             "left_out": self.left_out,
-            "condition_number": self.shown.condition,
+            "condition_number": self.numeric_rank.condition,
             "gap": self.gap.is_finite().then_some(self.gap),
         })
     }
 }
 
 /// The rank of H on the file's values, and in words where it says something else than exact reduction.
-pub(crate) fn judged_rank(model: &Model) -> Outcome<Judged> {
+pub(crate) fn judge_rank(model: &Model) -> Outcome<RankJudgement> {
     let message = format!("sampling {}", model.name);
-    let found = match model.host().watched(&message, 0, |_| sampled_rank(model))? {
+    let found = match model.host().run_job(&message, 0, |_| sampled_rank(model))? {
         Ok(found) => found,
         Err(reason) => {
             let says = format!("the numeric rank of eq. (9) was not found: {reason}");
-            return Ok(Judged {
+            return Ok(RankJudgement {
                 found: None,
                 warnings: vec![says],
             });
         }
     };
     let retained = model.base.len();
-    let rank = found.shown.rank;
-    let is_exact = matches!(model.derivation.reduction.method, Method::Exact { .. });
+    let rank = found.numeric_rank.rank;
+    let is_exact = matches!(model.derivation.reduction.method, ReductionMethod::Exact { .. });
     let mut warnings = Vec::new();
     let undetermined = || count(retained - rank, "direction", "directions");
     match rank.cmp(&retained) {
@@ -135,7 +135,7 @@ pub(crate) fn judged_rank(model: &Model) -> Outcome<Judged> {
             found.gap_text()
         ));
     }
-    Ok(Judged {
+    Ok(RankJudgement {
         found: Some(found),
         warnings,
     })
@@ -149,19 +149,19 @@ fn sampled_rank(model: &Model) -> Result<SampledRank, String> {
     }
     let n_drives = model.derivation.mechanism.drives.len().max(1);
     let wanted = SAMPLES.max((4 * n_products).div_ceil(n_drives));
-    let evaluator = Evaluator::new(&model.derivation);
-    let mut sampling = Sampling::new(model, n_drives);
+    let evaluator = ModelEvaluator::new(&model.derivation);
+    let mut sampling = StateSampling::new(model, n_drives);
     sampling.draw(&evaluator, wanted)?;
     let (full, retained) = match both_regressors(&evaluator, &sampling.states()) {
         Ok(both) => both,
-        Err(fault) if is_of_the_pose(&fault) => one_by_one(&evaluator, &mut sampling, wanted)?,
+        Err(fault) if is_pose_dependent(&fault) => regressors_state_by_state(&evaluator, &mut sampling, wanted)?,
         Err(fault) => return Err(fault.to_string()),
     };
     let found = numeric_rank(&full).map_err(|error| error.to_string())?;
     // Of the base as it is printed, also where its columns are fewer in truth.
     let condition = condition_number(&retained).map_err(|error| error.to_string())?;
     Ok(SampledRank {
-        shown: NumericRank {
+        numeric_rank: NumericRank {
             rank: found.rank,
             samples: wanted,
             condition,
@@ -173,8 +173,8 @@ fn sampled_rank(model: &Model) -> Result<SampledRank, String> {
 
 /// H for all products and H_min at some states.
 fn both_regressors(
-    evaluator: &Evaluator<'_>,
-    states: &States<'_>,
+    evaluator: &ModelEvaluator<'_>,
+    states: &MotionStates<'_>,
 ) -> Result<(DMatrix<f64>, DMatrix<f64>), PoseFault> {
     Ok((
         evaluator.full_regressor(states)?,
@@ -183,7 +183,7 @@ fn both_regressors(
 }
 
 /// Whether another pose would do.
-fn is_of_the_pose(fault: &PoseFault) -> bool {
+fn is_pose_dependent(fault: &PoseFault) -> bool {
     matches!(
         fault.reason,
         PoseReason::Singular | PoseReason::OutOfReach | PoseReason::Undefined
@@ -192,23 +192,23 @@ fn is_of_the_pose(fault: &PoseFault) -> bool {
 
 /// The regressors at states that are looked at each for itself: in a row, Newton's method would start from the state
 /// before, and states drawn at random are no neighbours. Where the mechanism is singular another state takes the place.
-fn one_by_one(
-    evaluator: &Evaluator<'_>,
-    sampling: &mut Sampling,
+fn regressors_state_by_state(
+    evaluator: &ModelEvaluator<'_>,
+    sampling: &mut StateSampling,
     wanted: usize,
 ) -> Result<(DMatrix<f64>, DMatrix<f64>), String> {
     let (mut full, mut retained) = (Vec::new(), Vec::new());
     while full.len() < wanted {
-        match both_regressors(evaluator, &sampling.state(full.len())) {
+        match both_regressors(evaluator, &sampling.single_state(full.len())) {
             Ok((all, few)) => {
                 full.push(all);
                 retained.push(few);
             }
-            Err(fault) if is_of_the_pose(&fault) && sampling.left_out < wanted => {
-                sampling.leave_out(full.len());
+            Err(fault) if is_pose_dependent(&fault) && sampling.left_out < wanted => {
+                sampling.exclude_state(full.len());
                 sampling.draw(evaluator, wanted)?;
             }
-            Err(fault) if !is_of_the_pose(&fault) => return Err(fault.to_string()),
+            Err(fault) if !is_pose_dependent(&fault) => return Err(fault.to_string()),
             Err(_) => {
                 return Err(format!(
                     "the model is singular or undefined at {} of {} random states around the nominal pose",
@@ -218,21 +218,21 @@ fn one_by_one(
             }
         }
     }
-    Ok((stacked(&full), stacked(&retained)))
+    Ok((stack_rows(&full), stack_rows(&retained)))
 }
 
 /// Matrices of equal width, one below the other.
-fn stacked(parts: &[DMatrix<f64>]) -> DMatrix<f64> {
+fn stack_rows(parts: &[DMatrix<f64>]) -> DMatrix<f64> {
     let rows: Vec<_> = parts.iter().flat_map(|part| part.row_iter()).collect();
     DMatrix::from_rows(&rows)
 }
 
 /// Random states at which the mechanism can stand.
-struct Sampling {
+struct StateSampling {
     /// Nominal values and motions of the active coordinates.
     active: Vec<(f64, bool)>,
     n_drives: usize,
-    draws: Draws,
+    draws: UniformDraws,
     /// Positions, rates, accelerations and loads, each as columns of samples.
     columns: [Vec<Vec<f64>>; 4],
     reach: f64,
@@ -242,7 +242,7 @@ struct Sampling {
     left_out: usize,
 }
 
-impl Sampling {
+impl StateSampling {
     fn new(model: &Model, n_drives: usize) -> Self {
         let coordinates = model.derivation.mechanism.coordinates.iter();
         let active: Vec<(f64, bool)> = coordinates
@@ -253,7 +253,7 @@ impl Sampling {
         Self {
             active,
             n_drives,
-            draws: Draws(0x6d69_6c6c),
+            draws: UniformDraws(0x6d69_6c6c),
             columns: [n, n, n, n_drives].map(|n| vec![Vec::new(); n]),
             reach: REACH,
             refused: 0,
@@ -262,7 +262,7 @@ impl Sampling {
     }
 
     /// Draws until there are as many states as wanted; the reason if poses are not to be found.
-    fn draw(&mut self, evaluator: &Evaluator<'_>, wanted: usize) -> Result<(), String> {
+    fn draw(&mut self, evaluator: &ModelEvaluator<'_>, wanted: usize) -> Result<(), String> {
         let n = self.active.len();
         let zero = vec![0.0; n.max(self.n_drives)];
         let resting = |n: usize| zero[..n].iter().map(std::slice::from_ref).collect();
@@ -276,10 +276,10 @@ impl Sampling {
                     } else {
                         0.5 * self.reach
                     };
-                    nominal + reach * self.draws.next()
+                    nominal + reach * self.draws.next_uniform()
                 })
                 .collect();
-            let still = States {
+            let still = MotionStates {
                 q: q.iter().map(std::slice::from_ref).collect(),
                 qd: resting(n),
                 qdd: resting(n),
@@ -301,16 +301,16 @@ impl Sampling {
             }
             for (set, range) in self.columns[1..].iter_mut().zip([RATE, ACCELERATION, LOAD]) {
                 for column in set {
-                    column.push(range * self.draws.next());
+                    column.push(range * self.draws.next_uniform());
                 }
             }
         }
         Ok(())
     }
 
-    fn states(&self) -> States<'_> {
+    fn states(&self) -> MotionStates<'_> {
         let slices = |k: usize| self.columns[k].iter().map(Vec::as_slice).collect();
-        States {
+        MotionStates {
             q: slices(0),
             qd: slices(1),
             qdd: slices(2),
@@ -319,14 +319,14 @@ impl Sampling {
     }
 
     /// One of them.
-    fn state(&self, sample: usize) -> States<'_> {
+    fn single_state(&self, sample: usize) -> MotionStates<'_> {
         let one = |k: usize| {
             let columns = self.columns[k].iter();
             columns
                 .map(|column| std::slice::from_ref(&column[sample]))
                 .collect()
         };
-        States {
+        MotionStates {
             q: one(0),
             qd: one(1),
             qdd: one(2),
@@ -335,7 +335,7 @@ impl Sampling {
     }
 
     /// Forgets a state at which the mechanism is singular.
-    fn leave_out(&mut self, sample: usize) {
+    fn exclude_state(&mut self, sample: usize) {
         for column in self.columns.iter_mut().flatten() {
             column.remove(sample);
         }
@@ -344,10 +344,10 @@ impl Sampling {
 }
 
 /// Uniform numbers in (-1, 1), the same on every machine (Steele et al., `SplitMix`, 2014).
-struct Draws(u64);
+struct UniformDraws(u64);
 
-impl Draws {
-    fn next(&mut self) -> f64 {
+impl UniformDraws {
+    fn next_uniform(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);

@@ -1,18 +1,18 @@
 //! `check`: what a model file holds, and how sound its base is.
 
 use modelmill_codegen::Derivation;
-use modelmill_identify::Note;
+use modelmill_identify::RecordingNote;
 
 use crate::error::Outcome;
 use crate::model::Model;
-use crate::model::sampled_rank::{SampledRank, judged_rank};
+use crate::model::sampled_rank::{SampledRank, judge_rank};
 
 /// A model that was looked over.
-pub struct Checked {
+pub struct ModelCheck {
     /// The model.
     pub model: Model,
     /// What it consists of.
-    pub summary: Summary,
+    pub summary: ModelSummary,
     /// Eq. (9) on the file's values, where it has an answer.
     pub rank: Option<SampledRank>,
     /// Where the numeric rank says something else than exact reduction.
@@ -21,26 +21,26 @@ pub struct Checked {
 
 impl Model {
     /// What the model consists of.
-    pub fn summary(&self) -> Summary {
-        Summary::new(&self.derivation)
+    pub fn summary(&self) -> ModelSummary {
+        ModelSummary::new(&self.derivation)
     }
 
     /// Looks the model over: what it consists of, and its rank in numbers beside the exact one.
     ///
     /// Fails only when whoever watches stops it.
-    pub fn check(&self) -> Outcome<Checked> {
+    pub fn check(&self) -> Outcome<ModelCheck> {
         // Without any product there is nothing whose rank could be looked at.
         let (rank, warnings) = if self.derivation.reduction.products.is_empty() {
             (None, Vec::new())
         } else {
-            let judged = judged_rank(self)?;
+            let judged = judge_rank(self)?;
             (judged.found, judged.warnings)
         };
         for says in &warnings {
             self.host()
-                .note(&Note::warning(format!("{}: {says}", self.path)));
+                .note(&RecordingNote::warning(format!("{}: {says}", self.path)));
         }
-        Ok(Checked {
+        Ok(ModelCheck {
             model: self.clone(),
             summary: self.summary(),
             rank,
@@ -51,7 +51,7 @@ impl Model {
 
 /// What a model consists of.
 #[derive(Clone, Debug)]
-pub struct Summary {
+pub struct ModelSummary {
     /// Parts.
     pub bodies: usize,
     /// Lumped masses.
@@ -72,7 +72,7 @@ pub struct Summary {
     pub parameters: Vec<String>,
 }
 
-impl Summary {
+impl ModelSummary {
     fn new(derivation: &Derivation) -> Self {
         let m = &derivation.mechanism;
         let coordinates = |passive: bool| {

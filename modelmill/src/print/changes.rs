@@ -3,13 +3,13 @@
 use modelmill_codegen::review::NumericMethod;
 use serde_json::{Value, json};
 
-use crate::model::{Change, Changes, Model};
-use crate::text::Style;
+use crate::model::{EntryChange, ModelChanges, Model};
+use crate::text::TerminalStyle;
 
-impl Changes {
+impl ModelChanges {
     /// All changes as one JSON object.
     pub fn json(&self, before: &Model, after: &Model) -> Value {
-        let list = |changes: &[Change]| -> Vec<Value> {
+        let list = |changes: &[EntryChange]| -> Vec<Value> {
             changes
                 .iter()
                 .map(|c| json!({ "name": c.name, "before": c.before, "after": c.after }))
@@ -51,14 +51,14 @@ impl Changes {
     }
 
     /// The same for people.
-    pub fn text(&self, before: &Model, after: &Model, style: Style) -> String {
+    pub fn text(&self, before: &Model, after: &Model, style: TerminalStyle) -> String {
         let mut lines = vec![style.bold(&format!("{} -> {}", before.path, after.path))];
         for model in [before, after] {
             if let Some(caution) = model.derivation.reduction.method.caution() {
                 lines.push(format!("  {}: {caution}", model.path));
             }
         }
-        let mut section = |title: &str, none: &str, changes: &[Change]| {
+        let mut section = |title: &str, none: &str, changes: &[EntryChange]| {
             lines.push(String::new());
             lines.push(style.bold(title));
             if changes.is_empty() {

@@ -2,13 +2,13 @@
 
 use serde_json::{Value, json};
 
-use crate::compare::Compared;
+use crate::compare::ModelComparison;
 use crate::error::{Error, Outcome};
 use crate::print::tables;
-use crate::text::Style;
+use crate::text::TerminalStyle;
 use crate::text::table::count;
 
-impl Compared {
+impl ModelComparison {
     /// Figures, regions and remarks as one JSON object; `parameters` says whose values they are: `nominal` or a file.
     pub fn json(&self, parameters: &str) -> Outcome<Value> {
         let mut object = json!({ "model": self.model, "parameters": parameters });
@@ -22,7 +22,7 @@ impl Compared {
     }
 
     /// The same for people.
-    pub fn text(&self, parameters: &str, style: Style) -> String {
+    pub fn text(&self, parameters: &str, style: TerminalStyle) -> String {
         let mut lines = vec![style.bold(&format!(
             "{} with {parameters} parameters on {}",
             self.model,

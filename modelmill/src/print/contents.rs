@@ -5,11 +5,11 @@ use std::fmt::Write as _;
 use modelmill_identify::TableInfo;
 use serde_json::{Value, json};
 
-use crate::recording::Contents;
-use crate::text::Style;
-use crate::text::table::{Align, count, number, significant, table};
+use crate::recording::RecordingContents;
+use crate::text::TerminalStyle;
+use crate::text::table::{ColumnAlignment, count, number, significant, table};
 
-impl Contents {
+impl RecordingContents {
     /// The tables as one JSON object.
     pub fn json(&self) -> Value {
         let of_table = |table: &TableInfo| {
@@ -30,7 +30,7 @@ impl Contents {
     }
 
     /// The tables for people.
-    pub fn text(&self, style: Style) -> String {
+    pub fn text(&self, style: TerminalStyle) -> String {
         let mut lines = vec![style.bold(&self.file)];
         for one in &self.tables {
             let mut head = String::new();
@@ -54,7 +54,7 @@ impl Contents {
                 .map(|column| vec![column.name.clone(), column.kind.clone()])
                 .collect();
             if !rows.is_empty() {
-                let head = [("column", Align::Left), ("type", Align::Left)];
+                let head = [("column", ColumnAlignment::Left), ("type", ColumnAlignment::Left)];
                 lines.extend(table(4, &head, &rows));
             }
         }

@@ -4,7 +4,7 @@ use modelmill_spec::edit::NewEffect;
 use serde_json::{Value, json};
 use similar::TextDiff;
 
-use crate::text::Style;
+use crate::text::TerminalStyle;
 
 /// Lines around a change that the difference shows.
 const CONTEXT: usize = 3;
@@ -19,7 +19,7 @@ pub fn difference(old: &str, new: &str, [before, after]: [&str; 2]) -> String {
 }
 
 /// A diff for the terminal.
-pub fn coloured(difference: &str, style: Style) -> String {
+pub fn colour_diff(difference: &str, style: TerminalStyle) -> String {
     let lines = difference.lines().map(|line| {
         if line.starts_with("+++") || line.starts_with("---") {
             style.bold(line)
@@ -37,7 +37,7 @@ pub fn coloured(difference: &str, style: Style) -> String {
 }
 
 /// An effect as scripts read it.
-pub fn described(effect: &NewEffect) -> Value {
+pub fn effect_json(effect: &NewEffect) -> Value {
     let parameters = effect.parameters.iter().map(|one| {
         let said = json!({ "name": one.name, "nominal": one.nominal });
         (one.symbol.clone(), said)

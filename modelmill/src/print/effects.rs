@@ -1,32 +1,32 @@
 //! `effects`: the library of effects, as a list or one kind in words.
 
 use modelmill_spec::{
-    ActsOn, Carries, EffectKind, KindConstant, KindParameter, Scale, Search, Sign,
+    ActsOn, PlaceLoad, EffectKind, KindConstant, KindParameter, Scale, ConstantSearch, Sign,
 };
 use serde_json::{Value, json};
 
 use crate::error::{Error, Outcome};
-use crate::text::Style;
-use crate::text::table::{Align, table};
+use crate::text::TerminalStyle;
+use crate::text::table::{ColumnAlignment, table};
 
 /// Letters of a line of text.
 const WIDTH: usize = 96;
 
 /// The kinds as one JSON object.
 pub fn json(kinds: &[EffectKind]) -> Value {
-    json!({ "kinds": kinds.iter().map(described).collect::<Vec<_>>() })
+    json!({ "kinds": kinds.iter().map(kind_json).collect::<Vec<_>>() })
 }
 
 /// The kinds as a table, a line for each.
-pub fn listed(kinds: &[EffectKind]) -> Vec<String> {
+pub fn kind_table(kinds: &[EffectKind]) -> Vec<String> {
     let rows: Vec<Vec<String>> = kinds
         .iter()
-        .map(|kind| vec![kind.name.clone(), places(kind), adds(kind)])
+        .map(|kind| vec![kind.name.clone(), places(kind), addition_text(kind)])
         .collect();
     let columns = [
-        ("effect", Align::Left),
-        ("acts on", Align::Left),
-        ("adds", Align::Left),
+        ("effect", ColumnAlignment::Left),
+        ("acts on", ColumnAlignment::Left),
+        ("adds", ColumnAlignment::Left),
     ];
     table(0, &columns, &rows)
 }
@@ -34,10 +34,10 @@ pub fn listed(kinds: &[EffectKind]) -> Vec<String> {
 /// A kind by its name; fails, with those that are known, if there is none of that name.
 pub fn kind<'a>(kinds: &'a [EffectKind], name: &str) -> Outcome<&'a EffectKind> {
     let found = kinds.iter().find(|kind| kind.name == name);
-    found.ok_or_else(|| unknown(name, kinds))
+    found.ok_or_else(|| unknown_kind_error(name, kinds))
 }
 
-fn unknown(name: &str, kinds: &[EffectKind]) -> Error {
+fn unknown_kind_error(name: &str, kinds: &[EffectKind]) -> Error {
     let names: Vec<&str> = kinds.iter().map(|kind| kind.name.as_str()).collect();
     Error::input(format!(
         "there is no kind of effect `{name}`; known are {}",
@@ -47,29 +47,29 @@ fn unknown(name: &str, kinds: &[EffectKind]) -> Error {
 
 /// Where a kind acts, in words.
 fn places(kind: &EffectKind) -> String {
-    let all: Vec<&str> = kind.on.iter().map(|on| on.words()).collect();
+    let all: Vec<&str> = kind.on.iter().map(|on| on.description()).collect();
     let joined = all.join(" or ");
     match (kind.places, kind.other) {
-        (_, Some(other)) => format!("{joined}, by another place that {}", other.words()),
+        (_, Some(other)) => format!("{joined}, by another place that {}", other.description()),
         (Some(2), None) => format!("two of: {joined}"),
         _ => joined,
     }
 }
 
-fn adds(kind: &EffectKind) -> String {
+fn addition_text(kind: &EffectKind) -> String {
     match kind.mechanics {
-        Some(mechanics) => mechanics.words().to_owned(),
+        Some(mechanics) => mechanics.description().to_owned(),
         None => kind.expression.clone(),
     }
 }
 
 /// One kind in words.
-pub fn explained(kind: &EffectKind, style: Style) -> String {
+pub fn kind_text(kind: &EffectKind, style: TerminalStyle) -> String {
     let mut lines = vec![style.bold(&kind.name)];
-    lines.extend(wrapped(&kind.says, 0));
+    lines.extend(wrap_text(&kind.says, 0));
     lines.push(String::new());
     lines.push(format!("acts on  {}", places(kind)));
-    lines.push(format!("adds     {}", adds(kind)));
+    lines.push(format!("adds     {}", addition_text(kind)));
     let mut symbols: Vec<Vec<String>> = Vec::new();
     for one in &kind.parameters {
         let sign = sign(one);
@@ -90,7 +90,7 @@ pub fn explained(kind: &EffectKind, style: Style) -> String {
             one.symbol.clone(),
             units(&one.units),
             format!("constant{default}"),
-            [one.note.clone(), sought(one)]
+            [one.note.clone(), search_text(one)]
                 .into_iter()
                 .filter(|text| !text.is_empty())
                 .collect::<Vec<_>>()
@@ -100,10 +100,10 @@ pub fn explained(kind: &EffectKind, style: Style) -> String {
     if !symbols.is_empty() {
         lines.push(String::new());
         let columns = [
-            ("symbol", Align::Left),
-            ("unit", Align::Left),
-            ("", Align::Left),
-            ("", Align::Left),
+            ("symbol", ColumnAlignment::Left),
+            ("unit", ColumnAlignment::Left),
+            ("", ColumnAlignment::Left),
+            ("", ColumnAlignment::Left),
         ];
         lines.extend(table(0, &columns, &symbols));
     }
@@ -114,14 +114,14 @@ pub fn explained(kind: &EffectKind, style: Style) -> String {
         if !text.is_empty() {
             lines.push(String::new());
             lines.push(style.bold(head));
-            lines.extend(wrapped(text, 2));
+            lines.extend(wrap_text(text, 2));
         }
     }
     lines.join("\n")
 }
 
 /// Text in lines of even width.
-fn wrapped(text: &str, indent: usize) -> Vec<String> {
+fn wrap_text(text: &str, indent: usize) -> Vec<String> {
     let mut lines = vec![" ".repeat(indent)];
     for word in text.split_whitespace() {
         let line = lines.last_mut().expect("there is a line");
@@ -137,7 +137,7 @@ fn wrapped(text: &str, indent: usize) -> Vec<String> {
     lines
 }
 
-fn units(units: &[(Carries, String)]) -> String {
+fn units(units: &[(PlaceLoad, String)]) -> String {
     let mut all: Vec<&str> = units.iter().map(|(_, unit)| unit.as_str()).collect();
     all.dedup();
     all.join(" or ")
@@ -152,11 +152,11 @@ fn sign(parameter: &KindParameter) -> Option<&'static str> {
 }
 
 /// How a constant is found where it is not known.
-fn sought(constant: &KindConstant) -> String {
+fn search_text(constant: &KindConstant) -> String {
     match constant.search {
         None => String::new(),
-        Some(Search::Linear) => "found linearly".to_owned(),
-        Some(Search::Range { from, to, of }) => {
+        Some(ConstantSearch::Linear) => "found linearly".to_owned(),
+        Some(ConstantSearch::Range { from, to, of }) => {
             let of = match of {
                 Scale::Rate => " of the largest rate",
                 Scale::Travel => " of the travel",
@@ -167,13 +167,13 @@ fn sought(constant: &KindConstant) -> String {
     }
 }
 
-fn described(kind: &EffectKind) -> Value {
-    let by_place = |units: &[(Carries, String)]| -> Value {
-        let name = |carries: &Carries| match carries {
-            Carries::Force => "force",
-            Carries::Torque => "torque",
-            Carries::Mass => "point",
-            Carries::Elsewhere => "elsewhere",
+fn kind_json(kind: &EffectKind) -> Value {
+    let by_place = |units: &[(PlaceLoad, String)]| -> Value {
+        let name = |carries: &PlaceLoad| match carries {
+            PlaceLoad::Force => "force",
+            PlaceLoad::Torque => "torque",
+            PlaceLoad::Mass => "point",
+            PlaceLoad::Elsewhere => "elsewhere",
         };
         let entries = units
             .iter()
@@ -207,8 +207,8 @@ fn described(kind: &EffectKind) -> Value {
             "value": one.value,
             "search": match one.search {
                 None => Value::Null,
-                Some(Search::Linear) => json!("linear"),
-                Some(Search::Range { from, to, of }) => json!({
+                Some(ConstantSearch::Linear) => json!("linear"),
+                Some(ConstantSearch::Range { from, to, of }) => json!({
                     "from": from,
                     "to": to,
                     "of": match of {
@@ -225,7 +225,7 @@ fn described(kind: &EffectKind) -> Value {
         "name": kind.name,
         "on": on.collect::<Vec<_>>(),
         "places": kind.places,
-        "adds": adds(kind),
+        "adds": addition_text(kind),
         "parameters": parameters.collect::<Vec<_>>(),
         "constants": constants.collect::<Vec<_>>(),
         "says": kind.says,

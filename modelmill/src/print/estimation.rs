@@ -5,13 +5,13 @@ use modelmill_identify::ParameterInfo;
 use modelmill_identify::estimate::PhysicalParameters;
 use serde_json::{Value, json};
 
-use crate::identify::regression::{Identified, InstrumentsFound};
-use crate::identify::{Estimation, Refined};
+use crate::identify::regression::{RegressionEstimate, InstrumentStatistics};
+use crate::identify::{EstimatorOptions, RefinementResult};
 use crate::model::Model;
-use crate::text::table::{Align, count, number, percent, significant, table};
+use crate::text::table::{ColumnAlignment, count, number, percent, significant, table};
 
 /// The median over the parameters that have any.
-fn effective_samples(found: &Identified) -> Option<f64> {
+fn effective_samples(found: &RegressionEstimate) -> Option<f64> {
     let mut all: Vec<f64> = found
         .deviations
         .effective_samples
@@ -24,7 +24,7 @@ fn effective_samples(found: &Identified) -> Option<f64> {
 }
 
 /// What `identify --json` holds under `estimator`.
-pub(crate) fn json(model: &Model, found: &Identified, args: &Estimation) -> Value {
+pub(crate) fn json(model: &Model, found: &RegressionEstimate, args: &EstimatorOptions) -> Value {
     let drives = model.drives();
     let by_drive = |values: &[f64]| -> Value {
         drives
@@ -44,7 +44,7 @@ pub(crate) fn json(model: &Model, found: &Identified, args: &Estimation) -> Valu
     if let Some(weighting) = &found.weighting {
         put("residual_scale", by_drive(&weighting.scales));
         put("iterations", json!(weighting.iterations));
-        put("settled", json!(weighting.settled));
+        put("settled", json!(weighting.converged));
         if let Some(bound) = weighting.huber {
             put(
                 "robust",
@@ -53,11 +53,11 @@ pub(crate) fn json(model: &Model, found: &Identified, args: &Estimation) -> Valu
         }
     }
     match &found.refined {
-        Refined::Nothing => {}
-        Refined::Prior(sigma, beliefs) => {
+        RefinementResult::Nothing => {}
+        RefinementResult::Prior(sigma, beliefs) => {
             put("prior", json!({ "sigma": sigma, "constraints": beliefs }));
         }
-        Refined::Essential(dropped, rise) => {
+        RefinementResult::Essential(dropped, rise) => {
             let dropped: Vec<Value> = dropped
                 .iter()
                 .map(|one| {
@@ -73,7 +73,7 @@ pub(crate) fn json(model: &Model, found: &Identified, args: &Estimation) -> Valu
                 json!({ "dropped": dropped, "residual_rise": rise }),
             );
         }
-        Refined::Physical(physical, bodies, before) => {
+        RefinementResult::Physical(physical, bodies, before) => {
             let parameters = &model.derivation.mechanism.parameters;
             let list: Vec<Value> = parameters
                 .iter()
@@ -81,7 +81,7 @@ pub(crate) fn json(model: &Model, found: &Identified, args: &Estimation) -> Valu
                 .map(|(i, p)| {
                     json!({
                         "name": p.name, "value": physical.parameters[i], "std": physical.std[i], "unit": p.unit,
-                        "nominal": p.nominal, "from_recording": physical.from_recording[i], "alone": physical.alone[i],
+                        "nominal": p.nominal, "from_recording": physical.from_recording[i], "alone": physical.individually_determined[i],
                     })
                 })
                 .collect();
@@ -96,7 +96,7 @@ pub(crate) fn json(model: &Model, found: &Identified, args: &Estimation) -> Valu
             );
         }
     }
-    if let Some(InstrumentsFound {
+    if let Some(InstrumentStatistics {
         strength,
         least_squares,
     }) = &found.instruments
@@ -113,7 +113,7 @@ pub(crate) fn json(model: &Model, found: &Identified, args: &Estimation) -> Valu
 }
 
 /// The same for people, line by line.
-pub(crate) fn text(model: &Model, found: &Identified, infos: &[ParameterInfo]) -> Vec<String> {
+pub(crate) fn text(model: &Model, found: &RegressionEstimate, infos: &[ParameterInfo]) -> Vec<String> {
     let mut lines = Vec::new();
     let deviations = &found.deviations;
     if let Some(effective) = effective_samples(found) {
@@ -139,7 +139,7 @@ pub(crate) fn text(model: &Model, found: &Identified, infos: &[ParameterInfo]) -
             "scale of the residuals {}, after {}{}",
             scales.join(", "),
             count(weighting.iterations, "solution", "solutions"),
-            if weighting.settled {
+            if weighting.converged {
                 ""
             } else {
                 ", which had not settled yet"
@@ -155,9 +155,9 @@ pub(crate) fn text(model: &Model, found: &Identified, infos: &[ParameterInfo]) -
     }
     let name = |i: usize| infos[found.unknown[i]].name.clone();
     match &found.refined {
-        Refined::Nothing => {}
-        Refined::Prior(_, beliefs) => lines.push(prior_text(*beliefs, found.unknown.len())),
-        Refined::Essential(dropped, rise) => {
+        RefinementResult::Nothing => {}
+        RefinementResult::Prior(_, beliefs) => lines.push(prior_text(*beliefs, found.unknown.len())),
+        RefinementResult::Essential(dropped, rise) => {
             let names: Vec<String> = dropped.iter().map(|one| name(one.parameter)).collect();
             lines.push(if names.is_empty() {
                 "all base parameters are essential".to_owned()
@@ -169,11 +169,11 @@ pub(crate) fn text(model: &Model, found: &Identified, infos: &[ParameterInfo]) -
                 )
             });
         }
-        Refined::Physical(physical, bodies, before) => {
+        RefinementResult::Physical(physical, bodies, before) => {
             lines.extend(physical_text(model, physical, bodies, *before));
         }
     }
-    if let Some(InstrumentsFound {
+    if let Some(InstrumentStatistics {
         strength,
         least_squares,
     }) = &found.instruments
@@ -200,10 +200,10 @@ pub(crate) fn text(model: &Model, found: &Identified, infos: &[ParameterInfo]) -
         lines.extend(table(
             0,
             &[
-                ("parameter", Align::Left),
-                ("instruments", Align::Right),
-                ("least squares", Align::Right),
-                ("apart, std", Align::Right),
+                ("parameter", ColumnAlignment::Left),
+                ("instruments", ColumnAlignment::Right),
+                ("least squares", ColumnAlignment::Right),
+                ("apart, std", ColumnAlignment::Right),
             ],
             &rows,
         ));
@@ -230,9 +230,9 @@ const NOT_ALONE: &str = "not alone";
 const NEXT_TO_NOTHING: f64 = 0.01;
 
 /// How much of a physical parameter the recordings say by themselves.
-fn from_recording(physical: &PhysicalParameters, i: usize) -> String {
+fn recording_share_text(physical: &PhysicalParameters, i: usize) -> String {
     let share = physical.from_recording[i];
-    if physical.alone[i] || share < NEXT_TO_NOTHING {
+    if physical.individually_determined[i] || share < NEXT_TO_NOTHING {
         percent(Some(share))
     } else {
         NOT_ALONE.to_owned()
@@ -255,7 +255,7 @@ fn physical_text(
                 number(p.nominal),
                 number(physical.parameters[i]),
                 significant(physical.std[i], 2),
-                from_recording(physical, i),
+                recording_share_text(physical, i),
                 p.unit.clone(),
             ]
         })
@@ -271,16 +271,16 @@ fn physical_text(
     lines.extend(table(
         0,
         &[
-            ("parameter", Align::Left),
-            ("nominal", Align::Right),
-            ("physical", Align::Right),
-            ("std", Align::Right),
-            ("from recording", Align::Right),
-            ("unit", Align::Left),
+            ("parameter", ColumnAlignment::Left),
+            ("nominal", ColumnAlignment::Right),
+            ("physical", ColumnAlignment::Right),
+            ("std", ColumnAlignment::Right),
+            ("from recording", ColumnAlignment::Right),
+            ("unit", ColumnAlignment::Left),
         ],
         &rows,
     ));
-    if (0..rows.len()).any(|i| from_recording(physical, i) == NOT_ALONE) {
+    if (0..rows.len()).any(|i| recording_share_text(physical, i) == NOT_ALONE) {
         lines.push(format!(
             "{NOT_ALONE}: the recordings tell combinations of this parameter with others, not it by itself; nominal values and \
              what a body can be do the rest, also in `std`"

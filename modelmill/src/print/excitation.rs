@@ -1,14 +1,14 @@
 //! An excitation as JSON and for people.
 
-use modelmill_identify::excite::Criterion;
+use modelmill_identify::excite::ExcitationCriterion;
 use serde_json::{Map, Value, json};
 
-use crate::excite::plant::used;
-use crate::excite::{Excited, Separated};
-use crate::text::Style;
-use crate::text::table::{Align, count, number, significant, table};
+use crate::excite::plant::used_fraction;
+use crate::excite::{ExcitationResult, SeparationResult};
+use crate::text::TerminalStyle;
+use crate::text::table::{ColumnAlignment, count, number, significant, table};
 
-impl Excited {
+impl ExcitationResult {
     fn violations(&self) -> usize {
         let margins = self.found.margins.iter();
         margins.filter(|margin| margin.excess > 0.0).count()
@@ -26,30 +26,30 @@ impl Excited {
             json!({
                 "name": margin.name,
                 "excess": margin.excess,
-                "used": Some(used(margin)).filter(|used| used.is_finite()),
+                "used": Some(used_fraction(margin)).filter(|used| used.is_finite()),
                 "proven": margin.proven,
             })
         });
         // The search takes the logarithm of the condition number; people do not.
         let criterion = |value: f64| match self.options.criterion {
-            Criterion::Condition => value.exp(),
-            Criterion::LogDet => value,
-            Criterion::Separation => (-value).exp(),
+            ExcitationCriterion::Condition => value.exp(),
+            ExcitationCriterion::LogDet => value,
+            ExcitationCriterion::Separation => (-value).exp(),
         };
         json!({
             "model": self.model,
             "condition_number": found.condition_number,
-            "start": found.start,
-            "random": found.random,
+            "start": found.start_condition_number,
+            "random": found.feasible_starts,
             "scaled_condition_number": self.scaled,
             "criterion": match self.options.criterion {
-                Criterion::Condition => "condition",
-                Criterion::LogDet => "log_det",
-                Criterion::Separation => "separation",
+                ExcitationCriterion::Condition => "condition",
+                ExcitationCriterion::LogDet => "log_det",
+                ExcitationCriterion::Separation => "separation",
             },
-            "separation": self.separated.as_ref().map(Separated::json),
+            "separation": self.separated.as_ref().map(SeparationResult::json),
             "value": criterion(found.value),
-            "ends": found.ends.iter().map(|end| criterion(*end)).collect::<Vec<_>>(),
+            "ends": found.end_values.iter().map(|end| criterion(*end)).collect::<Vec<_>>(),
             "evaluations": found.evaluations,
             "violations": self.violations(),
             "limits": limits.collect::<Vec<_>>(),
@@ -61,7 +61,7 @@ impl Excited {
     }
 
     /// The same for people.
-    pub fn text(&self, style: Style) -> String {
+    pub fn text(&self, style: TerminalStyle) -> String {
         let found = &self.found;
         let mut lines = vec![style.bold(&format!(
             "{}: {} of {} s",
@@ -70,7 +70,7 @@ impl Excited {
             self.options.period
         ))];
         if let Some(separated) = &self.separated {
-            lines.extend(separated.text(found.evaluations, found.random));
+            lines.extend(separated.text(found.evaluations, found.feasible_starts));
         } else {
             lines.extend(self.conditions());
         }
@@ -85,13 +85,13 @@ impl Excited {
         let mut lines = vec![format!(
             "  condition number {}, against {} of the best of {} ({} times better)",
             number(found.condition_number),
-            number(found.start),
+            number(found.start_condition_number),
             count(
-                found.random,
+                found.feasible_starts,
                 "random trajectory within the limits",
                 "random trajectories within the limits"
             ),
-            significant(found.start / found.condition_number, 3),
+            significant(found.start_condition_number / found.condition_number, 3),
         )];
         if let Some(scaled) = self.scaled {
             lines.push(format!(
@@ -112,7 +112,7 @@ impl Excited {
             .map(|margin| {
                 vec![
                     margin.name.clone(),
-                    format!("{} %", significant(100.0 * used(margin), 4)),
+                    format!("{} %", significant(100.0 * used_fraction(margin), 4)),
                     if margin.excess > 0.0 {
                         "exceeded".to_owned()
                     } else {
@@ -129,10 +129,10 @@ impl Excited {
         table(
             2,
             &[
-                ("limit", Align::Left),
-                ("used", Align::Right),
-                ("", Align::Left),
-                ("checked", Align::Left),
+                ("limit", ColumnAlignment::Left),
+                ("used", ColumnAlignment::Right),
+                ("", ColumnAlignment::Left),
+                ("checked", ColumnAlignment::Left),
             ],
             &rows,
         )

@@ -1,20 +1,20 @@
 //! What a diagnosis found as JSON and for people.
 
-use modelmill_identify::diagnose::{Rung, Verdict};
+use modelmill_identify::diagnose::{SelectionStep, DiagnosisVerdict};
 use serde_json::{Map, Value, json};
 
 use super::laws;
-use crate::diagnose::{Estimate, Findings, words};
-use crate::print::Spelling;
-use crate::text::Style;
-use crate::text::table::{Align, number, percent, significant, table};
+use crate::diagnose::{EffectEstimate, DiagnosisFindings, words};
+use crate::print::AdviceFormatter;
+use crate::text::TerminalStyle;
+use crate::text::table::{ColumnAlignment, number, percent, significant, table};
 
 /// Candidates that the text names.
-const NAMED: usize = 6;
+const MOST_CANDIDATES: usize = 6;
 
-impl Findings {
+impl DiagnosisFindings {
     /// All that was found as one JSON object; `spelling` says how its reader asks for what it advises.
-    pub fn json(&self, spelling: &dyn Spelling) -> Value {
+    pub fn json(&self, spelling: &dyn AdviceFormatter) -> Value {
         let diagnosis = &self.diagnosis;
         let channels = self.channels();
         let model = &self.before.model;
@@ -27,14 +27,14 @@ impl Findings {
                     "estimates": estimates(&missing.estimates),
                     "probability": missing.probability,
                     "indistinguishable_from": missing.indistinguishable_from,
-                    "separate_by": missing.separate_by,
-                    "separate_command": separation.and_then(|asked| spelling.separate(model, asked)),
+                    "separate_by": missing.separating_experiment,
+                    "separate_command": separation.and_then(|asked| spelling.separate_effects(model, asked)),
                 })
             })
             .collect();
         let candidates: Vec<Value> = (diagnosis.candidates.iter())
             .map(|c| {
-                json!({"kind": c.effect.kind, "at": c.effect.at, "explained": c.explained, "gain": c.gain, "refused": c.refused})
+                json!({"kind": c.effect.kind, "at": c.effect.at, "explained": c.explained, "gain": c.gain, "refused": c.rejection_reason})
             })
             .collect();
         let off: Vec<Value> = (self.off_nominal.iter())
@@ -54,7 +54,7 @@ impl Findings {
                 };
                 let value = json!({
                     "noise": part(budget.noise),
-                    "not_repeating": part(budget.not_repeating),
+                    "not_repeating": part(budget.non_repeatable),
                     "model": part(budget.model),
                     "unit": model.force_unit(d),
                     "rms": budget.force,
@@ -67,9 +67,9 @@ impl Findings {
                 json!({
                     "kind": one.kind,
                     "at": one.at,
-                    "says": one.says,
+                    "says": one.description,
                     "estimates": one.estimates.iter().map(|q| {
-                        json!({"name": q.name, "value": q.value, "std": q.deviation, "unit": q.unit})
+                        json!({"name": q.name, "value": q.value, "std": q.standard_deviation, "unit": q.unit})
                     }).collect::<Vec<_>>(),
                     "recordings": one.recordings,
                     "interval": one.interval,
@@ -77,7 +77,7 @@ impl Findings {
             })
             .collect();
         let unexplained: Vec<Value> = (diagnosis.unexplained.iter())
-            .map(|d| json!({"channel": channels[*d], "reproducible": diagnosis.reproducible[*d]}))
+            .map(|d| json!({"channel": channels[*d], "reproducible": diagnosis.repeatable_share[*d]}))
             .collect();
         json!({
             "model": model.name,
@@ -85,11 +85,11 @@ impl Findings {
             "noise_floor": diagnosis.noise_floor,
             "budget": budget,
             "disturbances": disturbances,
-            "steps": steps(&diagnosis.ladder),
+            "steps": steps(&diagnosis.steps),
             "effects": effects,
             "candidates": candidates,
-            "untold": self.untold.iter().map(|one| {
-                json!({"kind": one.effect.kind, "at": one.effect.at, "says": one.says, "separate_by": one.separate_by})
+            "untold": self.undecided.iter().map(|one| {
+                json!({"kind": one.effect.kind, "at": one.effect.at, "says": one.reason, "separate_by": one.separating_experiment})
             }).collect::<Vec<_>>(),
             "laws": laws::laws(&self.laws, model, spelling),
             "parameters_off_nominal": off,
@@ -99,7 +99,7 @@ impl Findings {
             "with_nominal_parameters": self.with_nominal.as_ref().map(|held| {
                 json!({
                     "verdict": held.diagnosis.verdict,
-                    "steps": steps(&held.diagnosis.ladder),
+                    "steps": steps(&held.diagnosis.steps),
                     "effects": held.missing.iter().map(|(effect, found)| {
                         json!({"kind": effect.kind, "at": effect.at, "estimates": estimates(found)})
                     }).collect::<Vec<_>>(),
@@ -109,16 +109,16 @@ impl Findings {
     }
 
     /// The answer for people, line by line.
-    pub fn text(&self, style: Style, spelling: &dyn Spelling) -> Vec<String> {
+    pub fn text(&self, style: TerminalStyle, spelling: &dyn AdviceFormatter) -> Vec<String> {
         let diagnosis = &self.diagnosis;
         let channels = self.channels();
-        let verdict = words::verdict(diagnosis, channels, self.judged);
+        let verdict = words::verdict(diagnosis, channels, self.validation);
         let mut lines: Vec<String> = (words::lines(&verdict, 100).iter())
             .map(|line| style.bold(line))
             .collect();
         lines.push(String::new());
         lines.push(style.bold("the ladder: relative error, step by step"));
-        let rows: Vec<Vec<String>> = (diagnosis.ladder.iter())
+        let rows: Vec<Vec<String>> = (diagnosis.steps.iter())
             .map(|rung| {
                 vec![
                     words::rung(rung),
@@ -130,17 +130,17 @@ impl Findings {
         lines.extend(table(
             2,
             &[
-                ("step", Align::Left),
-                ("fit", Align::Right),
-                (self.judged.short(), Align::Right),
+                ("step", ColumnAlignment::Left),
+                ("fit", ColumnAlignment::Right),
+                (self.validation.label(), ColumnAlignment::Right),
             ],
             &rows,
         ));
-        lines.push(format!("  {}", words::floor(diagnosis)));
+        lines.push(format!("  {}", words::noise_floor_text(diagnosis)));
         self.missing_text(style, spelling, &mut lines);
         self.disturbances_text(style, &mut lines);
         lines.push(String::new());
-        lines.push(style.bold(if diagnosis.verdict == Verdict::Unexplained {
+        lines.push(style.bold(if diagnosis.verdict == DiagnosisVerdict::Unexplained {
             "where what is left sits"
         } else {
             "where the error of the model as it is sits"
@@ -152,12 +152,12 @@ impl Findings {
         }
         lines.extend(laws::text(&self.laws, &self.before.model, style, spelling));
         self.refused_text(style, &mut lines);
-        self.untold_text(style, &mut lines);
-        self.off_text(style, spelling, &mut lines);
-        let mut next: Vec<String> = (self.to_add().iter())
-            .map(|entry| spelling.add(&self.before.model, entry))
+        self.undecided_text(style, &mut lines);
+        self.off_nominal_text(style, spelling, &mut lines);
+        let mut next: Vec<String> = (self.entries_to_add().iter())
+            .map(|entry| spelling.add_effect(&self.before.model, entry))
             .collect();
-        next.extend(self.beside_the_file().map(str::to_owned));
+        next.extend(self.further_action().map(str::to_owned));
         if !next.is_empty() {
             lines.push(String::new());
             lines.push(style.bold("how to go on"));
@@ -174,13 +174,13 @@ impl Findings {
     }
 
     /// What the recordings have besides, and where the error that is left comes from.
-    fn disturbances_text(&self, style: Style, lines: &mut Vec<String>) {
+    fn disturbances_text(&self, style: TerminalStyle, lines: &mut Vec<String>) {
         let diagnosis = &self.diagnosis;
         if !diagnosis.disturbances.is_empty() {
             lines.push(String::new());
             lines.push(style.bold("what the recordings have besides, and the model does not lack"));
             for one in &diagnosis.disturbances {
-                let says = format!("{}.", one.says.as_deref().unwrap_or_default());
+                let says = format!("{}.", one.description.as_deref().unwrap_or_default());
                 let told = words::lines(&says, 98);
                 lines.extend(told.iter().map(|line| format!("  {line}")));
             }
@@ -194,7 +194,7 @@ impl Findings {
                 vec![
                     channel.clone(),
                     of(budget.noise),
-                    of(budget.not_repeating),
+                    of(budget.non_repeatable),
                     of(budget.model),
                 ]
             })
@@ -202,17 +202,17 @@ impl Findings {
         lines.extend(table(
             2,
             &[
-                ("drive", Align::Left),
-                ("noise", Align::Right),
-                ("not repeating", Align::Right),
-                ("model", Align::Right),
+                ("drive", ColumnAlignment::Left),
+                ("noise", ColumnAlignment::Right),
+                ("not repeating", ColumnAlignment::Right),
+                ("model", ColumnAlignment::Right),
             ],
             &rows,
         ));
     }
 
     /// What was found, with values and doubles.
-    fn missing_text(&self, style: Style, spelling: &dyn Spelling, lines: &mut Vec<String>) {
+    fn missing_text(&self, style: TerminalStyle, spelling: &dyn AdviceFormatter, lines: &mut Vec<String>) {
         if self.missing.is_empty() {
             return;
         }
@@ -248,12 +248,12 @@ impl Findings {
                     "    These recordings cannot tell it from {}.",
                     words::effects(&found.indistinguishable_from)
                 ));
-                if let Some(says) = &found.separate_by {
+                if let Some(says) = &found.separating_experiment {
                     let wrapped = words::lines(says, 96);
                     lines.extend(wrapped.iter().map(|line| style.dim(&format!("    {line}"))));
                 }
                 if let Some(asked) = &found.separation
-                    && let Some(command) = spelling.separate(&self.before.model, asked)
+                    && let Some(command) = spelling.separate_effects(&self.before.model, asked)
                 {
                     lines.push("    Motion that tells them apart is sought by".to_owned());
                     lines.push(format!("      {command}"));
@@ -263,11 +263,11 @@ impl Findings {
     }
 
     /// The best of what was refused, with the reason.
-    fn refused_text(&self, style: Style, lines: &mut Vec<String>) {
+    fn refused_text(&self, style: TerminalStyle, lines: &mut Vec<String>) {
         let candidates = self.diagnosis.candidates.iter();
         let rows: Vec<Vec<String>> = candidates
             .filter_map(|c| {
-                let why = c.refused.clone()?;
+                let why = c.rejection_reason.clone()?;
                 (c.explained > 0.01).then(|| {
                     vec![
                         words::effect(&c.effect),
@@ -280,7 +280,7 @@ impl Findings {
                     ]
                 })
             })
-            .take(NAMED)
+            .take(MOST_CANDIDATES)
             .collect();
         if rows.is_empty() {
             return;
@@ -290,34 +290,34 @@ impl Findings {
         lines.extend(table(
             2,
             &[
-                ("candidate", Align::Left),
-                ("explains alone", Align::Right),
-                ("refused because", Align::Left),
+                ("candidate", ColumnAlignment::Left),
+                ("explains alone", ColumnAlignment::Right),
+                ("refused because", ColumnAlignment::Left),
             ],
             &rows,
         ));
     }
 
     /// What the recordings leave open, with the experiment that would tell.
-    fn untold_text(&self, style: Style, lines: &mut Vec<String>) {
-        if self.untold.is_empty() {
+    fn undecided_text(&self, style: TerminalStyle, lines: &mut Vec<String>) {
+        if self.undecided.is_empty() {
             return;
         }
         lines.push(String::new());
         lines.push(style.bold("what these recordings cannot tell"));
-        for one in &self.untold {
+        for one in &self.undecided {
             let says = words::lines(
-                &format!("{}: {}.", words::effect(&one.effect), one.says),
+                &format!("{}: {}.", words::effect(&one.effect), one.reason),
                 98,
             );
             lines.extend(says.iter().map(|line| format!("  {line}")));
-            let wrapped = words::lines(&one.separate_by, 96);
+            let wrapped = words::lines(&one.separating_experiment, 96);
             lines.extend(wrapped.iter().map(|line| style.dim(&format!("    {line}"))));
         }
     }
 
     /// Parameters that differ from what the file says.
-    fn off_text(&self, style: Style, spelling: &dyn Spelling, lines: &mut Vec<String>) {
+    fn off_nominal_text(&self, style: TerminalStyle, spelling: &dyn AdviceFormatter, lines: &mut Vec<String>) {
         if self.off_nominal.is_empty() {
             return;
         }
@@ -339,12 +339,12 @@ impl Findings {
         lines.extend(table(
             2,
             &[
-                ("", Align::Left),
-                ("nominal", Align::Right),
-                ("identified", Align::Right),
-                ("sigmas", Align::Right),
-                ("unit", Align::Left),
-                ("", Align::Left),
+                ("", ColumnAlignment::Left),
+                ("nominal", ColumnAlignment::Right),
+                ("identified", ColumnAlignment::Right),
+                ("sigmas", ColumnAlignment::Right),
+                ("unit", ColumnAlignment::Left),
+                ("", ColumnAlignment::Left),
             ],
             &rows,
         ));
@@ -355,27 +355,27 @@ impl Findings {
         let Some(held) = &self.with_nominal else {
             return;
         };
-        let says = words::verdict(&held.diagnosis, self.channels(), self.judged);
+        let says = words::verdict(&held.diagnosis, self.channels(), self.validation);
         let says = format!("With all parameters held at their nominal values: {says}");
         lines.extend(
             words::lines(&says, 98)
                 .iter()
                 .map(|line| format!("  {line}")),
         );
-        lines.push(format!("  ({} tells more.)", spelling.held()));
+        lines.push(format!("  ({} tells more.)", spelling.fix_parameters()));
     }
 }
 
 /// Estimates as scripts read them.
-pub(super) fn estimates(all: &[Estimate]) -> Vec<Value> {
+pub(super) fn estimates(all: &[EffectEstimate]) -> Vec<Value> {
     let one =
-        |e: &Estimate| json!({"name": e.name, "value": e.value, "std": e.std, "unit": e.unit});
+        |e: &EffectEstimate| json!({"name": e.name, "value": e.value, "std": e.std, "unit": e.unit});
     all.iter().map(one).collect()
 }
 
 /// The ladder as scripts read it.
-fn steps(ladder: &[Rung]) -> Vec<Value> {
-    let step = |rung: &Rung| {
+fn steps(ladder: &[SelectionStep]) -> Vec<Value> {
+    let step = |rung: &SelectionStep| {
         json!({
             "added": rung.added.first(),
             "also_added": rung.added.get(1..).unwrap_or_default(),

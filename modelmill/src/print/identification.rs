@@ -1,13 +1,13 @@
 //! An identification as JSON and for people.
 
-use modelmill_identify::Status;
+use modelmill_identify::ParameterStatus;
 use serde_json::{Value, json};
 
 use crate::error::{Error, Outcome};
 use crate::identify::Identification;
 use crate::model::Model;
 use crate::print::{estimation, tables};
-use crate::text::Style;
+use crate::text::TerminalStyle;
 use crate::text::table::{count, number};
 
 impl Identification {
@@ -36,10 +36,10 @@ impl Identification {
     }
 
     /// The result for people.
-    pub fn text(&self, model: &Model, style: Style) -> String {
+    pub fn text(&self, model: &Model, style: TerminalStyle) -> String {
         let fit = &self.fit;
-        let estimator = estimation::text(model, &self.found, &model.infos());
-        let identified = fit.parameters.iter().filter(|p| p.status != Status::Known);
+        let estimator = estimation::text(model, &self.found, &model.parameter_infos());
+        let identified = fit.parameters.iter().filter(|p| p.status != ParameterStatus::Known);
         let identified = identified.count();
         let mut lines = vec![style.bold(&format!(
             "{}: {} from {}",

@@ -1,18 +1,18 @@
 //! Physical parameters as JSON and for people.
 
-use modelmill_identify::interpret::{Interpretation, Physical};
+use modelmill_identify::interpret::{PhysicalInterpretation, PhysicalSolution};
 use serde_json::{Map, Value, json};
 
-use crate::interpret::Interpreted;
-use crate::text::Style;
-use crate::text::table::{Align, count, number, significant, table};
+use crate::interpret::InterpretationResult;
+use crate::text::TerminalStyle;
+use crate::text::table::{ColumnAlignment, count, number, significant, table};
 
-impl Interpreted {
+impl InterpretationResult {
     /// All that was found as one JSON object.
     pub fn json(&self) -> Value {
         let parameters = &self.model.derivation.mechanism.parameters;
         let names = self.names();
-        let solution = |one: &Physical| -> Value {
+        let solution = |one: &PhysicalSolution| -> Value {
             let entries = names.iter().enumerate().map(|(i, name)| {
                 let parameter = &parameters[self.unknown[i]];
                 let value = json!({
@@ -20,13 +20,13 @@ impl Interpreted {
                     "std": one.std.as_ref().map(|std| std[i]),
                     "unit": parameter.unit,
                     "nominal": parameter.nominal,
-                    "plausible": self.objection(i, one.values[i]).is_none(),
+                    "plausible": self.sign_violation(i, one.values[i]).is_none(),
                 });
                 (name.clone(), value)
             });
             Value::Object(entries.collect::<Map<_, _>>())
         };
-        let residuals = |one: &Physical| -> Value {
+        let residuals = |one: &PhysicalSolution| -> Value {
             let entries = self.used.iter().zip(&one.residuals);
             let entries = entries.map(|(k, r)| (self.model.base[*k].name.clone(), json!(r)));
             json!({
@@ -35,12 +35,12 @@ impl Interpreted {
             })
         };
         let method = match &self.found {
-            Interpretation::Exact { .. } => "exact",
-            Interpretation::LeastSquares { .. } => "least_squares",
-            Interpretation::Undetermined { .. } => "none",
+            PhysicalInterpretation::Exact { .. } => "exact",
+            PhysicalInterpretation::LeastSquares { .. } => "least_squares",
+            PhysicalInterpretation::Undetermined { .. } => "none",
         };
         let determined: Vec<&String> = match &self.found {
-            Interpretation::Undetermined { determined, .. } => {
+            PhysicalInterpretation::Undetermined { determined, .. } => {
                 let pairs = names.iter().zip(determined);
                 pairs.filter(|(_, d)| **d).map(|(name, _)| name).collect()
             }
@@ -48,18 +48,18 @@ impl Interpreted {
         };
         json!({
             "model": self.model.name,
-            "identifiable": !matches!(self.found, Interpretation::Undetermined { .. }),
+            "identifiable": !matches!(self.found, PhysicalInterpretation::Undetermined { .. }),
             "method": method,
             "solutions": self.solutions().iter().map(solution).collect::<Vec<_>>(),
             "fit": self.solutions().iter().map(residuals).collect::<Vec<_>>(),
-            "undetermined": self.undetermined(),
+            "undetermined": self.undetermined_directions(),
             "determined": determined,
             "base_parameters": self.used.iter().map(|k| self.model.base[*k].name.clone()).collect::<Vec<_>>(),
         })
     }
 
     /// The same for people.
-    pub fn text(&self, style: Style) -> String {
+    pub fn text(&self, style: TerminalStyle) -> String {
         let solutions = self.solutions();
         let unknowns = count(
             self.unknown.len(),
@@ -68,22 +68,22 @@ impl Interpreted {
         );
         let equations = count(self.used.len(), "base parameter", "base parameters");
         let head = match &self.found {
-            Interpretation::Undetermined { .. } => format!(
+            PhysicalInterpretation::Undetermined { .. } => format!(
                 "{}: {equations} do not determine {unknowns}",
                 self.model.name
             ),
-            Interpretation::Exact { .. } => format!(
+            PhysicalInterpretation::Exact { .. } => format!(
                 "{}: {} for {unknowns} from {equations}, and no others",
                 self.model.name,
                 count(solutions.len(), "real solution", "real solutions"),
             ),
-            Interpretation::LeastSquares {
+            PhysicalInterpretation::LeastSquares {
                 is_linear: true, ..
             } => format!(
                 "{}: {unknowns} from {equations} by weighted least squares",
                 self.model.name
             ),
-            Interpretation::LeastSquares { starts, .. } => format!(
+            PhysicalInterpretation::LeastSquares { starts, .. } => format!(
                 "{}: {} of weighted least squares for {unknowns} from {equations}, looked for from {}",
                 self.model.name,
                 count(solutions.len(), "minimum", "minima"),
@@ -91,7 +91,7 @@ impl Interpreted {
             ),
         };
         let mut lines = vec![style.bold(&head)];
-        for says in self.undetermined() {
+        for says in self.undetermined_directions() {
             lines.push(format!("  {says}."));
         }
         if !self.directions().is_empty() {
@@ -100,7 +100,7 @@ impl Interpreted {
                     .to_owned(),
             );
         }
-        if let (Interpretation::Exact { .. }, []) = (&self.found, solutions) {
+        if let (PhysicalInterpretation::Exact { .. }, []) = (&self.found, solutions) {
             lines.push(
                 "  No real values of these parameters give the base parameters; hold others at their nominal values."
                     .to_owned(),
@@ -112,14 +112,14 @@ impl Interpreted {
                 lines.push(format!("  solution {}", k + 1));
             }
             lines.extend(self.table(one));
-            if matches!(self.found, Interpretation::LeastSquares { .. }) {
+            if matches!(self.found, PhysicalInterpretation::LeastSquares { .. }) {
                 lines.extend(self.residuals(one));
             }
         }
         lines.join("\n")
     }
 
-    fn table(&self, one: &Physical) -> Vec<String> {
+    fn table(&self, one: &PhysicalSolution) -> Vec<String> {
         let parameters = &self.model.derivation.mechanism.parameters;
         let rows: Vec<Vec<String>> = (0..self.unknown.len())
             .map(|i| {
@@ -132,24 +132,24 @@ impl Interpreted {
                         .as_ref()
                         .map_or_else(|| "-".to_owned(), |std| significant(std[i], 2)),
                     parameter.unit.clone(),
-                    self.objection(i, one.values[i])
+                    self.sign_violation(i, one.values[i])
                         .unwrap_or_default()
                         .to_owned(),
                 ]
             })
             .collect();
         let columns = [
-            ("parameter", Align::Left),
-            ("nominal", Align::Right),
-            ("solved", Align::Right),
-            ("std", Align::Right),
-            ("unit", Align::Left),
-            ("", Align::Left),
+            ("parameter", ColumnAlignment::Left),
+            ("nominal", ColumnAlignment::Right),
+            ("solved", ColumnAlignment::Right),
+            ("std", ColumnAlignment::Right),
+            ("unit", ColumnAlignment::Left),
+            ("", ColumnAlignment::Left),
         ];
         table(2, &columns, &rows)
     }
 
-    fn residuals(&self, one: &Physical) -> Vec<String> {
+    fn residuals(&self, one: &PhysicalSolution) -> Vec<String> {
         let rows: Vec<Vec<String>> = self
             .used
             .iter()
@@ -164,9 +164,9 @@ impl Interpreted {
             })
             .collect();
         let columns = [
-            ("base parameter", Align::Left),
-            ("residual", Align::Right),
-            ("unit", Align::Left),
+            ("base parameter", ColumnAlignment::Left),
+            ("residual", ColumnAlignment::Right),
+            ("unit", ColumnAlignment::Left),
         ];
         let mut lines = table(2, &columns, &rows);
         if let Some(chi_squared) = one.chi_squared {

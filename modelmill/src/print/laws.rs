@@ -3,10 +3,10 @@
 use serde_json::{Value, json};
 
 use super::findings::estimates;
-use crate::diagnose::{Hypothesis, Law, words};
+use crate::diagnose::{LawHypothesis, ProposedLaw, words};
 use crate::model::Model;
-use crate::print::Spelling;
-use crate::text::Style;
+use crate::print::AdviceFormatter;
+use crate::text::TerminalStyle;
 use crate::text::table::{number, percent, significant};
 
 /// What is said of every law.
@@ -14,14 +14,14 @@ pub(crate) const HYPOTHESIS: &str =
     "A hypothesis that these recordings suggest, no finding: nothing says that the machine has it.";
 /// What an entry of a library needs to be known, and where the law cannot be written down.
 pub(crate) const LIBRARY: &str = "laws.toml";
-pub(crate) const REMEMBERS: &str = "It depends on the way there, which no formula of a library says; it is told so that it can be looked for.";
+pub(crate) const PATH_DEPENDENT_NOTE: &str = "It depends on the way there, which no formula of a library says; it is told so that it can be looked for.";
 
 /// Laws as scripts read them.
-pub(super) fn laws(laws: &[Hypothesis], model: &Model, spelling: &dyn Spelling) -> Vec<Value> {
-    let one = |hypothesis: &Hypothesis| {
+pub(super) fn laws(laws: &[LawHypothesis], model: &Model, spelling: &dyn AdviceFormatter) -> Vec<Value> {
+    let one = |hypothesis: &LawHypothesis| {
         let mut told = law(&hypothesis.law, model, spelling);
         let ties = hypothesis.near_ties.iter();
-        told["near_ties"] = ties.clone().map(|tie| json!(tie.says())).collect();
+        told["near_ties"] = ties.clone().map(|tie| json!(tie.label())).collect();
         told["ties"] = ties.map(|tie| law(tie, model, spelling)).collect();
         told["says"] = json!(HYPOTHESIS);
         told
@@ -29,7 +29,7 @@ pub(super) fn laws(laws: &[Hypothesis], model: &Model, spelling: &dyn Spelling) 
     laws.iter().map(one).collect()
 }
 
-fn law(law: &Law, model: &Model, spelling: &dyn Spelling) -> Value {
+fn law(law: &ProposedLaw, model: &Model, spelling: &dyn AdviceFormatter) -> Value {
     let entry = law.entry.as_ref();
     json!({
         "expression": law.expression,
@@ -40,16 +40,16 @@ fn law(law: &Law, model: &Model, spelling: &dyn Spelling) -> Value {
         "entry": entry.map(|entry| &entry.text),
         "kind": entry.map(|entry| &entry.effect.kind),
         "places": entry.map(|entry| &entry.effect.at),
-        "command": entry.map(|entry| spelling.add_from(model, &entry.effect, LIBRARY)),
+        "command": entry.map(|entry| spelling.add_effect_from_library(model, &entry.effect, LIBRARY)),
     })
 }
 
 /// Laws for people, line by line.
 pub(super) fn text(
-    laws: &[Hypothesis],
+    laws: &[LawHypothesis],
     model: &Model,
-    style: Style,
-    spelling: &dyn Spelling,
+    style: TerminalStyle,
+    spelling: &dyn AdviceFormatter,
 ) -> Vec<String> {
     let mut lines = Vec::new();
     if laws.is_empty() {
@@ -59,14 +59,14 @@ pub(super) fn text(
     lines.push(style.bold("which law would explain what is left: a hypothesis, to be tried"));
     for hypothesis in laws {
         let law = &hypothesis.law;
-        lines.push(format!("  {}", law.says()));
+        lines.push(format!("  {}", law.label()));
         lines.push(format!("    {}", values(law)));
         let wrapped = words::lines(&gain(law), 96);
         lines.extend(wrapped.iter().map(|line| format!("    {line}")));
         if !hypothesis.near_ties.is_empty() {
             lines.push("    As near to these recordings are".to_owned());
             for tie in &hypothesis.near_ties {
-                lines.push(format!("      {}", tie.says()));
+                lines.push(format!("      {}", tie.label()));
             }
         }
         match &law.entry {
@@ -79,11 +79,11 @@ pub(super) fn text(
                         .map(|line| style.dim(&format!("      {line}"))),
                 );
                 lines.push("    and with it".to_owned());
-                let command = spelling.add_from(model, &entry.effect, LIBRARY);
+                let command = spelling.add_effect_from_library(model, &entry.effect, LIBRARY);
                 lines.push(format!("      {command}"));
             }
             None => {
-                let wrapped = words::lines(REMEMBERS, 96);
+                let wrapped = words::lines(PATH_DEPENDENT_NOTE, 96);
                 lines.extend(wrapped.iter().map(|line| format!("    {line}")));
             }
         }
@@ -92,8 +92,8 @@ pub(super) fn text(
 }
 
 /// Parameters with their deviations and units.
-pub(crate) fn values(law: &Law) -> String {
-    let value = |p: &crate::diagnose::Estimate| {
+pub(crate) fn values(law: &ProposedLaw) -> String {
+    let value = |p: &crate::diagnose::EffectEstimate| {
         let deviation =
             (p.std).map_or_else(String::new, |std| format!(" ± {}", significant(std, 2)));
         let unit = if p.unit == "1" { "" } else { &p.unit };
@@ -105,7 +105,7 @@ pub(crate) fn values(law: &Law) -> String {
 }
 
 /// What it takes off, and what it makes needless.
-pub(crate) fn gain(law: &Law) -> String {
+pub(crate) fn gain(law: &ProposedLaw) -> String {
     let mut says = format!(
         "takes off {} of the squared error that is left where it was not fitted",
         percent(Some(law.gain))

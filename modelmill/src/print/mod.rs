@@ -19,5 +19,5 @@ mod summary;
 pub mod tables;
 mod variants;
 
-pub use spelling::{Advised, Spelling, Words, spelled};
+pub use spelling::{AdviceItem, AdviceFormatter, PlainAdvice, format_advice};
 pub use summary::{faults, refusal, warnings};

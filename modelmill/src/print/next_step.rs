@@ -1,8 +1,8 @@
 //! What is best done after an identification.
 
-use modelmill_identify::Status;
+use modelmill_identify::ParameterStatus;
 
-use crate::identify::{Identification, Refined};
+use crate::identify::{Identification, RefinementResult};
 
 /// Deviations above this part of the value say little more than that there is one.
 const VAGUE: f64 = 0.5;
@@ -13,18 +13,18 @@ impl Identification {
     /// What to do next, in a sentence or two.
     pub fn next_step(&self) -> String {
         let parameters = &self.fit.parameters;
-        let asked = parameters.iter().filter(|p| p.status != Status::Known);
+        let asked = parameters.iter().filter(|p| p.status != ParameterStatus::Known);
         let n = asked.clone().count();
         let vague = asked
             .filter(|p| match p.status {
-                Status::Undetermined => true,
-                Status::Identified => p.std.is_none_or(|std| std > VAGUE * p.value.abs()),
-                Status::NotEssential | Status::Known => false,
+                ParameterStatus::Undetermined => true,
+                ParameterStatus::Identified => p.std.is_none_or(|std| std > VAGUE * p.value.abs()),
+                ParameterStatus::NotEssential | ParameterStatus::Known => false,
             })
             .count();
         if vague > 0 && vague as f64 >= MANY * n as f64 {
             let physical = match self.found.refined {
-                Refined::Physical(..) => "",
+                RefinementResult::Physical(..) => "",
                 _ => {
                     "; option `physical` lets bodies and nominal values say what the recording does not"
                 }

@@ -2,12 +2,12 @@
 
 use std::fmt::Write as _;
 
-use modelmill_reduction::Report;
+use modelmill_reduction::ReductionReport;
 use serde_json::{Value, json};
 
-use crate::reduce::Reduced;
+use crate::reduce::RigReduction;
 
-impl Reduced {
+impl RigReduction {
     /// Findings and forces as one JSON object; `out` is where the model file goes.
     pub fn json(&self, out: &str) -> Value {
         json!({
@@ -30,14 +30,14 @@ impl Reduced {
     }
 }
 
-fn findings(report: &Report) -> Vec<Value> {
+fn findings(report: &ReductionReport) -> Vec<Value> {
     let findings = report.findings.iter();
     findings
         .map(|finding| {
             let sizes: Vec<Value> = finding
                 .sizes
                 .iter()
-                .map(|size| json!({ "of": size.of, "value": size.value, "unit": size.unit, "is_felt": size.is_felt() }))
+                .map(|size| json!({ "of": size.quantity, "value": size.value, "unit": size.unit, "is_felt": size.is_significant() }))
                 .collect();
             json!({ "step": finding.step, "about": finding.about, "says": finding.says, "sizes": sizes })
         })

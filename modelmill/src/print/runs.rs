@@ -3,16 +3,16 @@
 use modelmill_identify::ParameterInfo;
 use serde_json::{Value, json};
 
-use crate::runs::{ChangePoint, Changed, Compared, Fitted, OneRun, SharedFit, Valued, What};
-use crate::text::Style;
-use crate::text::table::{Align, count, table, with_deviation};
+use crate::runs::{ChangePoint, RunChange, RunsComparison, FittedValue, RunReport, SharedFit, RunValue, PhysicalChange};
+use crate::text::TerminalStyle;
+use crate::text::table::{ColumnAlignment, count, table, with_deviation};
 
-impl Compared {
+impl RunsComparison {
     /// All that was found as one JSON object.
     pub fn json(&self) -> Value {
         let later = || self.runs.iter().enumerate().skip(1);
         let moved =
-            later().flat_map(|(k, run)| run.moved.iter().map(move |p| self.moved_json(k, *p)));
+            later().flat_map(|(k, run)| run.moved.iter().map(move |p| self.moved_parameter_json(k, *p)));
         let all = self.runs.iter().enumerate();
         let changes =
             all.flat_map(|(k, run)| run.changes.iter().map(move |one| change_json([0, k], one)));
@@ -43,7 +43,7 @@ impl Compared {
                 "parameter": self.parameters[step.parameter].name,
                 "before": step.before.value,
                 "now": step.now.value,
-                "std": step.before.beside(step.now),
+                "std": step.before.difference_deviation(step.now),
                 "unit": self.parameters[step.parameter].unit,
             })
         });
@@ -69,7 +69,7 @@ impl Compared {
         let runs = fit.runs.iter().map(|(file, values)| {
             let values = values.iter().map(|one| {
                 json!({
-                    "of": one.of,
+                    "of": one.quantity,
                     "name": one.name,
                     "value": one.value.value,
                     "std": one.value.deviation,
@@ -86,9 +86,9 @@ impl Compared {
         })
     }
 
-    fn parameters_json(&self, fitted: &[Fitted]) -> Vec<Value> {
+    fn parameters_json(&self, fitted: &[FittedValue]) -> Vec<Value> {
         let pairs = self.parameters.iter().zip(fitted);
-        let one = |(info, fitted): (&ParameterInfo, &Fitted)| {
+        let one = |(info, fitted): (&ParameterInfo, &FittedValue)| {
             json!({
                 "name": info.name,
                 "expression": info.expression,
@@ -101,9 +101,9 @@ impl Compared {
     }
 
     /// A base parameter of a run that differs from that of the first.
-    fn moved_json(&self, run: usize, k: usize) -> Value {
+    fn moved_parameter_json(&self, run: usize, k: usize) -> Value {
         let (before, now) = (self.runs[0].alone[k], self.runs[run].alone[k]);
-        let deviation = before.beside(now);
+        let deviation = before.difference_deviation(now);
         json!({
             "parameter": self.parameters[k].name,
             "sigmas": (now.value - before.value).abs() / deviation,
@@ -116,7 +116,7 @@ impl Compared {
     }
 
     /// The same for people.
-    pub fn text(&self, style: Style) -> String {
+    pub fn text(&self, style: TerminalStyle) -> String {
         let [first, later @ ..] = &self.runs[..] else {
             return String::new();
         };
@@ -126,24 +126,24 @@ impl Compared {
             count(later.len(), "run", "runs"),
             first.file
         ))];
-        if later.len() > SINGLY {
-            self.say_points(&mut lines, style);
+        if later.len() > MOST_DETAILED_RUNS {
+            self.write_change_points(&mut lines, style);
         }
         if let Some(shared) = &self.shared {
-            say_shared(shared, &mut lines, style);
+            write_shared_fit(shared, &mut lines, style);
         }
         if !first.changes.is_empty() {
             lines.push(String::new());
             lines.push(style.bold(&first.file));
             lines.extend(first.changes.iter().map(|one| format!("  {}", one.says)));
         }
-        if later.len() > SINGLY {
-            say_many(later, &mut lines, style);
+        if later.len() > MOST_DETAILED_RUNS {
+            write_many_runs(later, &mut lines, style);
         } else {
             for run in later {
-                self.say_run(first, run, &mut lines, style);
+                self.write_run(first, run, &mut lines, style);
             }
-            self.say_points(&mut lines, style);
+            self.write_change_points(&mut lines, style);
         }
         for one in &self.unread {
             lines.push(String::new());
@@ -154,11 +154,11 @@ impl Compared {
     }
 
     /// A run against the first.
-    fn say_run(&self, first: &OneRun, run: &OneRun, lines: &mut Vec<String>, style: Style) {
+    fn write_run(&self, first: &RunReport, run: &RunReport, lines: &mut Vec<String>, style: TerminalStyle) {
         lines.push(String::new());
         lines.push(style.bold(&run.file));
-        say_changes(&run.changes, lines);
-        let is_event = |one: &Changed| matches!(one.what, What::ContactEvent { .. });
+        write_changes(&run.changes, lines);
+        let is_event = |one: &RunChange| matches!(one.change, PhysicalChange::ContactEvent { .. });
         if run.changes.iter().all(is_event) {
             let else_ = if run.changes.is_empty() { "" } else { " else" };
             lines.push(format!(
@@ -170,22 +170,22 @@ impl Compared {
             let rows: Vec<Vec<String>> = run
                 .moved
                 .iter()
-                .map(|k| self.moved(first, run, *k))
+                .map(|k| self.moved_parameter_row(first, run, *k))
                 .collect();
             let columns = [
-                ("name", Align::Left),
-                ("before", Align::Right),
-                ("now", Align::Right),
-                ("+-", Align::Right),
-                ("unit", Align::Left),
-                ("expression", Align::Left),
+                ("name", ColumnAlignment::Left),
+                ("before", ColumnAlignment::Right),
+                ("now", ColumnAlignment::Right),
+                ("+-", ColumnAlignment::Right),
+                ("unit", ColumnAlignment::Left),
+                ("expression", ColumnAlignment::Left),
             ];
             lines.extend(table(4, &columns, &rows));
         }
     }
 
     /// When something changed and stayed changed.
-    fn say_points(&self, lines: &mut Vec<String>, style: Style) {
+    fn write_change_points(&self, lines: &mut Vec<String>, style: TerminalStyle) {
         if self.runs.len() < 4 {
             return;
         }
@@ -211,18 +211,18 @@ impl Compared {
                 },
             ));
             let mut said = Vec::new();
-            say_changes(&point.changes, &mut said);
+            write_changes(&point.changes, &mut said);
             lines.extend(said.iter().map(|line| format!("  {line}")));
         }
     }
 
-    fn moved(&self, first: &OneRun, run: &OneRun, k: usize) -> Vec<String> {
+    fn moved_parameter_row(&self, first: &RunReport, run: &RunReport, k: usize) -> Vec<String> {
         let (before, now) = (first.alone[k], run.alone[k]);
         let info = &self.parameters[k];
-        let [value, deviation] = with_deviation(now.value, before.beside(now));
+        let [value, deviation] = with_deviation(now.value, before.difference_deviation(now));
         vec![
             info.name.clone(),
-            with_deviation(before.value, before.beside(now))[0].clone(),
+            with_deviation(before.value, before.difference_deviation(now))[0].clone(),
             value,
             deviation,
             info.unit.clone(),
@@ -232,9 +232,9 @@ impl Compared {
 }
 
 /// Up to so many later runs are told one after the other with their base parameters.
-const SINGLY: usize = 12;
+const MOST_DETAILED_RUNS: usize = 12;
 
-fn say_changes(changes: &[Changed], lines: &mut Vec<String>) {
+fn write_changes(changes: &[RunChange], lines: &mut Vec<String>) {
     for change in changes {
         lines.push(format!("  {}", change.says));
         if !change.rivals.is_empty() {
@@ -247,7 +247,7 @@ fn say_changes(changes: &[Changed], lines: &mut Vec<String>) {
 }
 
 /// Many runs, each with its changes alone; those without any are counted.
-fn say_many(later: &[OneRun], lines: &mut Vec<String>, style: Style) {
+fn write_many_runs(later: &[RunReport], lines: &mut Vec<String>, style: TerminalStyle) {
     let unchanged = later.iter().filter(|run| run.changes.is_empty()).count();
     lines.push(String::new());
     lines.push(format!(
@@ -256,17 +256,17 @@ fn say_many(later: &[OneRun], lines: &mut Vec<String>, style: Style) {
     ));
     for run in later.iter().filter(|run| !run.changes.is_empty()) {
         lines.push(style.bold(&run.file));
-        say_changes(&run.changes, lines);
+        write_changes(&run.changes, lines);
     }
 }
 
-fn change_json(between: [usize; 2], change: &Changed) -> Value {
-    let (kind, at, estimates) = change.what.parts(change.unit);
+fn change_json(between: [usize; 2], change: &RunChange) -> Value {
+    let (kind, at, estimates) = change.change.parts(change.unit);
     let estimates = estimates.iter().map(|(name, estimate, unit)| {
         json!({ "name": name, "value": estimate.value, "std": estimate.deviation, "unit": unit })
     });
-    let interval = match &change.what {
-        What::ContactEvent { interval, .. } => Some(interval),
+    let interval = match &change.change {
+        PhysicalChange::ContactEvent { interval, .. } => Some(interval),
         _ => None,
     };
     json!({
@@ -282,14 +282,14 @@ fn change_json(between: [usize; 2], change: &Changed) -> Value {
 }
 
 /// Values of the fit in which some are each run's own.
-fn say_shared(fit: &SharedFit, lines: &mut Vec<String>, style: Style) {
+fn write_shared_fit(fit: &SharedFit, lines: &mut Vec<String>, style: TerminalStyle) {
     lines.push(String::new());
     let n = fit.shared.iter().flatten().count();
     lines.push(style.bold(&format!(
         "One fit of all runs, with {} shared",
         count(n, "base parameter", "base parameters")
     )));
-    let text = |value: Fitted| match value.deviation {
+    let text = |value: FittedValue| match value.deviation {
         Some(deviation) => with_deviation(value.value, deviation),
         None => ["not told".to_owned(), String::new()],
     };
@@ -299,15 +299,15 @@ fn say_shared(fit: &SharedFit, lines: &mut Vec<String>, style: Style) {
             .map(|(drive, gain)| [vec![drive.clone()], text(*gain).to_vec()].concat())
             .collect();
         let columns = [
-            ("drive", Align::Left),
-            ("factor", Align::Right),
-            ("+-", Align::Right),
+            ("drive", ColumnAlignment::Left),
+            ("factor", ColumnAlignment::Right),
+            ("+-", ColumnAlignment::Right),
         ];
         lines.extend(table(4, &columns, &rows));
     }
     for (file, values) in fit.runs.iter().filter(|(_, values)| !values.is_empty()) {
         lines.push(format!("  {file}"));
-        let row = |one: &Valued| {
+        let row = |one: &RunValue| {
             let [value, deviation] = text(one.value);
             let against = if one.is_against_first {
                 "against the first run"
@@ -315,7 +315,7 @@ fn say_shared(fit: &SharedFit, lines: &mut Vec<String>, style: Style) {
                 ""
             };
             [
-                one.of.as_str(),
+                one.quantity.as_str(),
                 &one.name,
                 &value,
                 &deviation,
@@ -328,17 +328,17 @@ fn say_shared(fit: &SharedFit, lines: &mut Vec<String>, style: Style) {
         let told = values.iter().filter(|one| one.value.deviation.is_some());
         let rows: Vec<Vec<String>> = told.map(row).collect();
         let columns = [
-            ("of", Align::Left),
-            ("", Align::Left),
-            ("value", Align::Right),
-            ("+-", Align::Right),
-            ("unit", Align::Left),
-            ("", Align::Left),
+            ("of", ColumnAlignment::Left),
+            ("", ColumnAlignment::Left),
+            ("value", ColumnAlignment::Right),
+            ("+-", ColumnAlignment::Right),
+            ("unit", ColumnAlignment::Left),
+            ("", ColumnAlignment::Left),
         ];
         lines.extend(table(4, &columns, &rows));
         let not_told = values.iter().filter(|one| one.value.deviation.is_none());
         let not_told: Vec<String> = not_told
-            .map(|one| format!("{} of {}", one.name, one.of))
+            .map(|one| format!("{} of {}", one.name, one.quantity))
             .collect();
         if !not_told.is_empty() {
             lines.push(format!("    not told: {}", not_told.join(", ")));

@@ -3,44 +3,44 @@
 use std::borrow::Cow;
 use std::fmt::Write as _;
 
-pub use modelmill_boundary::text::{Advised, spelled};
+pub use modelmill_boundary::text::{AdviceItem, format_advice};
 use modelmill_spec::edit::NewEffect;
 
-use crate::diagnose::Separation;
+use crate::diagnose::SeparationProposal;
 use crate::model::Model;
 
 /// How the reader of a text asks for what it advises. The program spells its flags, a notebook its keywords.
-pub trait Spelling {
+pub trait AdviceFormatter {
     /// Adds an effect to the file of a model.
-    fn add(&self, model: &Model, effect: &NewEffect) -> String;
+    fn add_effect(&self, model: &Model, effect: &NewEffect) -> String;
 
     /// Adds an effect of a kind that a further library holds, which is kept in a file of some name.
-    fn add_from(&self, model: &Model, effect: &NewEffect, library: &str) -> String {
-        format!("{}, with the library {library}", self.add(model, effect))
+    fn add_effect_from_library(&self, model: &Model, effect: &NewEffect, library: &str) -> String {
+        format!("{}, with the library {library}", self.add_effect(model, effect))
     }
 
     /// Identifies a model once more from the same recordings.
     fn identify(&self, model: &Model) -> String;
 
     /// Seeks motion along which effects differ; `None` where that cannot be asked for.
-    fn separate(&self, model: &Model, separation: &Separation) -> Option<String>;
+    fn separate_effects(&self, model: &Model, separation: &SeparationProposal) -> Option<String>;
 
     /// Holds all parameters at their nominal values in a diagnosis.
-    fn held(&self) -> String;
+    fn fix_parameters(&self) -> String;
 
     /// A text of the library, which names options by their fields ("option `columns` = `q=angle`") and verbs by their
     /// names ("verb `identify`"); [`spelled`] finds them.
-    fn text<'a>(&self, text: &'a str) -> Cow<'a, str> {
+    fn format_text<'a>(&self, text: &'a str) -> Cow<'a, str> {
         Cow::Borrowed(text)
     }
 }
 
 /// Plain words, for whoever calls the library.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Words;
+pub struct PlainAdvice;
 
-impl Spelling for Words {
-    fn add(&self, model: &Model, effect: &NewEffect) -> String {
+impl AdviceFormatter for PlainAdvice {
+    fn add_effect(&self, model: &Model, effect: &NewEffect) -> String {
         let mut says = format!(
             "{}: add {} at {}",
             model.name,
@@ -61,7 +61,7 @@ impl Spelling for Words {
         format!("{}: identify again", model.name)
     }
 
-    fn separate(&self, model: &Model, separation: &Separation) -> Option<String> {
+    fn separate_effects(&self, model: &Model, separation: &SeparationProposal) -> Option<String> {
         let effect = &separation.effect.effect;
         let rivals: Vec<&str> = separation.rivals.iter().map(|r| r.kind.as_str()).collect();
         Some(format!(
@@ -73,7 +73,7 @@ impl Spelling for Words {
         ))
     }
 
-    fn held(&self) -> String {
+    fn fix_parameters(&self) -> String {
         "`Question::held`".to_owned()
     }
 }

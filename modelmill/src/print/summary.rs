@@ -2,23 +2,23 @@
 
 use modelmill_boundary::text::plain;
 use modelmill_codegen::review::NumericMethod;
-use modelmill_codegen::{Derivation, Method, Reduction, module_name};
+use modelmill_codegen::{Derivation, ReductionMethod, BaseReduction, module_name};
 use modelmill_spec::{
-    Diagnostic, DriveKind, Failure, Loaded, Mechanism, Motion, Severity, Sources,
+    Diagnostic, DriveKind, LoadFailure, LoadedModel, Mechanism, CoordinateMotion, DiagnosticSeverity, SourceFiles,
 };
 use serde_json::{Value, json};
 
-use crate::model::{Checked, SampledRank, Summary, retained_in_vain};
-use crate::text::Style;
+use crate::model::{ModelCheck, SampledRank, ModelSummary, ineffective_retained};
+use crate::text::TerminalStyle;
 use crate::text::table::count;
 
-impl Checked {
+impl ModelCheck {
     /// What the model holds as one JSON object, with all warnings.
     pub fn json(&self) -> Value {
         let model = &self.model;
         let loaded = &model.loaded;
         let mut warnings = self::warnings(loaded);
-        let in_vain = retained_in_vain(&model.derivation).into_iter();
+        let in_vain = ineffective_retained(&model.derivation).into_iter();
         warnings.extend(in_vain.map(|(k, says)| {
             let span = loaded.retain.get(k);
             let place = span.map(|span| loaded.sources.line_and_column(*span));
@@ -41,7 +41,7 @@ impl Checked {
     }
 
     /// The same for people.
-    pub fn text(&self, style: Style) -> String {
+    pub fn text(&self, style: TerminalStyle) -> String {
         let model = &self.model;
         self.summary
             .text(&model.name, &model.derivation, self.rank.as_ref(), style)
@@ -57,7 +57,7 @@ pub fn refusal(says: &str, path: &str) -> Value {
 }
 
 /// What is wrong with a file that has no meaning, as one JSON object.
-pub fn faults(failure: &Failure) -> Value {
+pub fn faults(failure: &LoadFailure) -> Value {
     json!({
         "valid": false,
         "diagnostics": diagnostics(&failure.diagnostics, &failure.sources),
@@ -65,11 +65,11 @@ pub fn faults(failure: &Failure) -> Value {
 }
 
 /// What may not be intended in a file that has a meaning, each as a JSON object.
-pub fn warnings(loaded: &Loaded) -> Vec<Value> {
+pub fn warnings(loaded: &LoadedModel) -> Vec<Value> {
     diagnostics(&loaded.warnings, &loaded.sources)
 }
 
-fn diagnostics(found: &[Diagnostic], sources: &Sources) -> Vec<Value> {
+fn diagnostics(found: &[Diagnostic], sources: &SourceFiles) -> Vec<Value> {
     found
         .iter()
         .map(|one| {
@@ -80,8 +80,8 @@ fn diagnostics(found: &[Diagnostic], sources: &Sources) -> Vec<Value> {
             });
             json!({
                 "severity": match one.severity {
-                    Severity::Error => "error",
-                    Severity::Warning => "warning",
+                    DiagnosticSeverity::Error => "error",
+                    DiagnosticSeverity::Warning => "warning",
                 },
                 "says": one.message,
                 "file": place.as_ref().map(|p| &p.0),
@@ -94,7 +94,7 @@ fn diagnostics(found: &[Diagnostic], sources: &Sources) -> Vec<Value> {
         .collect()
 }
 
-impl Summary {
+impl ModelSummary {
     fn json(&self, name: &str, derivation: &Derivation, warnings: &[Value]) -> Value {
         json!({
             "model": name,
@@ -122,7 +122,7 @@ impl Summary {
         name: &str,
         derivation: &Derivation,
         rank: Option<&SampledRank>,
-        style: Style,
+        style: TerminalStyle,
     ) -> String {
         let m = &derivation.mechanism;
         let mut lines = vec![style.bold(&format!("{}: sound", plain(name)))];
@@ -190,14 +190,14 @@ impl Summary {
             ),
         );
         match reduction.method {
-            Method::Numeric { .. } => line(
+            ReductionMethod::Numeric { .. } => line(
                 "reduced",
                 "numerically, on the values of this file".to_owned(),
             ),
-            Method::Exact {
+            ReductionMethod::Exact {
                 at_values: true, ..
             } => line("reduced", "for the values of this file alone".to_owned()),
-            Method::Exact { .. } | Method::Unreduced => {}
+            ReductionMethod::Exact { .. } | ReductionMethod::Unreduced => {}
         }
         if let Some(rank) = rank {
             line("numeric rank", rank.text());
@@ -207,18 +207,18 @@ impl Summary {
 }
 
 /// How columns were reduced to a base.
-fn reduction(reduction: &Reduction) -> Value {
+fn reduction(reduction: &BaseReduction) -> Value {
     match NumericMethod::from_reduction(reduction) {
         Some(method) => json!(method),
         None => json!({
             "name": "exact",
-            "at_values": matches!(reduction.method, Method::Exact { at_values: true, .. }),
+            "at_values": matches!(reduction.method, ReductionMethod::Exact { at_values: true, .. }),
         }),
     }
 }
 
-fn joint(motion: Motion, name: &str, passive: bool) -> String {
-    let unusual = (motion != Motion::Revolute).then(|| motion.name());
+fn joint(motion: CoordinateMotion, name: &str, passive: bool) -> String {
+    let unusual = (motion != CoordinateMotion::Revolute).then(|| motion.name());
     let remarks: Vec<&str> = unusual
         .into_iter()
         .chain(passive.then_some("passive"))

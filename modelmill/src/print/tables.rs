@@ -1,10 +1,10 @@
 //! Results in text, for people: parameters, figures and regions.
 
-use modelmill_identify::{Figures, FitParameter, Status, TRIMMED_PART};
+use modelmill_identify::{ErrorFigures, FitParameter, ParameterStatus, TRIMMED_PART};
 
-use crate::compare::{Places, ROUNDING};
+use crate::compare::{ErrorLocations, ROUNDING};
 use crate::model::Model;
-use crate::text::table::{Align, count, number, percent, significant, table};
+use crate::text::table::{ColumnAlignment, count, number, percent, significant, table};
 
 /// Identified base parameters beside their nominal values.
 pub fn parameters(parameters: &[FitParameter]) -> Vec<String> {
@@ -14,17 +14,17 @@ pub fn parameters(parameters: &[FitParameter]) -> Vec<String> {
             vec![
                 p.name.clone(),
                 p.nominal.map_or_else(|| "-".to_owned(), number),
-                if p.status == Status::Identified {
+                if p.status == ParameterStatus::Identified {
                     number(p.value)
                 } else {
                     format!("({})", number(p.value))
                 },
                 match (p.status, p.std) {
-                    (Status::Known, _) => "known".to_owned(),
-                    (Status::NotEssential, _) => "not essential".to_owned(),
-                    (Status::Undetermined, _) => "not determined".to_owned(),
-                    (Status::Identified, Some(std)) => significant(std, 2),
-                    (Status::Identified, None) => "—".to_owned(),
+                    (ParameterStatus::Known, _) => "known".to_owned(),
+                    (ParameterStatus::NotEssential, _) => "not essential".to_owned(),
+                    (ParameterStatus::Undetermined, _) => "not determined".to_owned(),
+                    (ParameterStatus::Identified, Some(std)) => significant(std, 2),
+                    (ParameterStatus::Identified, None) => "—".to_owned(),
                 },
                 p.std.map_or_else(String::new, |std| {
                     if p.value == 0.0 {
@@ -40,12 +40,12 @@ pub fn parameters(parameters: &[FitParameter]) -> Vec<String> {
     table(
         2,
         &[
-            ("parameter", Align::Left),
-            ("nominal", Align::Right),
-            ("identified", Align::Right),
-            ("std", Align::Right),
-            ("std", Align::Right),
-            ("unit", Align::Left),
+            ("parameter", ColumnAlignment::Left),
+            ("nominal", ColumnAlignment::Right),
+            ("identified", ColumnAlignment::Right),
+            ("std", ColumnAlignment::Right),
+            ("std", ColumnAlignment::Right),
+            ("unit", ColumnAlignment::Left),
         ],
         &rows,
     )
@@ -61,7 +61,7 @@ pub fn expressions(indent: usize, model: &Model) -> Vec<String> {
 }
 
 /// Error figures of several comparisons, one line for the total, where there is one, and one for each channel.
-pub fn figures(named: &[(&str, &Figures)]) -> Vec<String> {
+pub fn figures(named: &[(&str, &ErrorFigures)]) -> Vec<String> {
     let mut rows = Vec::new();
     for (name, figures) in named {
         let mut name = (*name).to_owned();
@@ -100,15 +100,15 @@ pub fn figures(named: &[(&str, &Figures)]) -> Vec<String> {
     let mut lines = table(
         2,
         &[
-            ("", Align::Left),
-            ("drive", Align::Left),
-            ("nrms", Align::Right),
-            ("in band", Align::Right),
-            ("sum|e|/sum|f|", Align::Right),
-            ("mean relative", Align::Right),
-            ("rms", Align::Right),
-            ("largest", Align::Right),
-            ("unit", Align::Left),
+            ("", ColumnAlignment::Left),
+            ("drive", ColumnAlignment::Left),
+            ("nrms", ColumnAlignment::Right),
+            ("in band", ColumnAlignment::Right),
+            ("sum|e|/sum|f|", ColumnAlignment::Right),
+            ("mean relative", ColumnAlignment::Right),
+            ("rms", ColumnAlignment::Right),
+            ("largest", ColumnAlignment::Right),
+            ("unit", ColumnAlignment::Left),
         ],
         &rows,
     );
@@ -137,13 +137,13 @@ pub fn figures(named: &[(&str, &Figures)]) -> Vec<String> {
 }
 
 /// The unit that all drives have.
-fn common_unit(figures: &Figures) -> String {
+fn common_unit(figures: &ErrorFigures) -> String {
     let first = figures.channels.values().next();
     first.map_or_else(String::new, |one| one.unit.clone())
 }
 
 /// Where an error lives, one sentence for each region.
-pub fn places(places: &Places) -> Vec<String> {
+pub fn places(places: &ErrorLocations) -> Vec<String> {
     let regions = places.regions.iter();
     let mut lines: Vec<String> = regions
         .map(|region| format!("  {}.", region.says))

@@ -3,9 +3,9 @@
 use serde_json::{Value, json};
 
 use crate::print::tables;
-use crate::text::Style;
-use crate::text::table::{Align, count, number, percent, significant, table};
-use crate::variants::{Crossing, DriveVariants, Effort, LimitUse, TermShare, Variants};
+use crate::text::TerminalStyle;
+use crate::text::table::{ColumnAlignment, count, number, percent, significant, table};
+use crate::variants::{LimitCrossing, DriveVariants, DriveEffort, LimitUse, TermShare, VariantComparison};
 
 /// Summands of a drive's difference that are shown, at most; the rest is told in one line.
 const MOST_TERMS: usize = 6;
@@ -16,7 +16,7 @@ const MOST_PRODUCTS: usize = 4;
 /// Summands below this share of the largest one are not shown by themselves.
 const LEAST_SHARE: f64 = 0.01;
 
-impl Variants {
+impl VariantComparison {
     /// All figures as one JSON object.
     pub fn json(&self) -> Value {
         let limits = self.limits.iter().map(|one| {
@@ -40,7 +40,7 @@ impl Variants {
     }
 
     /// The same for people, but for the notes.
-    pub fn text(&self, style: Style) -> String {
+    pub fn text(&self, style: TerminalStyle) -> String {
         let mut lines = vec![style.bold(&format!(
             "along {}: {} in {} s",
             self.recordings.join(", "),
@@ -68,29 +68,29 @@ impl Variants {
         lines.join("\n")
     }
 
-    fn limits_text(&self, style: Style) -> Vec<String> {
+    fn limits_text(&self, style: TerminalStyle) -> Vec<String> {
         if self.limits.is_empty() {
             return vec!["  the files have no `[limits]`".to_owned()];
         }
         let mut lines = Vec::new();
         for crossing in [
-            Crossing::NowExceeded,
-            Crossing::StillExceeded,
-            Crossing::NoLongerExceeded,
+            LimitCrossing::NowExceeded,
+            LimitCrossing::StillExceeded,
+            LimitCrossing::NoLongerExceeded,
         ] {
             for one in self.limits.iter().filter(|l| l.crossing() == crossing) {
-                let line = format!("  {}", limit(one));
+                let line = format!("  {}", limit_line(one));
                 lines.push(match crossing {
-                    Crossing::NowExceeded => style.red(&line),
-                    Crossing::StillExceeded | Crossing::Kept => line,
-                    Crossing::NoLongerExceeded => style.green(&line),
+                    LimitCrossing::NowExceeded => style.red(&line),
+                    LimitCrossing::StillExceeded | LimitCrossing::Kept => line,
+                    LimitCrossing::NoLongerExceeded => style.green(&line),
                 });
             }
         }
         let kept = self
             .limits
             .iter()
-            .filter(|l| l.crossing() == Crossing::Kept);
+            .filter(|l| l.crossing() == LimitCrossing::Kept);
         let most = kept.clone().max_by(|a, b| {
             let used = |one: &LimitUse| one.used.into_iter().flatten().fold(0.0, f64::max);
             used(a).total_cmp(&used(b))
@@ -99,7 +99,7 @@ impl Variants {
             lines.push(format!(
                 "  kept: {}; most is used of {}",
                 count(kept.count(), "limit", "limits"),
-                limit(most)
+                limit_line(most)
             ));
         }
         lines
@@ -107,18 +107,18 @@ impl Variants {
 }
 
 /// What the JSON calls it.
-fn crossing(crossing: Crossing) -> &'static str {
+fn crossing(crossing: LimitCrossing) -> &'static str {
     match crossing {
-        Crossing::NowExceeded => "now_exceeded",
-        Crossing::StillExceeded => "still_exceeded",
-        Crossing::NoLongerExceeded => "no_longer_exceeded",
-        Crossing::Kept => "kept",
+        LimitCrossing::NowExceeded => "now_exceeded",
+        LimitCrossing::StillExceeded => "still_exceeded",
+        LimitCrossing::NoLongerExceeded => "no_longer_exceeded",
+        LimitCrossing::Kept => "kept",
     }
 }
 
 /// A drive as JSON.
 fn drive(one: &DriveVariants) -> Value {
-    let effort = |effort: &Effort| {
+    let effort = |effort: &DriveEffort| {
         let [peak, rms, peak_power, rms_power, work, net_work] = numbers(effort);
         json!({
             "peak": peak,
@@ -158,7 +158,7 @@ fn drive(one: &DriveVariants) -> Value {
 }
 
 /// One line of a limit: what each model uses of it.
-fn limit(one: &LimitUse) -> String {
+fn limit_line(one: &LimitUse) -> String {
     let used = one
         .used
         .map(|used| used.map_or_else(|| "no limit".to_owned(), part));
@@ -173,10 +173,10 @@ fn limit(one: &LimitUse) -> String {
         }
     };
     let says = match one.crossing() {
-        Crossing::NowExceeded => "is now exceeded: ",
-        Crossing::StillExceeded => "is exceeded by both: ",
-        Crossing::NoLongerExceeded => "is no longer exceeded: ",
-        Crossing::Kept => "",
+        LimitCrossing::NowExceeded => "is now exceeded: ",
+        LimitCrossing::StillExceeded => "is exceeded by both: ",
+        LimitCrossing::NoLongerExceeded => "is no longer exceeded: ",
+        LimitCrossing::Kept => "",
     };
     format!("{}{range} {says}{} -> {}", one.limit, used[0], used[1])
 }
@@ -197,7 +197,7 @@ fn efforts(drives: &[DriveVariants]) -> Vec<String> {
             row.insert(4, one.unit.to_owned());
             row
         };
-        let shown = |effort: &Effort| numbers(effort).map(|x| significant(x, 4));
+        let shown = |effort: &DriveEffort| numbers(effort).map(|x| significant(x, 4));
         rows.push(row(&one.drive, "before", shown(&one.before)));
         rows.push(row("", "after", shown(&one.after)));
         let (before, after) = (numbers(&one.before), numbers(&one.after));
@@ -209,22 +209,22 @@ fn efforts(drives: &[DriveVariants]) -> Vec<String> {
     table(
         2,
         &[
-            ("drive", Align::Left),
-            ("", Align::Left),
-            ("peak", Align::Right),
-            ("rms", Align::Right),
-            ("", Align::Left),
-            ("peak, W", Align::Right),
-            ("rms, W", Align::Right),
-            ("work given, J", Align::Right),
-            ("net, J", Align::Right),
+            ("drive", ColumnAlignment::Left),
+            ("", ColumnAlignment::Left),
+            ("peak", ColumnAlignment::Right),
+            ("rms", ColumnAlignment::Right),
+            ("", ColumnAlignment::Left),
+            ("peak, W", ColumnAlignment::Right),
+            ("rms, W", ColumnAlignment::Right),
+            ("work given, J", ColumnAlignment::Right),
+            ("net, J", ColumnAlignment::Right),
         ],
         &rows,
     )
 }
 
-fn numbers(effort: &Effort) -> [f64; 6] {
-    let Effort {
+fn numbers(effort: &DriveEffort) -> [f64; 6] {
+    let DriveEffort {
         peak,
         rms,
         peak_power,
@@ -294,16 +294,16 @@ fn shares(one: &DriveVariants) -> Vec<String> {
                     format!("in {}", term.retained)
                 },
                 value(term),
-                by_column(term),
+                column_share_text(term),
             ]
         })
         .collect();
     let columns = [
-        ("", Align::Right),
-        ("", Align::Left),
-        ("", Align::Left),
-        ("", Align::Left),
-        ("", Align::Left),
+        ("", ColumnAlignment::Right),
+        ("", ColumnAlignment::Left),
+        ("", ColumnAlignment::Left),
+        ("", ColumnAlignment::Left),
+        ("", ColumnAlignment::Left),
     ];
     lines.extend(table(4, &columns, &rows).into_iter().skip(1));
     let rest: f64 = terms[n..].iter().map(|term| term.share).sum();
@@ -327,7 +327,7 @@ fn signed_percent(share: f64) -> String {
 }
 
 /// What of a share is the column's and not the value's; nothing where there is no such part.
-fn by_column(term: &TermShare) -> String {
+fn column_share_text(term: &TermShare) -> String {
     let by_column = term.share - term.by_value;
     if by_column.abs() <= LEAST_SHARE * term.share.abs() {
         String::new()

@@ -10,13 +10,13 @@
 //! harmonics are tried in the same way: it averages over the periods what a low-pass lets through. Local polynomials are no
 //! candidates: at the same cut-off they leave as much as the low-pass, on all recordings that were looked at.
 
-use modelmill_codegen::{Evaluator, States};
-use modelmill_identify::{LowPass, Note, Open, PASSED_BY_DECIMATION, Recording as Raw, Run};
+use modelmill_codegen::{ModelEvaluator, MotionStates};
+use modelmill_identify::{LowPass, RecordingNote, PreparationChoices, DECIMATION_PASSBAND, SignalRecording as Raw, PreparedRun};
 use nalgebra::{DMatrix, DVector};
 
 use super::free;
-use super::options::Reading;
-use super::smoother::{Smoother, series_up_to, whole};
+use super::options::RecordingOptions;
+use super::smoother::{SmootherCandidate, series_up_to, floor_to_count};
 use crate::error::Outcome;
 use crate::model::Model;
 use crate::text::table::{percent, significant};
@@ -56,31 +56,31 @@ const HOPELESS: f64 = 1.5;
 
 /// The preparation with what was open settled, and what was chosen; nothing where nothing is open, or where forces do not
 /// tell.
-pub(super) fn choose(
+pub(super) fn choose_preparation(
     model: &Model,
     raw: &Raw,
-    reading: &Reading,
-) -> Outcome<Option<(Reading, Note)>> {
+    reading: &RecordingOptions,
+) -> Outcome<Option<(RecordingOptions, RecordingNote)>> {
     let drives = model.drives();
-    let has_forces = !drives.is_empty() && drives.iter().all(|drive| raw.has(drive));
+    let has_forces = !drives.is_empty() && drives.iter().all(|drive| raw.has_column(drive));
     if !has_forces || model.base.is_empty() {
         return Ok(None);
     }
-    let open = raw.open(&model.active(), &drives, &reading.preparation)?;
+    let open = raw.find_open_choices(&model.active_coordinates(), &drives, &reading.preparation)?;
     Ok(open.and_then(|open| {
-        let search = Search {
+        let search = SmootherSearch {
             model,
             raw,
             reading,
             open,
         };
-        search.chosen()
+        search.best_reading()
     }))
 }
 
 /// What is left of the forces on held-out time.
 #[derive(Clone, Copy)]
-struct Left {
+struct HeldOutResidual {
     /// The logarithm of the geometric mean over the drives of what is left, in units of the forces.
     figure: f64,
     /// The geometric mean over the drives of their relative errors below the band of the motion.
@@ -88,14 +88,14 @@ struct Left {
 }
 
 /// Smoothers of one kind that were tried, the one that passes most first.
-struct Tried {
-    all: Vec<(Smoother, Left)>,
+struct SmootherTrials {
+    all: Vec<(SmootherCandidate, HeldOutResidual)>,
     /// Which is the smoothest of those that leave nearly the least.
     best: usize,
 }
 
-impl Tried {
-    fn best(&self) -> (Smoother, Left) {
+impl SmootherTrials {
+    fn best(&self) -> (SmootherCandidate, HeldOutResidual) {
         self.all[self.best]
     }
 
@@ -104,14 +104,14 @@ impl Tried {
         let beside = [self.best.checked_sub(1), Some(self.best + 1)];
         beside.into_iter().flatten().filter_map(|at| {
             let (smoother, other) = self.all.get(at)?;
-            let cost = cost(other.figure - self.best().1.figure);
-            Some(format!("{cost} at {}", smoother.place()))
+            let cost = cost_text(other.figure - self.best().1.figure);
+            Some(format!("{cost} at {}", smoother.frequency_text()))
         })
     }
 }
 
 /// How much more is left, of the difference of two figures.
-fn cost(difference: f64) -> String {
+fn cost_text(difference: f64) -> String {
     let more = difference.exp() - 1.0;
     if more.abs() < 1e-3 {
         "as much".to_owned()
@@ -122,16 +122,16 @@ fn cost(difference: f64) -> String {
     }
 }
 
-struct Search<'a> {
+struct SmootherSearch<'a> {
     model: &'a Model,
     raw: &'a Raw,
-    reading: &'a Reading,
-    open: Open,
+    reading: &'a RecordingOptions,
+    open: PreparationChoices,
 }
 
-impl Search<'_> {
-    fn chosen(&self) -> Option<(Reading, Note)> {
-        let Open {
+impl SmootherSearch<'_> {
+    fn best_reading(&self) -> Option<(RecordingOptions, RecordingNote)> {
+        let PreparationChoices {
             rate_hz,
             band_hz,
             cutoff_hz,
@@ -146,33 +146,33 @@ impl Search<'_> {
         while ladder[ladder.len() - 1] / RATIO >= lowest {
             ladder.push(ladder[ladder.len() - 1] / RATIO);
         }
-        let ladder: Vec<Smoother> = ladder.into_iter().map(Smoother::low_pass).collect();
+        let ladder: Vec<SmootherCandidate> = ladder.into_iter().map(SmootherCandidate::low_pass).collect();
         // The lowest cut-off drops most samples; what it leaves is looked at for all.
         let runs = self.runs(ladder[ladder.len() - 1])?;
         let looked_at = self.windows(&runs);
-        let filtered = self.tried(&ladder, &looked_at)?;
+        let filtered = self.try_smoothers(&ladder, &looked_at)?;
         let series = period.and_then(|period| {
             let ladder = series_up_to(filtered.best().0.cutoff, period);
-            self.tried(&ladder, &looked_at)
+            self.try_smoothers(&ladder, &looked_at)
         });
         let (low_pass, by_filter) = filtered.best();
-        let is_better = |series: &Tried| series.best().1.figure < by_filter.figure - BETTER;
+        let is_better = |series: &SmootherTrials| series.best().1.figure < by_filter.figure - BETTER;
         let (tried, other) = match series {
             Some(series) if is_better(&series) => {
-                let more = cost(by_filter.figure - series.best().1.figure);
+                let more = cost_text(by_filter.figure - series.best().1.figure);
                 (
                     series,
-                    Some(format!("{more} by a low-pass at {}", low_pass.place())),
+                    Some(format!("{more} by a low-pass at {}", low_pass.frequency_text())),
                 )
             }
             Some(series) => {
                 let (smoother, left) = series.best();
-                let more = cost(left.figure - by_filter.figure);
+                let more = cost_text(left.figure - by_filter.figure);
                 (
                     filtered,
                     Some(format!(
                         "{more} by a Fourier series of {}",
-                        smoother.place()
+                        smoother.frequency_text()
                     )),
                 )
             }
@@ -181,7 +181,7 @@ impl Search<'_> {
         let (smoother, left) = tried.best();
         let (decimate, left) = self.decimation(smoother, &looked_at).unwrap_or((1, left));
         let mut reading = self.reading.clone();
-        smoother.goes_into(&mut reading.preparation);
+        smoother.apply_to(&mut reading.preparation);
         reading.preparation.decimate = decimate;
         reading.preparation.chosen = true;
         let mut others = vec![String::new()];
@@ -202,15 +202,15 @@ impl Search<'_> {
             percent(Some(left.relative)),
             significant(band_hz, 3),
         );
-        Some((reading, Note::info(says)))
+        Some((reading, RecordingNote::info(says)))
     }
 
     /// Smoothers that are tried one after the other, the one that passes most first, until nothing is to be hoped for.
-    fn tried(&self, ladder: &[Smoother], looked_at: &[Window]) -> Option<Tried> {
-        let mut all: Vec<(Smoother, Left)> = Vec::new();
+    fn try_smoothers(&self, ladder: &[SmootherCandidate], looked_at: &[TimeWindow]) -> Option<SmootherTrials> {
+        let mut all: Vec<(SmootherCandidate, HeldOutResidual)> = Vec::new();
         let mut least = f64::INFINITY;
         for smoother in ladder {
-            let Some(left) = self.left(*smoother, self.open.band_hz, looked_at) else {
+            let Some(left) = self.held_out_residual(*smoother, self.open.band_hz, looked_at) else {
                 continue;
             };
             all.push((*smoother, left));
@@ -219,19 +219,19 @@ impl Search<'_> {
                 break;
             }
         }
-        let is_good = |(_, left): &(Smoother, Left)| left.figure <= least + BETTER;
+        let is_good = |(_, left): &(SmootherCandidate, HeldOutResidual)| left.figure <= least + BETTER;
         let best = all.iter().rposition(is_good)?;
-        Some(Tried { all, best })
+        Some(SmootherTrials { all, best })
     }
 
     /// The factor of decimation, and what is left with it on held-out time.
-    fn decimation(&self, smoother: Smoother, looked_at: &[Window]) -> Option<(usize, Left)> {
-        let mut best: Option<(usize, Left)> = None;
+    fn decimation(&self, smoother: SmootherCandidate, looked_at: &[TimeWindow]) -> Option<(usize, HeldOutResidual)> {
+        let mut best: Option<(usize, HeldOutResidual)> = None;
         for part in PARALLEL {
             let passed = part * self.open.band_hz;
-            let factor = whole(PASSED_BY_DECIMATION * self.open.rate_hz / passed).max(1);
+            let factor = floor_to_count(DECIMATION_PASSBAND * self.open.rate_hz / passed).max(1);
             let passed = if factor == 1 { f64::INFINITY } else { passed };
-            let left = self.left(smoother, passed, looked_at)?;
+            let left = self.held_out_residual(smoother, passed, looked_at)?;
             if best.is_none_or(|(_, least)| left.figure < least.figure - BETTER) {
                 best = Some((factor, left));
             }
@@ -243,9 +243,9 @@ impl Search<'_> {
     }
 
     /// The runs that a smoother gives.
-    fn runs(&self, smoother: Smoother) -> Option<Vec<Run>> {
+    fn runs(&self, smoother: SmootherCandidate) -> Option<Vec<PreparedRun>> {
         let mut preparation = self.reading.preparation.clone();
-        smoother.goes_into(&mut preparation);
+        smoother.apply_to(&mut preparation);
         // Band and period were found already, and cost a look at all positions.
         preparation.band_hz = Some(self.open.band_hz);
         preparation.unexamined = true;
@@ -253,16 +253,16 @@ impl Search<'_> {
         let delay = self.model.derivation.mechanism.force_delay;
         if delay != 0.0 {
             for run in &mut runs {
-                run.pair_with_earlier_states(delay)?;
+                run.shift_states_by_delay(delay)?;
             }
         }
         Some(runs)
     }
 
     /// The stretches of time that all candidates have, or windows of them.
-    fn windows(&self, runs: &[Run]) -> Vec<Window> {
+    fn windows(&self, runs: &[PreparedRun]) -> Vec<TimeWindow> {
         let total: f64 = runs.iter().map(duration).sum();
-        let step = self.fine().recip();
+        let step = self.evaluation_rate().recip();
         let most = step * LOOKED_AT as f64;
         let share = if total > most { most / total } else { 1.0 };
         let mut windows = Vec::new();
@@ -274,7 +274,7 @@ impl Search<'_> {
             let length = (last - first) / parts as f64;
             for part in 0..parts {
                 let from = first + length * part as f64;
-                windows.push(Window {
+                windows.push(TimeWindow {
                     from,
                     to: from + share * length,
                 });
@@ -284,20 +284,20 @@ impl Search<'_> {
     }
 
     /// The highest frequency that is looked at, Hz.
-    fn highest(&self) -> f64 {
+    fn highest_frequency(&self) -> f64 {
         let octaves = 2.0_f64.powi(i32::try_from(OCTAVES).unwrap_or(0));
         (octaves * self.open.band_hz).min(HIGHEST * self.open.rate_hz)
     }
 
     /// Samples per second at which the model is evaluated.
-    fn fine(&self) -> f64 {
-        (FINE * self.highest()).min(self.open.rate_hz)
+    fn evaluation_rate(&self) -> f64 {
+        (FINE * self.highest_frequency()).min(self.open.rate_hz)
     }
 
     /// What is left on held-out time by a smoother, where rows below `passed`, Hz, are fitted.
-    fn left(&self, smoother: Smoother, passed: f64, windows: &[Window]) -> Option<Left> {
+    fn held_out_residual(&self, smoother: SmootherCandidate, passed: f64, windows: &[TimeWindow]) -> Option<HeldOutResidual> {
         let runs = self.runs(smoother)?;
-        let every = whole(self.open.rate_hz / self.fine()).max(1);
+        let every = floor_to_count(self.open.rate_hz / self.evaluation_rate()).max(1);
         let rate = self.open.rate_hz / every as f64;
         let slack = 1.0 / self.open.rate_hz;
         let samples = windows
@@ -309,18 +309,18 @@ impl Search<'_> {
                 })?;
                 self.samples(run, window, every)
             })
-            .collect::<Option<Vec<Samples>>>()?;
+            .collect::<Option<Vec<WindowSamples>>>()?;
         let total: usize = samples.iter().map(|one| one.forces.nrows()).sum();
         let mut before = 0;
-        let mut folds: Vec<Rows> = Vec::new();
+        let mut folds: Vec<FoldSums> = Vec::new();
         let mut parts: Vec<(usize, usize, usize, usize)> = Vec::new();
         for (window, one) in samples.iter().enumerate() {
             let n = one.forces.nrows();
-            let filtered = one.below(passed, rate)?;
+            let filtered = one.low_passed(passed, rate)?;
             let margin = margin(n, rate, self.open.band_hz);
-            let thin = whole(rate / (4.0 * passed.min(self.open.band_hz * 4.0))).max(1);
+            let thin = floor_to_count(rate / (4.0 * passed.min(self.open.band_hz * 4.0))).max(1);
             if folds.is_empty() {
-                folds = vec![Rows::new(one.forces.ncols(), one.regressor.ncols()); FOLDS];
+                folds = vec![FoldSums::new(one.forces.ncols(), one.regressor.ncols()); FOLDS];
             }
             let fold_of = |i: usize| ((before + i) * FOLDS / total).min(FOLDS - 1);
             for i in (margin..n - margin).step_by(thin) {
@@ -335,13 +335,13 @@ impl Search<'_> {
             }
             before += n;
         }
-        let values = fitted(&folds)?;
+        let values = fit_folds(&folds)?;
         let drives = samples.first()?.forces.ncols();
         let edges: Vec<f64> = (0..=OCTAVES)
             .map(|k| self.open.band_hz * 2.0_f64.powi(i32::try_from(k).unwrap_or(0)))
             .filter(|edge| *edge < 0.45 * rate)
             .collect();
-        let mut octaves = vec![vec![Octave::default(); edges.len()]; drives];
+        let mut octaves = vec![vec![OctavePower::default(); edges.len()]; drives];
         for (window, fold, start, end) in parts {
             let one = &samples[window];
             let margin = margin(end - start, rate, self.open.band_hz);
@@ -380,20 +380,20 @@ impl Search<'_> {
                 return None;
             }
             let rounding = ROUNDING * ROUNDING * size;
-            let above: f64 = octaves[1..].iter().map(|octave| octave.left(true)).sum();
-            let within = octaves[0].left(false).max(rounding);
+            let above: f64 = octaves[1..].iter().map(|octave| octave.residual_power(true)).sum();
+            let within = octaves[0].residual_power(false).max(rounding);
             figure += 0.5 * (within + above).ln();
             relative += 0.5 * (within / size).ln();
         }
         let n = drives as f64;
-        Some(Left {
+        Some(HeldOutResidual {
             figure: figure / n,
             relative: (relative / n).exp(),
         })
     }
 
     /// Regressor and forces at every so many samples of a window.
-    fn samples(&self, run: &Run, window: &Window, every: usize) -> Option<Samples> {
+    fn samples(&self, run: &PreparedRun, window: &TimeWindow, every: usize) -> Option<WindowSamples> {
         let forces = run.force.as_deref()?;
         let start = run.time.partition_point(|t| *t < window.from);
         let end = run.time.partition_point(|t| *t <= window.to);
@@ -419,30 +419,30 @@ impl Search<'_> {
                 picked[(i, d)] = smooth[*sample - from];
             }
         }
-        Some(Samples {
+        Some(WindowSamples {
             regressor,
             forces: picked,
         })
     }
 
     /// The model's regressor at some samples, with friction and an offset of every drive beside; row of sample and drive.
-    fn regressor(&self, run: &Run, samples: &[usize]) -> Option<DMatrix<f64>> {
+    fn regressor(&self, run: &PreparedRun, samples: &[usize]) -> Option<DMatrix<f64>> {
         let pick = |columns: &[Vec<f64>]| -> Vec<Vec<f64>> {
             let pick = |column: &Vec<f64>| samples.iter().map(|k| column[*k]).collect();
             columns.iter().map(pick).collect()
         };
         let states = [&run.q, &run.qd, &run.qdd].map(|columns| pick(columns));
         let load = pick(run.force.as_deref().unwrap_or(&[]));
-        let states = States {
+        let states = MotionStates {
             q: states[0].iter().map(Vec::as_slice).collect(),
             qd: states[1].iter().map(Vec::as_slice).collect(),
             qdd: states[2].iter().map(Vec::as_slice).collect(),
             load: load.iter().map(Vec::as_slice).collect(),
         };
-        let evaluator = Evaluator::new(&self.model.derivation);
+        let evaluator = ModelEvaluator::new(&self.model.derivation);
         let regressor = evaluator.regressor(&states).ok()?;
         let n = self.model.drives().len();
-        let rates = evaluator.drives(&states).ok()?;
+        let rates = evaluator.drive_motion(&states).ok()?;
         let rates = rates.get(n..2 * n)?;
         let width = regressor.ncols();
         let mut more = regressor.resize_horizontally(width + 3 * n, 0.0);
@@ -459,20 +459,20 @@ impl Search<'_> {
 }
 
 /// A stretch of time, s.
-struct Window {
+struct TimeWindow {
     from: f64,
     to: f64,
 }
 
 /// Rows of the regressor per sample and drive, and forces per sample.
-struct Samples {
+struct WindowSamples {
     regressor: DMatrix<f64>,
     forces: DMatrix<f64>,
 }
 
-impl Samples {
+impl WindowSamples {
     /// The same below a frequency, Hz; `None` where there are too few samples.
-    fn below(&self, passed: f64, rate: f64) -> Option<Self> {
+    fn low_passed(&self, passed: f64, rate: f64) -> Option<Self> {
         let mut filtered = Self {
             regressor: self.regressor.clone(),
             forces: self.forces.clone(),
@@ -502,13 +502,13 @@ impl Samples {
 
 /// Inner products of measured and model force in an octave.
 #[derive(Clone, Default)]
-struct Octave {
+struct OctavePower {
     measured: f64,
     product: f64,
     model: f64,
 }
 
-impl Octave {
+impl OctavePower {
     fn add(&mut self, measured: &[f64], model: &[f64]) {
         for (y, m) in measured.iter().zip(model) {
             self.measured += y * y;
@@ -519,7 +519,7 @@ impl Octave {
 
     /// What the model leaves of the measured force. It may be damped where it says less than it adds, as a filter will do
     /// above the band of the motion: noise there costs nothing but what it hides.
-    fn left(&self, may_be_damped: bool) -> f64 {
+    fn residual_power(&self, may_be_damped: bool) -> f64 {
         let scale = if may_be_damped && self.model > 0.0 {
             (self.product / self.model).clamp(0.0, 1.0)
         } else {
@@ -531,26 +531,26 @@ impl Octave {
 
 /// Samples at both ends of `n` that a low-pass at `band` spoils.
 fn margin(n: usize, rate: f64, band: f64) -> usize {
-    whole((DROPPED.0 * rate / band).min(DROPPED.1 * n as f64))
+    floor_to_count((DROPPED.0 * rate / band).min(DROPPED.1 * n as f64))
 }
 
 /// Inner products of the rows of one fold, drive by drive.
 #[derive(Clone)]
-struct Rows {
-    drives: Vec<Products>,
+struct FoldSums {
+    drives: Vec<DriveNormalEquations>,
 }
 
 #[derive(Clone)]
-struct Products {
+struct DriveNormalEquations {
     normal: DMatrix<f64>,
     right: DVector<f64>,
     size: f64,
     rows: usize,
 }
 
-impl Rows {
+impl FoldSums {
     fn new(drives: usize, width: usize) -> Self {
-        let products = Products {
+        let products = DriveNormalEquations {
             normal: DMatrix::zeros(width, width),
             right: DVector::zeros(width),
             size: 0.0,
@@ -561,7 +561,7 @@ impl Rows {
         }
     }
 
-    fn add(&mut self, samples: &Samples, i: usize) {
+    fn add(&mut self, samples: &WindowSamples, i: usize) {
         let drives = self.drives.len();
         for (d, one) in self.drives.iter_mut().enumerate() {
             let row = samples.regressor.row(i * drives + d).transpose();
@@ -575,7 +575,7 @@ impl Rows {
 }
 
 /// For each fold the values that fit the others; `None` where there are too few rows, or nothing is measured.
-fn fitted(folds: &[Rows]) -> Option<Vec<DVector<f64>>> {
+fn fit_folds(folds: &[FoldSums]) -> Option<Vec<DVector<f64>>> {
     let n = folds.first()?.drives.len();
     let width = folds[0].drives[0].right.len();
     let total = |d: usize| -> f64 { folds.iter().map(|fold| fold.drives[d].size).sum() };
@@ -602,7 +602,7 @@ fn fitted(folds: &[Rows]) -> Option<Vec<DVector<f64>>> {
                     right += &one.right * *weight;
                 }
             }
-            let found = solved(&normal, &right)?;
+            let found = solve_scaled(&normal, &right)?;
             for (left, one) in left.iter_mut().zip(&judged.drives) {
                 let explained =
                     2.0 * one.right.dot(&found) - (symmetric(&one.normal) * &found).dot(&found);
@@ -615,7 +615,7 @@ fn fitted(folds: &[Rows]) -> Option<Vec<DVector<f64>>> {
 }
 
 /// Values of scaled normal equations with a trace of a ridge, since columns may be the same.
-fn solved(normal: &DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
+fn solve_scaled(normal: &DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
     let mut normal = symmetric(normal);
     let n = right.len();
     let scale: Vec<f64> = (0..n)
@@ -640,7 +640,7 @@ fn symmetric(lower: &DMatrix<f64>) -> DMatrix<f64> {
     whole
 }
 
-fn duration(run: &Run) -> f64 {
+fn duration(run: &PreparedRun) -> f64 {
     match run.time.as_slice() {
         [first, .., last] => last - first,
         _ => 0.0,

@@ -1,10 +1,10 @@
 //! Which columns of a recording are ours: the user's `--map`, then what the model file says, applied to the names
 //! that the file has.
 
-use modelmill_identify::{Computed, NotFinite, ReadOptions};
-use modelmill_spec::{ColumnFault, ColumnSum, Quantity, read_column};
+use modelmill_identify::{ComputedColumn, NonFinitePolicy, ReadOptions};
+use modelmill_spec::{ColumnFault, ColumnSum, ColumnQuantity, read_column};
 
-use super::options::Reading;
+use super::options::RecordingOptions;
 use crate::error::{Error, Outcome};
 use crate::model::Model;
 
@@ -12,18 +12,18 @@ use crate::model::Model;
 /// Fails when a mapping makes no sense for this model, or asks for columns that are not there.
 pub(crate) fn read_options(
     model: &Model,
-    args: &Reading,
+    args: &RecordingOptions,
     header: &[String],
     file: &str,
 ) -> Outcome<ReadOptions> {
     let mechanism = &model.derivation.mechanism;
     let known = mechanism.columns();
-    let mut mapping = Mapping::default();
+    let mut mapping = ColumnMapping::default();
     // All faults are told at once.
     let mut faults = Vec::new();
     for (k, (ours, text)) in args.columns.iter().enumerate() {
         let Some(quantity) = quantity_of(&known, ours) else {
-            faults.push(unknown(model, &known, ours));
+            faults.push(unknown_column_error(model, &known, ours));
             continue;
         };
         if args.columns[..k].iter().any(|(other, _)| other == ours) {
@@ -32,7 +32,7 @@ pub(crate) fn read_options(
             )));
             continue;
         }
-        match read(model, text, quantity, header) {
+        match parse_column_sum(model, text, quantity, header) {
             Ok(sum) => mapping.add(ours, sum),
             // The reader of the recording says what is missing and lists what there is.
             Err(ColumnFault::Missing { column, .. }) if column == *text => {
@@ -41,7 +41,7 @@ pub(crate) fn read_options(
             Err(fault @ ColumnFault::Missing { .. }) => {
                 faults.push(Error::input(format!(
                     "{file}: option `columns` = `{ours}={text}`: {fault} {}",
-                    listed(header)
+                    column_list_text(header)
                 )));
             }
             Err(fault) => {
@@ -58,17 +58,17 @@ pub(crate) fn read_options(
         let Some(quantity) = quantity_of(&known, ours) else {
             continue;
         };
-        match read(model, text, quantity, header) {
-            Ok(sum) if mapping.takes_away(&sum) => {}
+        match parse_column_sum(model, text, quantity, header) {
+            Ok(sum) if mapping.is_conflicting(&sum) => {}
             Ok(sum) => mapping.add(ours, sum),
             // A recording may have our names, or lack what can be done without.
             Err(ColumnFault::Missing { .. })
-                if header.contains(ours) || can_lack(ours, quantity) => {}
+                if header.contains(ours) || is_optional(ours, quantity) => {}
             Err(fault) => {
                 faults.push(Error::input(format!(
                     "{file}: the model file takes `{ours}` from `{text}`, but {fault} {} \
                      Map one onto it with option `columns` = `{ours}=THEIRS`",
-                    listed(header)
+                    column_list_text(header)
                 )));
             }
         }
@@ -77,26 +77,26 @@ pub(crate) fn read_options(
         mapping.scale(drive, *factor, header);
         mapping.scale(&format!("{drive}_var"), factor * factor, header);
     }
-    if let Some(fault) = together(faults) {
+    if let Some(fault) = combined_error(faults) {
         return Err(fault);
     }
     Ok(ReadOptions {
         renames: mapping.renames,
         computed: mapping.computed,
         not_finite: if args.skip_bad_samples {
-            NotFinite::LeaveOut
+            NonFinitePolicy::LeaveOut
         } else {
-            NotFinite::Refuse
+            NonFinitePolicy::Refuse
         },
         wanted: Some(known.into_iter().map(|(name, _)| name).collect()),
-        may_lack: may_lack(model),
-        between: args.between,
+        may_be_missing: optional_forces(model),
+        time_interval: args.between,
         ..ReadOptions::default()
     })
 }
 
 /// Forces of which samples may be missing. Those of drives that share rows are looked at before they are repaired.
-fn may_lack(model: &Model) -> Vec<String> {
+fn optional_forces(model: &Model) -> Vec<String> {
     if model.derivation.mechanism.shared_drives.is_empty() {
         model.drives()
     } else {
@@ -105,7 +105,7 @@ fn may_lack(model: &Model) -> Vec<String> {
 }
 
 /// Several faults as one, each on a line of its own; wrong options weigh more than what the recording lacks.
-fn together(mut faults: Vec<Error>) -> Option<Error> {
+fn combined_error(mut faults: Vec<Error>) -> Option<Error> {
     if faults.len() < 2 {
         return faults.pop();
     }
@@ -127,18 +127,18 @@ fn together(mut faults: Vec<Error>) -> Option<Error> {
 
 /// What was found so far.
 #[derive(Default)]
-struct Mapping {
+struct ColumnMapping {
     renames: Vec<(String, String)>,
-    computed: Vec<Computed>,
+    computed: Vec<ComputedColumn>,
 }
 
-impl Mapping {
+impl ColumnMapping {
     fn add(&mut self, ours: &str, sum: ColumnSum) {
         match sum.terms.as_slice() {
             [(theirs, factor)] if factor.total_cmp(&1.0).is_eq() && sum.offset == 0.0 => {
                 self.renames.push((ours.to_owned(), theirs.clone()));
             }
-            _ => self.computed.push(Computed {
+            _ => self.computed.push(ComputedColumn {
                 name: ours.to_owned(),
                 terms: sum.terms,
                 offset: sum.offset,
@@ -159,7 +159,7 @@ impl Mapping {
             None if header.iter().any(|name| name == ours) => ours.to_owned(),
             None => return,
         };
-        self.computed.push(Computed {
+        self.computed.push(ComputedColumn {
             name: ours.to_owned(),
             terms: vec![(theirs, factor)],
             offset: 0.0,
@@ -167,7 +167,7 @@ impl Mapping {
     }
 
     /// Whether a column that the user has given another name would be needed under this one.
-    fn takes_away(&self, sum: &ColumnSum) -> bool {
+    fn is_conflicting(&self, sum: &ColumnSum) -> bool {
         sum.terms.len() == 1
             && self
                 .renames
@@ -176,10 +176,10 @@ impl Mapping {
     }
 }
 
-fn read(
+fn parse_column_sum(
     model: &Model,
     text: &str,
-    quantity: Quantity,
+    quantity: ColumnQuantity,
     header: &[String],
 ) -> Result<ColumnSum, ColumnFault> {
     let constants = &model.derivation.mechanism.constants;
@@ -188,22 +188,22 @@ fn read(
     })
 }
 
-fn quantity_of(known: &[(String, Quantity)], ours: &str) -> Option<Quantity> {
+fn quantity_of(known: &[(String, ColumnQuantity)], ours: &str) -> Option<ColumnQuantity> {
     let found = known.iter().find(|(name, _)| name == ours);
     found.map(|(_, quantity)| *quantity)
 }
 
 /// Derivatives, forces and variances may be missing: they are prepared, or asked for where they are needed.
-fn can_lack(ours: &str, quantity: Quantity) -> bool {
+fn is_optional(ours: &str, quantity: ColumnQuantity) -> bool {
     match quantity {
-        Quantity::Time | Quantity::Number => false,
-        Quantity::Angle(order) | Quantity::Length(order) => order > 0 && ours.contains("_d"),
+        ColumnQuantity::Time | ColumnQuantity::Number => false,
+        ColumnQuantity::Angle(order) | ColumnQuantity::Length(order) => order > 0 && ours.contains("_d"),
         _ => true,
     }
 }
 
-fn unknown(model: &Model, known: &[(String, Quantity)], ours: &str) -> Error {
-    let why = if model.passive().iter().any(|name| name == ours) {
+fn unknown_column_error(model: &Model, known: &[(String, ColumnQuantity)], ours: &str) -> Error {
+    let why = if model.passive_coordinates().iter().any(|name| name == ours) {
         "is passive: it is computed from the loops and not read"
     } else {
         "is no name of this model"
@@ -215,7 +215,7 @@ fn unknown(model: &Model, known: &[(String, Quantity)], ours: &str) -> Error {
     ))
 }
 
-fn listed(header: &[String]) -> String {
+fn column_list_text(header: &[String]) -> String {
     let shown: Vec<String> = header
         .iter()
         .take(40)

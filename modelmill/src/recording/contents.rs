@@ -11,7 +11,7 @@ pub use modelmill_identify::{ColumnInfo, TableInfo};
 
 /// What a file holds.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Contents {
+pub struct RecordingContents {
     /// What messages call it.
     pub file: String,
     /// Its tables, or the topics of a log.
@@ -22,16 +22,16 @@ impl Host {
     /// Lists the tables and topics of a recording with their columns, samples and rates.
     ///
     /// Fails when the file cannot be read.
-    pub fn recordings(&self, path: impl AsRef<Path>) -> Outcome<Contents> {
-        if let Some(kind) = kinds_of_files::kind(self, path.as_ref()) {
+    pub fn recordings(&self, path: impl AsRef<Path>) -> Outcome<RecordingContents> {
+        if let Some(kind) = kinds_of_files::file_kind(self, path.as_ref()) {
             let path = path.as_ref().display();
             return Err(Error::input(format!(
                 "{path} is {kind}; a recording is expected"
             )));
         }
         let file = RecordingFile::open(self.files(), path.as_ref())?;
-        let tables = self.watched(&format!("reading {}", file.name()), 0, |_| file.tables())??;
-        Ok(Contents {
+        let tables = self.run_job(&format!("reading {}", file.name()), 0, |_| file.tables())??;
+        Ok(RecordingContents {
             file: file.name().to_owned(),
             tables,
         })

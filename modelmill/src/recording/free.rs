@@ -1,8 +1,8 @@
 //! What recordings hold of free bodies and of what nothing drives: quaternions whose sign may change from sample to sample,
 //! twists that are recorded or follow from the pose, and forces that are zero because nothing acts.
 
-use modelmill_identify::{Note, Preparation, Recording as Raw, Run};
-use modelmill_spec::{DriveKind, FreeBody, Kinematics, Mechanism, Step, TwistAxes};
+use modelmill_identify::{RecordingNote, StatePreparation, SignalRecording as Raw, PreparedRun};
+use modelmill_spec::{DriveKind, FreeBody, Kinematics, Mechanism, FrameStep, TwistAxes};
 
 use crate::error::{Error, Outcome};
 use crate::model::Model;
@@ -14,37 +14,37 @@ const UNIT: f64 = 0.02;
 pub(crate) fn free_bodies(mechanism: &Mechanism) -> impl Iterator<Item = &FreeBody> {
     let steps = mechanism.frames.iter().flat_map(|frame| &frame.steps);
     steps.filter_map(|step| match step {
-        Step::Free(body) => Some(body),
+        FrameStep::Free(body) => Some(body),
         _ => None,
     })
 }
 
 /// Makes a raw recording whole: quaternions of unit length that do not change sides, and forces of zero where nothing drives
 /// and nothing was measured; what was done comes back as notes.
-pub(super) fn complete(model: &Model, raw: &mut Raw) -> Outcome<Vec<Note>> {
+pub(super) fn complete(model: &Model, raw: &mut Raw) -> Outcome<Vec<RecordingNote>> {
     let mechanism = &model.derivation.mechanism;
     for body in free_bodies(mechanism) {
         let names = body
             .quaternion
             .map(|i| mechanism.coordinates[i.0].name.as_str());
         // What is missing is said where states are made.
-        if names.iter().all(|name| raw.has(name)) {
-            one_sided(raw, names)?;
+        if names.iter().all(|name| raw.has_column(name)) {
+            normalise_quaternions(raw, names)?;
         }
         check_twist(mechanism, body, raw)?;
     }
-    share(mechanism, raw)?;
+    add_shared_drive_forces(mechanism, raw)?;
     let mut zero = Vec::new();
     for drive in mechanism.drives.iter().filter(|drive| !drive.is_driven) {
-        if !raw.has(&drive.name) && mechanism.shared_drives.is_empty() {
-            raw.put(&drive.name, vec![0.0; raw.samples()]);
+        if !raw.has_column(&drive.name) && mechanism.shared_drives.is_empty() {
+            raw.set_column(&drive.name, vec![0.0; raw.samples()]);
             zero.push(format!("`{}`", drive.name));
         }
     }
     if zero.is_empty() {
         return Ok(Vec::new());
     }
-    Ok(vec![Note::info(format!(
+    Ok(vec![RecordingNote::info(format!(
         "{} has no column {}: nothing drives there, and no other force, such as that of a contact, is taken to act.",
         raw.file(),
         zero.join(", ")
@@ -52,9 +52,9 @@ pub(super) fn complete(model: &Model, raw: &mut Raw) -> Outcome<Vec<Note>> {
 }
 
 /// Adds what drives that share the rows do on each of them, `J' f`, to what is recorded there.
-fn share(mechanism: &Mechanism, raw: &mut Raw) -> Outcome {
+fn add_shared_drive_forces(mechanism: &Mechanism, raw: &mut Raw) -> Outcome {
     let shared = &mechanism.shared_drives;
-    let has = |name: &str| raw.has(name);
+    let has = |name: &str| raw.has_column(name);
     if !shared.iter().any(|drive| has(&drive.name))
         || !mechanism.coordinates.iter().all(|c| has(&c.name))
     {
@@ -93,13 +93,13 @@ fn share(mechanism: &Mechanism, raw: &mut Raw) -> Outcome {
         }
     }
     for (row, total) in mechanism.drives.iter().zip(rows) {
-        raw.put(&row.name, total);
+        raw.set_column(&row.name, total);
     }
     Ok(())
 }
 
 /// Scales quaternions to unit length, and turns the sign of those that lie on the other side of the one before.
-fn one_sided(raw: &mut Raw, names: [&str; 4]) -> Outcome {
+fn normalise_quaternions(raw: &mut Raw, names: [&str; 4]) -> Outcome {
     let mut columns: Vec<Vec<f64>> = Vec::new();
     for name in names {
         columns.push(raw.column(name)?.to_vec());
@@ -129,7 +129,7 @@ fn one_sided(raw: &mut Raw, names: [&str; 4]) -> Outcome {
         }
     }
     for (name, column) in names.into_iter().zip(columns) {
-        raw.put(name, column);
+        raw.set_column(name, column);
     }
     Ok(())
 }
@@ -137,11 +137,11 @@ fn one_sided(raw: &mut Raw, names: [&str; 4]) -> Outcome {
 /// Refuses a half of a twist that is recorded in part, and accelerations without the velocities that they change.
 fn check_twist(mechanism: &Mechanism, body: &FreeBody, raw: &Raw) -> Outcome {
     let name = |i: usize| mechanism.coordinates[i].name.as_str();
-    for half in halves(body) {
+    for half in twist_halves(body) {
         let [rates, accelerations] = ["_d", "_dd"].map(|suffix| {
             let recorded = half
                 .iter()
-                .filter(|i| raw.has(&format!("{}{suffix}", name(**i))));
+                .filter(|i| raw.has_column(&format!("{}{suffix}", name(**i))));
             recorded.count()
         });
         let is_whole = |n: usize| n == 0 || n == 3;
@@ -161,40 +161,40 @@ fn check_twist(mechanism: &Mechanism, body: &FreeBody, raw: &Raw) -> Outcome {
 }
 
 /// Coordinates whose rates are the velocity, and those whose rates are the angular velocity.
-fn halves(body: &FreeBody) -> [[usize; 3]; 2] {
+fn twist_halves(body: &FreeBody) -> [[usize; 3]; 2] {
     let [_, x, y, z] = body.quaternion;
     [body.position, [x, y, z]].map(|half| half.map(|i| i.0))
 }
 
 /// The states of a recording for a model, in which rates of free bodies are their twist.
-pub(super) fn runs(model: &Model, raw: &Raw, preparation: &Preparation) -> Outcome<Vec<Run>> {
+pub(super) fn runs(model: &Model, raw: &Raw, preparation: &StatePreparation) -> Outcome<Vec<PreparedRun>> {
     let mechanism = &model.derivation.mechanism;
-    let mut runs = raw.runs_with(&model.active(), &model.drives(), preparation)?;
+    let mut runs = raw.runs_with(&model.active_coordinates(), &model.drives(), preparation)?;
     for body in free_bodies(mechanism) {
-        let [velocity, angular] = halves(body).map(|half| {
+        let [velocity, angular] = twist_halves(body).map(|half| {
             let name = &mechanism.coordinates[half[0]].name;
-            raw.has(&format!("{name}_d"))
+            raw.has_column(&format!("{name}_d"))
         });
         for run in &mut runs {
-            twist(mechanism, body, run, [velocity, angular]);
+            set_twist(mechanism, body, run, [velocity, angular]);
         }
     }
     Ok(runs)
 }
 
 /// Replaces derivatives of a pose by the twist and its derivative, half by half where it was not recorded.
-fn twist(mechanism: &Mechanism, body: &FreeBody, run: &mut Run, recorded: [bool; 2]) {
+fn set_twist(mechanism: &Mechanism, body: &FreeBody, run: &mut PreparedRun, recorded: [bool; 2]) {
     // States hold the independent coordinates alone.
     let at = |i: usize| {
         let before = mechanism.coordinates[..i].iter();
         before.filter(|c| !c.passive).count()
     };
     let quaternion = body.quaternion.map(|i| at(i.0));
-    let [position, vector] = halves(body).map(|half| half.map(at));
+    let [position, vector] = twist_halves(body).map(|half| half.map(at));
     for sample in 0..run.time.len() {
         let of = |columns: &[Vec<f64>], i: usize| columns[i][sample];
         let q = quaternion.map(|i| of(&run.q, i));
-        let turn = Turn::new(q);
+        let turn = BodyRotation::new(q);
         let (mut omega, mut alpha) = (
             vector.map(|i| of(&run.qd, i)),
             vector.map(|i| of(&run.qdd, i)),
@@ -214,7 +214,7 @@ fn twist(mechanism: &Mechanism, body: &FreeBody, run: &mut Run, recorded: [bool;
             omega = first;
             alpha = std::array::from_fn(|k| second[k] - shrink * first[k]);
             if body.angular == TwistAxes::World {
-                (omega, alpha) = (turn.out(omega), turn.out(alpha));
+                (omega, alpha) = (turn.to_base(omega), turn.to_base(alpha));
             }
         }
         let (mut velocity, mut acceleration) = (
@@ -224,11 +224,11 @@ fn twist(mechanism: &Mechanism, body: &FreeBody, run: &mut Run, recorded: [bool;
         if !recorded[0] && body.linear == TwistAxes::Body {
             let omega = match body.angular {
                 TwistAxes::Body => omega,
-                TwistAxes::World => turn.inside(omega),
+                TwistAxes::World => turn.to_body(omega),
             };
-            velocity = turn.inside(velocity);
+            velocity = turn.to_body(velocity);
             let carried = cross(omega, velocity);
-            let inside = turn.inside(acceleration);
+            let inside = turn.to_body(acceleration);
             acceleration = std::array::from_fn(|k| inside[k] - carried[k]);
         }
         for k in 0..3 {
@@ -259,9 +259,9 @@ fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
 }
 
 /// A rotation from a body's axes to the base's, by rows.
-struct Turn([[f64; 3]; 3]);
+struct BodyRotation([[f64; 3]; 3]);
 
-impl Turn {
+impl BodyRotation {
     fn new([w, x, y, z]: [f64; 4]) -> Self {
         let v = [x, y, z];
         let per = 2.0 / (w * w + x * x + y * y + z * z);
@@ -276,11 +276,11 @@ impl Turn {
         Self(std::array::from_fn(|i| columns.map(|column| column[i])))
     }
 
-    fn out(&self, v: [f64; 3]) -> [f64; 3] {
+    fn to_base(&self, v: [f64; 3]) -> [f64; 3] {
         self.0.map(|row| (0..3).map(|k| row[k] * v[k]).sum())
     }
 
-    fn inside(&self, v: [f64; 3]) -> [f64; 3] {
+    fn to_body(&self, v: [f64; 3]) -> [f64; 3] {
         std::array::from_fn(|k| (0..3).map(|i| self.0[i][k] * v[i]).sum())
     }
 }

@@ -1,6 +1,6 @@
 //! Ways to smooth positions that are tried against each other: low-passes, and Fourier series where a motion repeats itself.
 
-use modelmill_identify::{Preparation, Smoothing};
+use modelmill_identify::{StatePreparation, SmoothingMethod};
 
 use crate::text::table::significant;
 
@@ -11,14 +11,14 @@ const MOST_HARMONICS: usize = 100;
 
 /// A way to smooth positions.
 #[derive(Clone, Copy)]
-pub(super) struct Smoother {
+pub(super) struct SmootherCandidate {
     /// Hz.
     pub(super) cutoff: f64,
     /// The period of a Fourier series, s; none of a low-pass.
     period: Option<f64>,
 }
 
-impl Smoother {
+impl SmootherCandidate {
     pub(super) fn low_pass(cutoff: f64) -> Self {
         Self {
             cutoff,
@@ -35,20 +35,20 @@ impl Smoother {
     }
 
     pub(super) fn harmonics(self) -> Option<usize> {
-        Some(whole(self.cutoff * self.period?))
+        Some(floor_to_count(self.cutoff * self.period?))
     }
 
-    pub(super) fn goes_into(self, preparation: &mut Preparation) {
+    pub(super) fn apply_to(self, preparation: &mut StatePreparation) {
         preparation.cutoff_hz = Some(self.cutoff);
         if self.period.is_some() {
-            preparation.smoothing = Smoothing::Fourier {
+            preparation.smoothing = SmoothingMethod::Fourier {
                 period: self.period,
             };
         }
     }
 
     /// Where it is, beside others of its kind.
-    pub(super) fn place(self) -> String {
+    pub(super) fn frequency_text(self) -> String {
         match self.harmonics() {
             Some(1) => "1 harmonic".to_owned(),
             Some(n) => format!("{n} harmonics"),
@@ -61,20 +61,20 @@ impl Smoother {
             Some(period) => format!(
                 "is taken for a Fourier series of period {} s with {}",
                 significant(period, 5),
-                self.place()
+                self.frequency_text()
             ),
-            None => format!("is smoothed at {}", self.place()),
+            None => format!("is smoothed at {}", self.frequency_text()),
         }
     }
 }
 
 /// Series up to a frequency, Hz, of ever fewer harmonics.
-pub(super) fn series_up_to(highest: f64, period: f64) -> Vec<Smoother> {
-    let mut harmonics = whole(highest * period).clamp(1, MOST_HARMONICS);
+pub(super) fn series_up_to(highest: f64, period: f64) -> Vec<SmootherCandidate> {
+    let mut harmonics = floor_to_count(highest * period).clamp(1, MOST_HARMONICS);
     let mut ladder = Vec::new();
     while harmonics > 0 {
-        ladder.push(Smoother::series(period, harmonics));
-        harmonics = whole(harmonics as f64 / FEWER);
+        ladder.push(SmootherCandidate::series(period, harmonics));
+        harmonics = floor_to_count(harmonics as f64 / FEWER);
     }
     ladder
 }
@@ -85,6 +85,6 @@ pub(super) fn series_up_to(highest: f64, period: f64) -> Vec<Smoother> {
     clippy::cast_sign_loss,
     reason = "a float becomes the nearest count there is"
 )]
-pub(super) fn whole(value: f64) -> usize {
+pub(super) fn floor_to_count(value: f64) -> usize {
     value as usize
 }

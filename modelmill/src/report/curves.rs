@@ -8,10 +8,10 @@ use std::fmt::Write as _;
 
 use serde_json::json;
 
-use super::draw::{Axis, LEFT, Picture, RIGHT, WIDTH, attribute, line, range, with_room};
+use super::draw::{PlotAxis, LEFT, SvgPicture, RIGHT, WIDTH, attribute, line, range, with_room};
 use super::units::force_unit;
-use crate::diagnose::{Along, Version};
-use crate::text::svg::{escape, thinned};
+use crate::diagnose::{ForceComparison, ModelVersion};
+use crate::text::svg::{escape, thin_out};
 
 /// Values that all curves of a page may have together.
 const BUDGET: usize = 420_000;
@@ -24,7 +24,7 @@ pub(crate) const MOST_RUNS: usize = 6;
 /// Height of a panel.
 const HEIGHT: f64 = 190.0;
 
-struct Curve {
+struct PlotCurve {
     name: String,
     class: &'static str,
     span: [f64; 2],
@@ -33,7 +33,7 @@ struct Curve {
 
 /// Measured and calculated forces over time and their errors, of all recordings, those of the check first and open; `names` are
 /// those of both models' curves. The same numbers stand beside them for the script of pages.
-pub fn section(before: &Version, after: Option<&Version>, names: [&str; 2]) -> String {
+pub fn section(before: &ModelVersion, after: Option<&ModelVersion>, names: [&str; 2]) -> String {
     let mut order: Vec<usize> = (0..before.runs.len()).collect();
     order.sort_by_key(|k| !before.runs[*k].is_check);
     let shown = order.len().min(MOST_RUNS);
@@ -58,7 +58,7 @@ pub fn section(before: &Version, after: Option<&Version>, names: [&str; 2]) -> S
             "<details class=\"run\"{open} data-curves=\"run{k}\">\n<summary>{}</summary>",
             escape(&title)
         );
-        html.push_str(&of_run(before, after, names, *k, most));
+        html.push_str(&run_panels(before, after, names, *k, most));
         html.push_str("</details>\n");
     }
     if shown < order.len() {
@@ -71,9 +71,9 @@ pub fn section(before: &Version, after: Option<&Version>, names: [&str; 2]) -> S
     html
 }
 
-fn of_run(
-    before: &Version,
-    after: Option<&Version>,
+fn run_panels(
+    before: &ModelVersion,
+    after: Option<&ModelVersion>,
     names: [&str; 2],
     k: usize,
     most: usize,
@@ -84,7 +84,7 @@ fn of_run(
         let unit = force_unit(&before.model, d);
         for (title, curves) in panels(before, after, names, k, d, drive) {
             let title = format!("{title}, {unit}");
-            html.push_str(&still(&title, &curves));
+            html.push_str(&static_picture(&title, &curves));
             let curves: Vec<_> = curves.iter().map(|curve| pack(curve, most)).collect();
             packed.push(json!({ "title": title, "unit": unit, "curves": curves }));
         }
@@ -101,14 +101,14 @@ fn of_run(
 
 /// Forces of a drive, and below them their errors.
 fn panels(
-    before: &Version,
-    after: Option<&Version>,
+    before: &ModelVersion,
+    after: Option<&ModelVersion>,
     names: [&str; 2],
     k: usize,
     d: usize,
     drive: &str,
-) -> [(String, Vec<Curve>); 2] {
-    let curve = |name: &str, class, run: &Along, values: Vec<f64>| Curve {
+) -> [(String, Vec<PlotCurve>); 2] {
+    let curve = |name: &str, class, run: &ForceComparison, values: Vec<f64>| PlotCurve {
         name: name.to_owned(),
         class,
         span: [
@@ -137,13 +137,13 @@ fn panels(
 }
 
 /// The picture without any script.
-fn still(title: &str, curves: &[Curve]) -> String {
+fn static_picture(title: &str, curves: &[PlotCurve]) -> String {
     let spans: Vec<f64> = curves.iter().flat_map(|c| c.span).collect();
     let time = range(&spans);
     let values = with_room(range(curves.iter().flat_map(|c| &c.values)), 0.05);
-    let x = Axis::new(time, [LEFT, WIDTH - RIGHT]);
-    let y = Axis::new(values, [HEIGHT - 34.0, 8.0]);
-    let mut picture = Picture::new(WIDTH, HEIGHT);
+    let x = PlotAxis::new(time, [LEFT, WIDTH - RIGHT]);
+    let y = PlotAxis::new(values, [HEIGHT - 34.0, 8.0]);
+    let mut picture = SvgPicture::new(WIDTH, HEIGHT);
     picture.frame(&x, &y, "time, s", [9, 4]);
     for curve in curves {
         picture.path(
@@ -171,9 +171,9 @@ fn still(title: &str, curves: &[Curve]) -> String {
 }
 
 /// A curve for the script: the number that a step stands for, and the steps.
-fn pack(curve: &Curve, most: usize) -> serde_json::Value {
+fn pack(curve: &PlotCurve, most: usize) -> serde_json::Value {
     let values = &curve.values;
-    let kept: Vec<f64> = thinned(values, most).into_iter().map(|(_, v)| v).collect();
+    let kept: Vec<f64> = thin_out(values, most).into_iter().map(|(_, v)| v).collect();
     let [low, high] = range(&kept);
     let (low, step) = if high > low {
         (low, (high - low) / 65_534.0)
@@ -250,7 +250,7 @@ mod tests {
         let mut values = vec![0.0; 50_000];
         values[31_234] = 7.0;
         values[100] = -3.0;
-        let curve = Curve {
+        let curve = PlotCurve {
             name: "error".to_owned(),
             class: "c-before",
             span: [0.0, 10.0],

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use crate::text::svg::{escape, thinned};
+use crate::text::svg::{escape, thin_out};
 
 /// Width of a picture in its own units.
 pub(crate) const WIDTH: f64 = 860.0;
@@ -13,7 +13,7 @@ pub(crate) const RIGHT: f64 = 14.0;
 
 /// An axis from one value to another over a stretch of the picture.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Axis {
+pub(crate) struct PlotAxis {
     pub from: f64,
     pub to: f64,
     pub start: f64,
@@ -22,7 +22,7 @@ pub(crate) struct Axis {
     pub log: bool,
 }
 
-impl Axis {
+impl PlotAxis {
     /// An axis; one that has no length gets some.
     pub(crate) fn new(range: [f64; 2], pixels: [f64; 2]) -> Self {
         let [mut from, mut to] = range;
@@ -53,7 +53,7 @@ impl Axis {
     }
 
     /// Where a value lies, kept within the axis.
-    pub(crate) fn at(&self, value: f64) -> f64 {
+    pub(crate) fn position(&self, value: f64) -> f64 {
         let share = if self.log {
             (value.max(1e-300) / self.from).ln() / (self.to / self.from).ln()
         } else {
@@ -149,13 +149,13 @@ fn label(value: f64, step: f64) -> String {
 }
 
 /// A picture as it grows.
-pub(crate) struct Picture {
+pub(crate) struct SvgPicture {
     body: String,
     width: f64,
     height: f64,
 }
 
-impl Picture {
+impl SvgPicture {
     /// An empty one.
     pub(crate) fn new(width: f64, height: f64) -> Self {
         Self {
@@ -166,11 +166,11 @@ impl Picture {
     }
 
     /// Grid, ticks and a frame around a pair of axes; `x` may be without labels.
-    pub(crate) fn frame(&mut self, x: &Axis, y: &Axis, title: &str, n_ticks: [usize; 2]) {
+    pub(crate) fn frame(&mut self, x: &PlotAxis, y: &PlotAxis, title: &str, n_ticks: [usize; 2]) {
         let (left, right) = (x.start, x.end);
         let (bottom, top) = (y.start, y.end);
         for (value, label) in x.ticks(n_ticks[0]) {
-            let at = x.at(value);
+            let at = x.position(value);
             let _ = write!(
                 self.body,
                 r#"<path class="grid" d="M{at:.1} {top:.1}V{bottom:.1}"/><text class="tick" x="{at:.1}" y="{:.1}" text-anchor="middle">{label}</text>"#,
@@ -178,7 +178,7 @@ impl Picture {
             );
         }
         for (value, label) in y.ticks(n_ticks[1]) {
-            let at = y.at(value);
+            let at = y.position(value);
             let _ = write!(
                 self.body,
                 r#"<path class="grid" d="M{left:.1} {at:.1}H{right:.1}"/><text class="tick" x="{:.1}" y="{:.1}" text-anchor="end">{label}</text>"#,
@@ -255,17 +255,17 @@ pub(crate) fn attribute(text: &str) -> String {
 }
 
 /// A curve over an axis, thinned to what can be seen; values that are no numbers are gaps.
-pub(crate) fn line(values: &[f64], x: &Axis, span: [f64; 2], y: &Axis, points: usize) -> String {
+pub(crate) fn line(values: &[f64], x: &PlotAxis, span: [f64; 2], y: &PlotAxis, points: usize) -> String {
     let last = values.len().max(2) - 1;
     let mut d = String::new();
     let mut pen = 'M';
-    for (i, value) in thinned(values, points) {
+    for (i, value) in thin_out(values, points) {
         if !value.is_finite() {
             pen = 'M';
             continue;
         }
         let at = span[0] + (span[1] - span[0]) * i as f64 / last as f64;
-        let _ = write!(d, "{pen}{:.0} {:.1}", x.at(at), y.at(value));
+        let _ = write!(d, "{pen}{:.0} {:.1}", x.position(at), y.position(value));
         pen = 'L';
     }
     d
@@ -291,28 +291,28 @@ mod tests {
 
     #[test]
     fn ticks_are_round_and_within_the_axis() {
-        let axis = Axis::new([-0.37, 1.13], [0.0, 100.0]);
+        let axis = PlotAxis::new([-0.37, 1.13], [0.0, 100.0]);
         let labels: Vec<String> = axis.ticks(6).into_iter().map(|(_, l)| l).collect();
         assert_eq!(labels, ["0", "0.5", "1.0"]);
         // Few ticks are two at least.
-        let axis = Axis::new([-4.5, 4.5], [0.0, 100.0]);
+        let axis = PlotAxis::new([-4.5, 4.5], [0.0, 100.0]);
         let labels: Vec<String> = axis.ticks(2).into_iter().map(|(_, l)| l).collect();
         assert_eq!(
             labels,
             ["-4", "-2", "0", "2", "4"].map(|l| l.replace('-', "\u{2212}"))[..]
         );
-        let axis = Axis::decades([3e-4, 0.2], [0.0, 100.0]);
+        let axis = PlotAxis::decades([3e-4, 0.2], [0.0, 100.0]);
         let ticks: Vec<f64> = axis.ticks(6).into_iter().map(|(v, _)| v).collect();
         assert_eq!(ticks.len(), 3);
-        assert!((axis.at(0.2) - 100.0).abs() < 1e-9 && axis.at(3e-4).abs() < 1e-9);
+        assert!((axis.position(0.2) - 100.0).abs() < 1e-9 && axis.position(3e-4).abs() < 1e-9);
     }
 
     #[test]
     fn odd_ranges_do_no_harm() {
         for range in [[0.0, 0.0], [f64::NAN, 1.0], [5.0, 5.0], [1e300, -1e300]] {
-            let axis = Axis::new(range, [0.0, 100.0]);
+            let axis = PlotAxis::new(range, [0.0, 100.0]);
             assert!(
-                axis.at(0.0).is_finite() && axis.ticks(5).len() < 20,
+                axis.position(0.0).is_finite() && axis.ticks(5).len() < 20,
                 "{range:?}"
             );
         }

@@ -1,9 +1,9 @@
 //! The ladder: errors on fit and check step by step on an axis of decades, against the noise of the forces.
 
-use modelmill_identify::diagnose::Rung;
+use modelmill_identify::diagnose::SelectionStep;
 
-use super::draw::{Axis, Picture, WIDTH};
-use crate::diagnose::words::{self, Judged};
+use super::draw::{PlotAxis, SvgPicture, WIDTH};
+use crate::diagnose::words::{self, ValidationMethod};
 use crate::text::table::percent;
 
 /// Least height of a step, and that of a line of its label.
@@ -15,7 +15,7 @@ const LEFT: f64 = 290.0;
 const LETTERS: usize = 38;
 
 /// The picture.
-pub(crate) fn picture(ladder: &[Rung], noise: f64, judged: Judged) -> String {
+pub(crate) fn picture(ladder: &[SelectionStep], noise: f64, judged: ValidationMethod) -> String {
     let errors = ladder.iter().flat_map(|rung| [rung.fit, rung.check]);
     let all: Vec<f64> = errors.chain([noise]).filter(|e| *e > 0.0).collect();
     let low = all.iter().copied().fold(f64::INFINITY, f64::min);
@@ -31,12 +31,12 @@ pub(crate) fn picture(ladder: &[Rung], noise: f64, judged: Judged) -> String {
     let row = ROW.max(LINE * longest as f64 + 8.0);
     let bottom = TOP + row * ladder.len() as f64;
     let percents = [100.0 * low / 1.6, 100.0 * high * 1.6];
-    let x = Axis::decades(percents, [LEFT, WIDTH - 110.0]);
-    let y = Axis::new([0.0, 1.0], [bottom, TOP]);
-    let mut picture = Picture::new(WIDTH, bottom + 40.0);
+    let x = PlotAxis::decades(percents, [LEFT, WIDTH - 110.0]);
+    let y = PlotAxis::new([0.0, 1.0], [bottom, TOP]);
+    let mut picture = SvgPicture::new(WIDTH, bottom + 40.0);
     picture.frame(&x, &y, "error / force, %", [7, 0]);
     if noise > 0.0 {
-        let at = x.at(100.0 * noise);
+        let at = x.position(100.0 * noise);
         picture.path("noise", &format!("M{at:.1} {TOP:.1}V{bottom:.1}"));
         let anchor = if at > 0.5 * (x.start + x.end) {
             "end"
@@ -54,7 +54,7 @@ pub(crate) fn picture(ladder: &[Rung], noise: f64, judged: Judged) -> String {
     let mut last: Option<[f64; 3]> = None;
     for (k, rung) in ladder.iter().enumerate() {
         let middle = TOP + row * (k as f64 + 0.5);
-        let [fit, check] = [rung.fit, rung.check].map(|e| x.at(100.0 * e));
+        let [fit, check] = [rung.fit, rung.check].map(|e| x.position(100.0 * e));
         if let Some([fit_before, check_before, before]) = last {
             picture.path(
                 "rung c-fit",
@@ -83,7 +83,7 @@ pub(crate) fn picture(ladder: &[Rung], noise: f64, judged: Judged) -> String {
             "tick c-after",
             [right, middle + 12.0],
             "start",
-            &format!("{} {}", judged.short(), percent(Some(rung.check))),
+            &format!("{} {}", judged.label(), percent(Some(rung.check))),
         );
         for (i, line) in labels[k].iter().enumerate() {
             let up = 0.5 * LINE * (labels[k].len() as f64 - 1.0);

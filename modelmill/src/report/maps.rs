@@ -3,9 +3,9 @@
 
 use std::fmt::Write as _;
 
-use super::draw::{Axis, Picture, range};
+use super::draw::{PlotAxis, SvgPicture, range};
 use super::units::{force_unit, variable_unit};
-use crate::diagnose::Version;
+use crate::diagnose::ModelVersion;
 use crate::text::svg::escape;
 use crate::text::table::significant;
 
@@ -17,16 +17,16 @@ const SHADES: usize = 9;
 const LEAST: usize = 2;
 
 /// A variable along the recordings that are judged.
-pub(crate) type Variable = (String, Vec<f64>);
+pub(crate) type MapVariable = (String, Vec<f64>);
 
 /// Where each sample lies in a map; the cells of both variables.
-struct Grid {
+struct ErrorGrid {
     x: [f64; 2],
     y: [f64; 2],
     cells: Vec<usize>,
 }
 
-impl Grid {
+impl ErrorGrid {
     fn new(x: &[f64], y: &[f64]) -> Option<Self> {
         let (of_x, of_y) = (range(x), range(y));
         if !(of_x[1] > of_x[0] && of_y[1] > of_y[0]) {
@@ -63,7 +63,7 @@ impl Grid {
     }
 
     /// How much of the spread of the squared error is between cells, less what as many cells would show by chance.
-    fn gathers(&self, error: &[f64]) -> f64 {
+    fn error_concentration(&self, error: &[f64]) -> f64 {
         let n = error.len() as f64;
         let mean = error.iter().map(|e| e * e).sum::<f64>() / n;
         let total: f64 = error.iter().map(|e| (e * e - mean).powi(2)).sum();
@@ -83,7 +83,7 @@ impl Grid {
 }
 
 /// Pairs of variables that may explain an error: a motion and its rate. Two positions would only retrace the path.
-fn pairs(variables: &[Variable]) -> Vec<(usize, usize)> {
+fn pairs(variables: &[MapVariable]) -> Vec<(usize, usize)> {
     let at = |name: &str| variables.iter().position(|(n, _)| n == name);
     let mut pairs = Vec::new();
     for (i, (name, _)) in variables.iter().enumerate() {
@@ -102,24 +102,24 @@ fn pairs(variables: &[Variable]) -> Vec<(usize, usize)> {
 }
 
 /// A figure for each drive.
-pub(crate) fn figures(before: &Version, after: Option<&Version>, variables: &[Variable]) -> String {
-    let judged = before.judged();
+pub(crate) fn figures(before: &ModelVersion, after: Option<&ModelVersion>, variables: &[MapVariable]) -> String {
+    let judged = before.validation_runs();
     let mut html = String::new();
     for (d, drive) in before.model.drives().iter().enumerate() {
         let error = before.errors(&judged, d);
         // With a delay the model with effects has other samples.
         let rest = after.map(|after| after.errors(&judged, d));
         let rest = rest.filter(|rest| rest.len() == error.len());
-        let mut best: Option<(f64, usize, usize, Grid)> = None;
+        let mut best: Option<(f64, usize, usize, ErrorGrid)> = None;
         for (i, j) in pairs(variables) {
             let (x, y) = (&variables[i].1, &variables[j].1);
             if x.len() != error.len() || y.len() != error.len() {
                 continue;
             }
-            let Some(grid) = Grid::new(x, y) else {
+            let Some(grid) = ErrorGrid::new(x, y) else {
                 continue;
             };
-            let gathers = grid.gathers(&error);
+            let gathers = grid.error_concentration(&error);
             if best.as_ref().is_none_or(|(most, ..)| gathers > *most) {
                 best = Some((gathers, i, j, grid));
             }
@@ -156,7 +156,7 @@ pub(crate) fn figures(before: &Version, after: Option<&Version>, variables: &[Va
 
 fn picture(
     maps: &[(&str, Vec<Option<f64>>)],
-    grid: &Grid,
+    grid: &ErrorGrid,
     names: &[String; 2],
     unit: &str,
 ) -> String {
@@ -165,11 +165,11 @@ fn picture(
         .iter()
         .flat_map(|(_, map)| map.iter().flatten())
         .fold(0.0_f64, |m, v| m.max(*v));
-    let mut picture = Picture::new(860.0, top + height + 66.0);
+    let mut picture = SvgPicture::new(860.0, top + height + 66.0);
     for (k, (title, map)) in maps.iter().enumerate() {
         let left = 62.0 + k as f64 * (width + 62.0);
-        let x = Axis::new(grid.x, [left, left + width]);
-        let y = Axis::new(grid.y, [top + height, top]);
+        let x = PlotAxis::new(grid.x, [left, left + width]);
+        let y = PlotAxis::new(grid.y, [top + height, top]);
         picture.text("label", [left, top - 8.0], "start", title);
         let (w, h) = (width / COLUMNS as f64, height / ROWS as f64);
         let mut shades = vec![String::new(); SHADES];
@@ -232,15 +232,15 @@ mod tests {
             .zip(&rate)
             .map(|(q, v)| if *q > 0.5 && *v < 0.0 { 3.0 } else { 0.1 })
             .collect();
-        let right = Grid::new(&q, &rate).unwrap().gathers(&error);
-        let wrong = Grid::new(&other, &rate).unwrap().gathers(&error);
+        let right = ErrorGrid::new(&q, &rate).unwrap().error_concentration(&error);
+        let wrong = ErrorGrid::new(&other, &rate).unwrap().error_concentration(&error);
         assert!(right > 0.8 && wrong < 0.5 * right, "{right} {wrong}");
-        assert!(Grid::new(&q, &vec![1.0; q.len()]).is_none());
+        assert!(ErrorGrid::new(&q, &vec![1.0; q.len()]).is_none());
     }
 
     #[test]
     fn pairs_are_motions_with_their_rates() {
-        let variables: Vec<Variable> = ["q_d", "q_dd", "q", "left_length", "left_d", "left"]
+        let variables: Vec<MapVariable> = ["q_d", "q_dd", "q", "left_length", "left_d", "left"]
             .into_iter()
             .map(|name| (name.to_owned(), Vec::new()))
             .collect();

@@ -17,23 +17,23 @@ mod spectrum;
 mod tables;
 mod units;
 
-use crate::diagnose::{Findings, Version, words};
+use crate::diagnose::{DiagnosisFindings, ModelVersion, words};
 
-pub use atlas::{Pictured, atlas};
+pub use atlas::{AtlasMechanism, atlas};
 pub use curves::section as curves;
 pub use modelmill_draw::page::{begin as begin_page, end as end_page};
 pub use page::{STYLE, page, scripts};
-pub use runs::{over_runs, runs_page};
-pub use tables::{Cell, table};
+pub use runs::{parameter_history, runs_page};
+pub use tables::{TableCell, table};
 
 /// The ladder of a diagnosis as a picture: errors of fit and check step by step, beside the noise.
-pub fn ladder(findings: &Findings) -> String {
+pub fn ladder(findings: &DiagnosisFindings) -> String {
     let diagnosis = &findings.diagnosis;
-    ladder::picture(&diagnosis.ladder, diagnosis.noise_floor, findings.judged)
+    ladder::picture(&diagnosis.steps, diagnosis.noise_floor, findings.validation)
 }
 
 /// Which colour is which model.
-fn keys(with_after: bool) -> &'static str {
+fn legend(with_after: bool) -> &'static str {
     if with_after {
         "<span class=\"key c-before\">as it is</span> <span class=\"key c-after\">with the effects</span>"
     } else {

@@ -2,37 +2,37 @@
 
 use std::fmt::Write as _;
 
-use modelmill_codegen::review::Format;
+use modelmill_codegen::review::PageFormat;
 use modelmill_draw::page as pages;
-use modelmill_identify::diagnose::Verdict;
+use modelmill_identify::diagnose::DiagnosisVerdict;
 
-use super::{Findings, curves, keys, ladder, maps, regions, spectrum, tables, words};
-use crate::compare::Places;
+use super::{DiagnosisFindings, curves, legend, ladder, maps, regions, spectrum, tables, words};
+use crate::compare::ErrorLocations;
 use crate::error::Outcome;
-use crate::print::{Spelling, laws as told};
+use crate::print::{AdviceFormatter, laws as told};
 use crate::text::svg::escape;
 use crate::text::table::percent;
 
 /// The page's text; `spelling` says how its reader asks for what it advises.
 ///
 /// Fails only when whoever watches stops it.
-pub fn page(findings: &Findings, spelling: &dyn Spelling) -> Outcome<String> {
-    let last = findings.last();
-    let equations = last.model.equations(Format::Html)?.text;
+pub fn page(findings: &DiagnosisFindings, spelling: &dyn AdviceFormatter) -> Outcome<String> {
+    let last = findings.final_version();
+    let equations = last.model.equations(PageFormat::Html)?.text;
     let name = &findings.before.model.name;
     let title = format!("{name}: what the model lacks");
     let mut page = pages::begin(&title);
     let sections = [
-        ("ladder", "How the error falls", the_ladder(findings)),
+        ("ladder", "How the error falls", ladder_section(findings)),
         (
             "found",
             "What was found, and how to go on",
-            found(findings, spelling),
+            missing_section(findings, spelling),
         ),
         (
             "curves",
             "Measured and calculated forces",
-            the_curves(findings),
+            curves_section(findings),
         ),
         ("where", "Where the error lives", location(findings)),
         (
@@ -47,7 +47,7 @@ pub fn page(findings: &Findings, spelling: &dyn Spelling) -> Outcome<String> {
             "What was done to the recordings",
             tables::data(findings, spelling),
         ),
-        ("equations", "Equations", embedded(findings, &equations)),
+        ("equations", "Equations", embed_equations(findings, &equations)),
     ];
     page.push_str("<nav>");
     for (id, title, _) in &sections {
@@ -82,25 +82,25 @@ pub fn scripts() -> impl Iterator<Item = &'static str> {
 }
 
 /// What stands between two marks; empty if they are missing.
-pub(super) fn between<'a>(text: &'a str, from: &str, to: &str) -> &'a str {
+pub(super) fn text_between<'a>(text: &'a str, from: &str, to: &str) -> &'a str {
     let inner = text
         .split_once(from)
         .and_then(|(_, rest)| rest.split_once(to));
     inner.map_or("", |(inner, _)| inner)
 }
 
-fn summary(findings: &Findings) -> String {
+fn summary(findings: &DiagnosisFindings) -> String {
     let diagnosis = &findings.diagnosis;
     let (class, word) = match diagnosis.verdict {
-        Verdict::Adequate => ("adequate", "adequate"),
-        Verdict::MissingEffect => ("missing", "an effect is missing"),
-        Verdict::Unexplained => ("unexplained", "unexplained"),
+        DiagnosisVerdict::Adequate => ("adequate", "adequate"),
+        DiagnosisVerdict::MissingEffect => ("missing", "an effect is missing"),
+        DiagnosisVerdict::Unexplained => ("unexplained", "unexplained"),
     };
-    let says = words::verdict(diagnosis, &findings.before.model.drives(), findings.judged);
+    let says = words::verdict(diagnosis, &findings.before.model.drives(), findings.validation);
     let mut tiles = vec![("verdict", word.to_owned())];
-    if let (Some(first), Some(last)) = (diagnosis.ladder.first(), diagnosis.ladder.last()) {
+    if let (Some(first), Some(last)) = (diagnosis.steps.first(), diagnosis.steps.last()) {
         tiles.push(("error as it is", percent(Some(first.check))));
-        if diagnosis.ladder.len() > 1 {
+        if diagnosis.steps.len() > 1 {
             tiles.push(("with the effects", percent(Some(last.check))));
         }
     }
@@ -116,22 +116,22 @@ fn summary(findings: &Findings) -> String {
     )
 }
 
-fn the_ladder(findings: &Findings) -> String {
+fn ladder_section(findings: &DiagnosisFindings) -> String {
     let diagnosis = &findings.diagnosis;
     format!(
         "<figure class=\"still\"><figcaption><b>Error relative to the force</b> <span class=\"key c-fit\">fit</span> \
          <span class=\"key c-after\">{}</span></figcaption>\n{}</figure>\n{}\n\
          <p>An error is the root of the squared difference of measured and calculated forces over the squared measured ones. \
          Steps were judged {}.</p>\n{}",
-        findings.judged.words(),
-        ladder::picture(&diagnosis.ladder, diagnosis.noise_floor, findings.judged),
+        findings.validation.phrase(),
+        ladder::picture(&diagnosis.steps, diagnosis.noise_floor, findings.validation),
         tables::ladder(findings),
-        findings.judged.words(),
+        findings.validation.phrase(),
         tables::drives(findings)
     )
 }
 
-fn found(findings: &Findings, spelling: &dyn Spelling) -> String {
+fn missing_section(findings: &DiagnosisFindings, spelling: &dyn AdviceFormatter) -> String {
     let mut html = effects(findings, spelling);
     if !findings.laws.is_empty() {
         html.push_str(&laws(findings, spelling));
@@ -140,7 +140,7 @@ fn found(findings: &Findings, spelling: &dyn Spelling) -> String {
 }
 
 /// Laws that would explain what is left.
-fn laws(findings: &Findings, spelling: &dyn Spelling) -> String {
+fn laws(findings: &DiagnosisFindings, spelling: &dyn AdviceFormatter) -> String {
     let model = &findings.before.model;
     let mut html = format!(
         "<h3>Which law would explain what is left</h3>\n<p>{}</p>\n",
@@ -151,20 +151,20 @@ fn laws(findings: &Findings, spelling: &dyn Spelling) -> String {
         let _ = writeln!(
             html,
             "<p><code>{}</code> with {}: it {}</p>",
-            escape(&law.says()),
+            escape(&law.label()),
             escape(&told::values(law)),
             escape(&told::gain(law))
         );
         if !hypothesis.near_ties.is_empty() {
             html.push_str("<p>As near to these recordings are</p>\n<ul>\n");
             for tie in &hypothesis.near_ties {
-                let _ = writeln!(html, "<li><code>{}</code></li>", escape(&tie.says()));
+                let _ = writeln!(html, "<li><code>{}</code></li>", escape(&tie.label()));
             }
             html.push_str("</ul>\n");
         }
         match &law.entry {
             Some(entry) => {
-                let command = spelling.add_from(model, &entry.effect, told::LIBRARY);
+                let command = spelling.add_effect_from_library(model, &entry.effect, told::LIBRARY);
                 let _ = writeln!(
                     html,
                     "<p>As a library, <code>{}</code>, and with it:</p>\n<pre class=\"commands\"><code>{}</code></pre>\n\
@@ -175,20 +175,20 @@ fn laws(findings: &Findings, spelling: &dyn Spelling) -> String {
                 );
             }
             None => {
-                let _ = writeln!(html, "<p>{}</p>", escape(told::REMEMBERS));
+                let _ = writeln!(html, "<p>{}</p>", escape(told::PATH_DEPENDENT_NOTE));
             }
         }
     }
     html
 }
 
-fn effects(findings: &Findings, spelling: &dyn Spelling) -> String {
-    if findings.to_add().is_empty() {
-        if let Some(says) = findings.beside_the_file() {
+fn effects(findings: &DiagnosisFindings, spelling: &dyn AdviceFormatter) -> String {
+    if findings.entries_to_add().is_empty() {
+        if let Some(says) = findings.further_action() {
             return format!("{}<p>{says}</p>\n", tables::effects(findings));
         }
         let says = match findings.diagnosis.verdict {
-            Verdict::Adequate => {
+            DiagnosisVerdict::Adequate => {
                 "Nothing needs to be added. The parameters below are those that the recordings ask for."
             }
             _ => {
@@ -203,14 +203,14 @@ fn effects(findings: &Findings, spelling: &dyn Spelling) -> String {
         let _ = writeln!(
             html,
             "<p class=\"alias\">The model with these effects could not be made: {}</p>",
-            escape(&spelling.text(says))
+            escape(&spelling.format_text(says))
         );
     }
     let model = &findings.before.model;
     let mut commands: Vec<String> = findings
-        .to_add()
+        .entries_to_add()
         .iter()
-        .map(|entry| spelling.add(model, entry))
+        .map(|entry| spelling.add_effect(model, entry))
         .collect();
     commands.push(spelling.identify(model));
     let _ = writeln!(
@@ -221,7 +221,7 @@ fn effects(findings: &Findings, spelling: &dyn Spelling) -> String {
     html
 }
 
-fn the_curves(findings: &Findings) -> String {
+fn curves_section(findings: &DiagnosisFindings) -> String {
     format!(
         "<p class=\"script-only\">Turn the wheel over a picture to zoom, drag to move, drag with Shift to mark a stretch, double \
          click for the whole. With the keyboard: + and −, arrows, 0. A click on a name hides its curve, one on a number of a \
@@ -234,7 +234,7 @@ fn the_curves(findings: &Findings) -> String {
     )
 }
 
-fn location(findings: &Findings) -> String {
+fn location(findings: &DiagnosisFindings) -> String {
     let after = findings.after.as_ref().ok();
     let mut html = String::new();
     html.push_str(&sentences(
@@ -245,7 +245,7 @@ fn location(findings: &Findings) -> String {
         let _ = writeln!(
             html,
             "<p>Each picture shows mean and standard deviation of the error over its variable, the region shaded. {}</p>",
-            keys(after.is_some())
+            legend(after.is_some())
         );
         html.push_str(&regions::figures(
             &findings.places.regions,
@@ -254,7 +254,7 @@ fn location(findings: &Findings) -> String {
             &findings.variables,
         ));
     }
-    if let Some(left) = &findings.left {
+    if let Some(left) = &findings.residual_locations {
         html.push_str("<h3>What is left with the effects</h3>\n");
         html.push_str(&sentences(left, "What is left"));
         if !left.regions.is_empty() {
@@ -275,7 +275,7 @@ fn location(findings: &Findings) -> String {
 }
 
 /// What there is to say where there is no region.
-fn sentences(places: &Places, what: &str) -> String {
+fn sentences(places: &ErrorLocations, what: &str) -> String {
     let mut html = String::new();
     if !places.rounding.is_empty() {
         let _ = writeln!(
@@ -293,7 +293,7 @@ fn sentences(places: &Places, what: &str) -> String {
     html
 }
 
-fn candidates(findings: &Findings) -> String {
+fn candidates(findings: &DiagnosisFindings) -> String {
     format!(
         "<p>Every kind of the library at every place that it fits. The first share is of the squared error of the model as it is; \
          the gain is of what is left beside the effects that were found, for a found one what would be lost without it.\
@@ -302,7 +302,7 @@ fn candidates(findings: &Findings) -> String {
     )
 }
 
-fn parameters(findings: &Findings) -> String {
+fn parameters(findings: &DiagnosisFindings) -> String {
     if findings.before.identified.is_none() {
         return tables::parameters(&findings.before);
     }
@@ -326,8 +326,8 @@ fn parameters(findings: &Findings) -> String {
 }
 
 /// The page of equations within this one: names of places on it get a prefix, headings go down two steps.
-fn embedded(findings: &Findings, page: &str) -> String {
-    let inner = between(page, "<main>", "</main>")
+fn embed_equations(findings: &DiagnosisFindings, page: &str) -> String {
+    let inner = text_between(page, "<main>", "</main>")
         .replace(" id=\"", " id=\"equations-")
         .replace("href=\"#", "href=\"#equations-");
     let mut inner = inner;

@@ -3,12 +3,12 @@
 use std::cmp::Ordering;
 use std::fmt::Write as _;
 
-use modelmill_identify::{Region, TIME_COLUMN};
+use modelmill_identify::{ErrorRegion, TIME_COLUMN};
 
-use super::draw::{Axis, Picture, range, with_room};
-use super::maps::Variable;
+use super::draw::{PlotAxis, SvgPicture, range, with_room};
+use super::maps::MapVariable;
 use super::units::{force_unit, variable_unit};
-use crate::diagnose::Version;
+use crate::diagnose::ModelVersion;
 use crate::model::Model;
 use crate::text::svg::escape;
 use crate::text::table::significant;
@@ -20,10 +20,10 @@ const LEFT: f64 = 58.0;
 
 /// A figure for each region of the error of the model as it is.
 pub(crate) fn figures(
-    regions: &[Region],
-    before: &Version,
-    after: Option<&Version>,
-    variables: &[Variable],
+    regions: &[ErrorRegion],
+    before: &ModelVersion,
+    after: Option<&ModelVersion>,
+    variables: &[MapVariable],
 ) -> String {
     let mut html = String::from("<div class=\"grid\">\n");
     for region in regions {
@@ -39,7 +39,7 @@ pub(crate) fn figures(
 }
 
 /// A region in one sentence; every number has its unit.
-pub(crate) fn sentence(region: &Region, model: &Model) -> String {
+pub(crate) fn sentence(region: &ErrorRegion, model: &Model) -> String {
     let unit = variable_unit(model, &region.variable);
     let [low, high] = region.range;
     let name = if region.variable == TIME_COLUMN {
@@ -72,14 +72,14 @@ pub(crate) fn sentence(region: &Region, model: &Model) -> String {
 }
 
 fn picture(
-    region: &Region,
-    before: &Version,
-    after: Option<&Version>,
-    variables: &[Variable],
+    region: &ErrorRegion,
+    before: &ModelVersion,
+    after: Option<&ModelVersion>,
+    variables: &[MapVariable],
 ) -> Option<String> {
     let model = &before.model;
     let d = model.drives().iter().position(|d| *d == region.channel)?;
-    let judged = before.judged();
+    let judged = before.validation_runs();
     // A stretch of time lies in one recording, which its sentence names if there are several.
     let runs: Vec<usize> = if region.variable == TIME_COLUMN {
         let named = |k: &usize| {
@@ -110,9 +110,9 @@ fn picture(
         curves.push(("c-after", after.errors(&runs, d)));
     }
     curves.retain(|(_, error)| error.len() == over.len());
-    let bins: Vec<(&str, Vec<Bin>)> = curves
+    let bins: Vec<(&str, Vec<ErrorBin>)> = curves
         .iter()
-        .map(|(class, error)| (*class, binned(&over, error)))
+        .map(|(class, error)| (*class, bin_errors(&over, error)))
         .collect();
     let bounds: Vec<f64> = bins
         .iter()
@@ -124,10 +124,10 @@ fn picture(
     if bounds.is_empty() {
         return None;
     }
-    let x = Axis::new(range(&over), [LEFT, WIDTH - 10.0]);
-    let y = Axis::new(with_room(range(&bounds), 0.06), [HEIGHT - 36.0, 8.0]);
-    let mut picture = Picture::new(WIDTH, HEIGHT);
-    let [low, high] = region.range.map(|v| x.at(v));
+    let x = PlotAxis::new(range(&over), [LEFT, WIDTH - 10.0]);
+    let y = PlotAxis::new(with_room(range(&bounds), 0.06), [HEIGHT - 36.0, 8.0]);
+    let mut picture = SvgPicture::new(WIDTH, HEIGHT);
+    let [low, high] = region.range.map(|v| x.position(v));
     picture.rect("region", [low, y.start], [high.max(low + 1.0), y.end]);
     let unit = variable_unit(model, &region.variable);
     let name = if region.variable == TIME_COLUMN {
@@ -140,11 +140,11 @@ fn picture(
     for (class, bins) in &bins {
         let (mut upper, mut lower, mut mean) = (String::new(), String::new(), String::new());
         for (k, bin) in bins.iter().enumerate() {
-            let at = x.at(bin.at);
+            let at = x.position(bin.at);
             let pen = if k == 0 { 'M' } else { 'L' };
-            let _ = write!(mean, "{pen}{at:.1} {:.1}", y.at(bin.mean));
-            let _ = write!(upper, "{pen}{at:.1} {:.1}", y.at(bin.mean + bin.spread));
-            lower = format!("L{at:.1} {:.1}{lower}", y.at(bin.mean - bin.spread));
+            let _ = write!(mean, "{pen}{at:.1} {:.1}", y.position(bin.mean));
+            let _ = write!(upper, "{pen}{at:.1} {:.1}", y.position(bin.mean + bin.spread));
+            lower = format!("L{at:.1} {:.1}{lower}", y.position(bin.mean - bin.spread));
         }
         picture.path(&format!("band {class}"), &format!("{upper}{lower}Z"));
         picture.path(&format!("curve {class}"), &mean);
@@ -153,14 +153,14 @@ fn picture(
 }
 
 /// A stretch of a variable: its middle, mean and standard deviation of the error there.
-struct Bin {
+struct ErrorBin {
     at: f64,
     mean: f64,
     spread: f64,
 }
 
 /// Mean and standard deviation of an error in stretches of equal length that hold at least three samples.
-fn binned(over: &[f64], error: &[f64]) -> Vec<Bin> {
+fn bin_errors(over: &[f64], error: &[f64]) -> Vec<ErrorBin> {
     let [low, high] = range(over);
     if high.partial_cmp(&low) != Some(Ordering::Greater) {
         return Vec::new();
@@ -183,7 +183,7 @@ fn binned(over: &[f64], error: &[f64]) -> Vec<Bin> {
     let bins = sums.iter().enumerate().filter(|(_, (n, _, _))| *n >= 3.0);
     bins.map(|(k, (n, sum, squares))| {
         let mean = sum / n;
-        Bin {
+        ErrorBin {
             at: low + (k as f64 + 0.5) / BINS as f64 * (high - low),
             mean,
             spread: (squares / n - mean * mean).max(0.0).sqrt(),
@@ -202,10 +202,10 @@ mod tests {
         let error: Vec<f64> = (0..4400)
             .map(|i| if i < 2200 { 1.0 } else { 5.0 } + if i % 2 == 0 { 0.5 } else { -0.5 })
             .collect();
-        let bins = binned(&over, &error);
+        let bins = bin_errors(&over, &error);
         assert_eq!(bins.len(), BINS);
         assert!((bins[3].mean - 1.0).abs() < 1e-9 && (bins[40].mean - 5.0).abs() < 1e-9);
         assert!(bins.iter().all(|b| (b.spread - 0.5).abs() < 1e-9));
-        assert!(binned(&[1.0; 50], &[1.0; 50]).is_empty());
+        assert!(bin_errors(&[1.0; 50], &[1.0; 50]).is_empty());
     }
 }

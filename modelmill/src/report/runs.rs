@@ -5,11 +5,11 @@ use std::fmt::Write as _;
 use modelmill_draw::page as pages;
 use modelmill_identify::ParameterInfo;
 
-use super::draw::{Axis, LEFT, Picture, RIGHT, WIDTH, range, with_room};
+use super::draw::{PlotAxis, LEFT, SvgPicture, RIGHT, WIDTH, range, with_room};
 use super::page::end;
-use super::tables::{Cell, table};
-use super::units::pretty;
-use crate::runs::{Changed, Compared, Fitted, SharedFit};
+use super::tables::{TableCell, table};
+use super::units::typographic_unit;
+use crate::runs::{RunChange, RunsComparison, FittedValue, SharedFit};
 use crate::text::svg::escape;
 use crate::text::table::{count, significant};
 
@@ -19,7 +19,7 @@ const HEIGHT: f64 = 170.0;
 const BARS: f64 = 2.0;
 
 /// The page's text.
-pub fn runs_page(compared: &Compared) -> String {
+pub fn runs_page(compared: &RunsComparison) -> String {
     let title = format!("{}: what changed between runs", compared.model);
     let mut page = pages::begin(&title);
     page.push_str(&summary(compared));
@@ -29,10 +29,10 @@ pub fn runs_page(compared: &Compared) -> String {
             "When something changed and stayed changed",
             points(compared),
         ),
-        ("against", "Every run against the first", against(compared)),
+        ("against", "Every run against the first", changes_table(compared)),
     ];
     if let Some(shared) = &compared.shared {
-        sections.push(("own", "One fit of all runs", own(shared)));
+        sections.push(("own", "One fit of all runs", shared_fit_section(shared)));
     }
     sections.push((
         "parameters",
@@ -50,7 +50,7 @@ pub fn runs_page(compared: &Compared) -> String {
     page
 }
 
-fn summary(compared: &Compared) -> String {
+fn summary(compared: &RunsComparison) -> String {
     let later = compared.runs.len() - 1;
     let changed = compared.runs.iter().skip(1);
     let changed = changed.filter(|run| !run.changes.is_empty()).count();
@@ -71,7 +71,7 @@ fn summary(compared: &Compared) -> String {
     format!("<p class=\"verdict {class}\">{}</p>\n", escape(&says))
 }
 
-fn said(changes: &[Changed]) -> String {
+fn changes_list(changes: &[RunChange]) -> String {
     let mut html = String::from("<ul>\n");
     for one in changes {
         let _ = write!(html, "<li>{}", escape(&one.says));
@@ -85,7 +85,7 @@ fn said(changes: &[Changed]) -> String {
     html
 }
 
-fn points(compared: &Compared) -> String {
+fn points(compared: &RunsComparison) -> String {
     if compared.points.is_empty() {
         return "<p>No base parameter changed and stayed changed over two or more runs.</p>\n"
             .to_owned();
@@ -97,17 +97,17 @@ fn points(compared: &Compared) -> String {
         if point.changes.is_empty() {
             html.push_str("<p>No single change in physics explains it.</p>\n");
         } else {
-            html.push_str(&said(&point.changes));
+            html.push_str(&changes_list(&point.changes));
         }
-        let rows: Vec<Vec<Cell>> = (point.steps.iter())
+        let rows: Vec<Vec<TableCell>> = (point.steps.iter())
             .map(|step| {
                 let info = &compared.parameters[step.parameter];
                 vec![
-                    Cell::text(&info.name),
+                    TableCell::text(&info.name),
                     value(Some(step.before)),
                     value(Some(step.now)),
-                    Cell::text(&pretty(&info.unit)),
-                    Cell::html(format!(
+                    TableCell::text(&typographic_unit(&info.unit)),
+                    TableCell::html(format!(
                         "<code class=\"expression\">{}</code>",
                         escape(&info.expression)
                     )),
@@ -123,27 +123,27 @@ fn points(compared: &Compared) -> String {
     html
 }
 
-fn value(fitted: Option<Fitted>) -> Cell {
+fn value(fitted: Option<FittedValue>) -> TableCell {
     match fitted {
-        Some(Fitted {
+        Some(FittedValue {
             value,
             deviation: Some(deviation),
-        }) => Cell::number(
+        }) => TableCell::number(
             &format!("{} ± {}", significant(value, 5), significant(deviation, 2)),
             value,
         ),
-        _ => Cell::text("not told"),
+        _ => TableCell::text("not told"),
     }
 }
 
-fn against(compared: &Compared) -> String {
-    let rows: Vec<Vec<Cell>> = (compared.runs.iter().enumerate())
+fn changes_table(compared: &RunsComparison) -> String {
+    let rows: Vec<Vec<TableCell>> = (compared.runs.iter().enumerate())
         .filter(|(_, run)| !run.changes.is_empty())
         .map(|(k, run)| {
             vec![
-                Cell::number(&format!("{}", k + 1), k as f64),
-                Cell::text(&run.file),
-                Cell::html(said(&run.changes)),
+                TableCell::number(&format!("{}", k + 1), k as f64),
+                TableCell::text(&run.file),
+                TableCell::html(changes_list(&run.changes)),
             ]
         })
         .collect();
@@ -157,7 +157,7 @@ fn against(compared: &Compared) -> String {
     )
 }
 
-fn own(shared: &SharedFit) -> String {
+fn shared_fit_section(shared: &SharedFit) -> String {
     let mut html = String::from(
         "<p>Base parameters are shared by all runs; these values are each run's own.</p>\n",
     );
@@ -165,20 +165,20 @@ fn own(shared: &SharedFit) -> String {
         html.push_str(
             "<p>True forces are the measured ones times these factors, by the known load.</p>\n",
         );
-        let rows: Vec<Vec<Cell>> = (shared.gains.iter())
-            .map(|(drive, gain)| vec![Cell::text(drive), value(Some(*gain))])
+        let rows: Vec<Vec<TableCell>> = (shared.gains.iter())
+            .map(|(drive, gain)| vec![TableCell::text(drive), value(Some(*gain))])
             .collect();
         html.push_str(&table("gains", &["drive", "#factor"], &rows));
     }
-    let rows: Vec<Vec<Cell>> = (shared.runs.iter())
+    let rows: Vec<Vec<TableCell>> = (shared.runs.iter())
         .flat_map(|(file, values)| {
             values.iter().map(move |one| {
                 vec![
-                    Cell::text(file),
-                    Cell::text(&one.of),
-                    Cell::text(&one.name),
+                    TableCell::text(file),
+                    TableCell::text(&one.quantity),
+                    TableCell::text(&one.name),
                     value(Some(one.value)),
-                    Cell::text(&pretty(&one.unit)),
+                    TableCell::text(&typographic_unit(&one.unit)),
                 ]
             })
         })
@@ -191,7 +191,7 @@ fn own(shared: &SharedFit) -> String {
     html
 }
 
-fn parameters(compared: &Compared) -> String {
+fn parameters(compared: &RunsComparison) -> String {
     let has_changed = |k: &usize| {
         let mut steps = compared.points.iter().flat_map(|point| &point.steps);
         steps.any(|step| step.parameter == *k)
@@ -200,7 +200,7 @@ fn parameters(compared: &Compared) -> String {
         compared
             .runs
             .iter()
-            .any(|run| told(run.alone[*k]).is_some())
+            .any(|run| known_value(run.alone[*k]).is_some())
     };
     let all = (0..compared.parameters.len()).filter(is_told);
     let (changed, same): (Vec<usize>, Vec<usize>) = all.partition(has_changed);
@@ -221,27 +221,27 @@ fn parameters(compared: &Compared) -> String {
 }
 
 /// A value that the run tells, with its deviation.
-fn told(fitted: Fitted) -> Option<[f64; 2]> {
+fn known_value(fitted: FittedValue) -> Option<[f64; 2]> {
     Some([fitted.value, fitted.deviation.filter(|d| *d > 0.0)?])
 }
 
 /// One base parameter over the runs.
-fn picture(compared: &Compared, k: usize) -> String {
+fn picture(compared: &RunsComparison, k: usize) -> String {
     let runs = &compared.runs;
     let known: Vec<(usize, [f64; 2])> = (runs.iter().enumerate())
-        .filter_map(|(at, run)| Some((at, told(run.alone[k])?)))
+        .filter_map(|(at, run)| Some((at, known_value(run.alone[k])?)))
         .collect();
     let steps = compared.points.iter().flat_map(|point| {
         let own = point.steps.iter().filter(|step| step.parameter == k);
         own.map(move |step| (point.run, [step.before.value, step.now.value]))
     });
     let steps: Vec<(usize, [f64; 2])> = steps.collect();
-    over_runs(&compared.parameters[k], "run", runs.len(), &known, &steps)
+    parameter_history(&compared.parameters[k], "run", runs.len(), &known, &steps)
 }
 
 /// A base parameter over `n` runs or days as a picture: values that are known, by place and with their deviations, and levels
 /// before and since each change, by the place from which on it is there.
-pub fn over_runs(
+pub fn parameter_history(
     info: &ParameterInfo,
     what: &str,
     n: usize,
@@ -251,26 +251,26 @@ pub fn over_runs(
     let ends: Vec<f64> = (known.iter())
         .flat_map(|(_, [x, d])| [x - BARS * d, x + BARS * d])
         .collect();
-    let x = Axis::new([0.5, n as f64 + 0.5], [LEFT, WIDTH - RIGHT]);
-    let y = Axis::new(with_room(range(&ends), 0.05), [HEIGHT - 40.0, 8.0]);
-    let mut picture = Picture::new(WIDTH, HEIGHT);
+    let x = PlotAxis::new([0.5, n as f64 + 0.5], [LEFT, WIDTH - RIGHT]);
+    let y = PlotAxis::new(with_room(range(&ends), 0.05), [HEIGHT - 40.0, 8.0]);
+    let mut picture = SvgPicture::new(WIDTH, HEIGHT);
     picture.frame(&x, &y, what, [n.min(12), 4]);
     for (at, [value, deviation]) in known {
-        let across = x.at(*at as f64 + 1.0);
-        let [low, high] = [-BARS, BARS].map(|b| y.at(value + b * deviation));
+        let across = x.position(*at as f64 + 1.0);
+        let [low, high] = [-BARS, BARS].map(|b| y.position(value + b * deviation));
         picture.path("curve c-fit", &format!("M{across:.1} {low:.1}V{high:.1}"));
-        picture.dot("dot c-before", [across, y.at(*value)], 2.4);
+        picture.dot("dot c-before", [across, y.position(*value)], 2.4);
     }
     for (i, (run, [before, now])) in steps.iter().enumerate() {
         let start = if i == 0 { 0 } else { steps[i - 1].0 };
         let end = steps.get(i + 1).map_or(n, |next| next.0);
-        let at = |run: usize| x.at(run as f64 + 0.5);
+        let at = |run: usize| x.position(run as f64 + 0.5);
         if i == 0 {
-            let level = y.at(*before);
+            let level = y.position(*before);
             let d = format!("M{:.1} {level:.1}H{:.1}", at(start), at(*run));
             picture.path("curve c-after", &d);
         }
-        let level = y.at(*now);
+        let level = y.position(*now);
         picture.path(
             "curve c-after",
             &format!("M{:.1} {level:.1}H{:.1}", at(*run), at(end)),
@@ -284,26 +284,26 @@ pub fn over_runs(
     format!(
         "<figure class=\"still\"><figcaption><b>{}</b> {} <code class=\"expression\">{}</code></figcaption>\n{}</figure>\n",
         escape(&info.name),
-        escape(&pretty(&info.unit)),
+        escape(&typographic_unit(&info.unit)),
         escape(&info.expression),
         picture.finish(&says)
     )
 }
 
-fn runs(compared: &Compared) -> String {
-    let mut rows: Vec<Vec<Cell>> = (compared.runs.iter().enumerate())
+fn runs(compared: &RunsComparison) -> String {
+    let mut rows: Vec<Vec<TableCell>> = (compared.runs.iter().enumerate())
         .map(|(k, run)| {
             vec![
-                Cell::number(&format!("{}", k + 1), k as f64),
-                Cell::text(&run.file),
-                Cell::number(&run.samples.to_string(), run.samples as f64),
-                Cell::number(&run.moved.len().to_string(), run.moved.len() as f64),
+                TableCell::number(&format!("{}", k + 1), k as f64),
+                TableCell::text(&run.file),
+                TableCell::number(&run.samples.to_string(), run.samples as f64),
+                TableCell::number(&run.moved.len().to_string(), run.moved.len() as f64),
             ]
         })
         .collect();
     rows.extend(compared.unread.iter().map(|one| {
-        let says = Cell::text(&format!("gave no answer: {}", one.error));
-        vec![Cell::text(""), Cell::text(&one.file), Cell::text(""), says]
+        let says = TableCell::text(&format!("gave no answer: {}", one.error));
+        vec![TableCell::text(""), TableCell::text(&one.file), TableCell::text(""), says]
     }));
     table(
         "runs",

@@ -3,9 +3,9 @@
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
 
-use super::draw::{Axis, LEFT, Picture, RIGHT, WIDTH, range};
+use super::draw::{PlotAxis, LEFT, SvgPicture, RIGHT, WIDTH, range};
 use super::units::force_unit;
-use crate::diagnose::Version;
+use crate::diagnose::ModelVersion;
 use crate::text::svg::escape;
 
 const HEIGHT: f64 = 170.0;
@@ -69,12 +69,12 @@ fn goertzel(values: &[f64], bin: usize) -> f64 {
 }
 
 /// A figure for each drive: what is left over frequency, before and after.
-pub(crate) fn figures(before: &Version, after: Option<&Version>) -> String {
+pub(crate) fn figures(before: &ModelVersion, after: Option<&ModelVersion>) -> String {
     let mut html = String::new();
     for (d, drive) in before.model.drives().iter().enumerate() {
-        let of = |version: &Version| -> Vec<(f64, f64)> {
+        let of = |version: &ModelVersion| -> Vec<(f64, f64)> {
             // The longest run says most about low frequencies.
-            let judged = version.judged();
+            let judged = version.validation_runs();
             let longest = judged.iter().max_by_key(|k| version.runs[**k].time.len());
             let Some(run) = longest.map(|k| &version.runs[*k]) else {
                 return Vec::new();
@@ -103,19 +103,19 @@ pub(crate) fn figures(before: &Version, after: Option<&Version>) -> String {
         if roots.is_empty() {
             continue;
         }
-        let x = Axis::decades(range(&frequencies), [LEFT, WIDTH - RIGHT]);
+        let x = PlotAxis::decades(range(&frequencies), [LEFT, WIDTH - RIGHT]);
         let [low, high] = range(&roots);
-        let y = Axis::decades(
+        let y = PlotAxis::decades(
             [(low / 1.5).max(high * 1e-8), high * 1.5],
             [HEIGHT - 34.0, 8.0],
         );
-        let mut picture = Picture::new(WIDTH, HEIGHT);
+        let mut picture = SvgPicture::new(WIDTH, HEIGHT);
         picture.frame(&x, &y, "frequency, Hz", [8, 4]);
         for (class, curve) in &curves {
             let mut path = String::new();
             for (k, (f, v)) in curve.iter().enumerate() {
                 let pen = if k == 0 { 'M' } else { 'L' };
-                let _ = write!(path, "{pen}{:.1} {:.1}", x.at(*f), y.at(v.sqrt()));
+                let _ = write!(path, "{pen}{:.1} {:.1}", x.position(*f), y.position(v.sqrt()));
             }
             picture.path(&format!("curve {class}"), &path);
         }
@@ -124,7 +124,7 @@ pub(crate) fn figures(before: &Version, after: Option<&Version>) -> String {
             html,
             "<figure class=\"still\"><figcaption><b>{}: error over frequency, {unit}/√Hz</b> {}</figcaption>\n{}</figure>\n",
             escape(drive),
-            super::keys(after.is_some()),
+            super::legend(after.is_some()),
             picture.finish(&format!("spectrum of the error of {drive}"))
         );
     }

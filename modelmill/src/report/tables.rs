@@ -2,13 +2,13 @@
 
 use std::fmt::Write as _;
 
-use modelmill_identify::diagnose::Considered;
-use modelmill_identify::{FitParameter, Severity, Status};
+use modelmill_identify::diagnose::CandidateOutcome;
+use modelmill_identify::{FitParameter, NoteSeverity, ParameterStatus};
 
 use super::draw::attribute;
-use super::units::{force_unit, pretty};
-use super::{Findings, Version, words};
-use crate::print::Spelling;
+use super::units::{force_unit, typographic_unit};
+use super::{DiagnosisFindings, ModelVersion, words};
+use crate::print::AdviceFormatter;
 use crate::text::svg::escape;
 use crate::text::table::{percent, significant};
 
@@ -16,9 +16,9 @@ use crate::text::table::{percent, significant};
 const FIRST: usize = 20;
 
 /// A cell: its text, and the number by which it is sorted.
-pub struct Cell(String, Option<f64>);
+pub struct TableCell(String, Option<f64>);
 
-impl Cell {
+impl TableCell {
     /// A text.
     pub fn text(text: &str) -> Self {
         Self(escape(text), None)
@@ -36,7 +36,7 @@ impl Cell {
 }
 
 /// A table; columns that begin with `#` hold numbers.
-pub fn table(class: &str, head: &[&str], rows: &[Vec<Cell>]) -> String {
+pub fn table(class: &str, head: &[&str], rows: &[Vec<TableCell>]) -> String {
     let mut html = format!("<div class=\"wide\"><table class=\"{class}\">\n<thead><tr>");
     for name in head {
         let (class, name) = match name.strip_prefix('#') {
@@ -48,7 +48,7 @@ pub fn table(class: &str, head: &[&str], rows: &[Vec<Cell>]) -> String {
     html.push_str("</tr></thead>\n<tbody>\n");
     for row in rows {
         html.push_str("<tr>");
-        for (k, Cell(text, value)) in row.iter().enumerate() {
+        for (k, TableCell(text, value)) in row.iter().enumerate() {
             let number = head.get(k).is_some_and(|name| name.starts_with('#'));
             let class = if number { " class=\"number\"" } else { "" };
             let value = value.map_or_else(String::new, |v| format!(" data-value=\"{v:e}\""));
@@ -61,20 +61,20 @@ pub fn table(class: &str, head: &[&str], rows: &[Vec<Cell>]) -> String {
 }
 
 /// The steps of the ladder with what spoke for them.
-pub(crate) fn ladder(findings: &Findings) -> String {
+pub(crate) fn ladder(findings: &DiagnosisFindings) -> String {
     let diagnosis = &findings.diagnosis;
-    let rows: Vec<Vec<Cell>> = diagnosis
-        .ladder
+    let rows: Vec<Vec<TableCell>> = diagnosis
+        .steps
         .iter()
         .map(|rung| {
-            let percents = |v: f64| Cell::number(&percent(Some(v)), v);
+            let percents = |v: f64| TableCell::number(&percent(Some(v)), v);
             let evidence = rung.evidence;
             let of = |f: &dyn Fn() -> Option<(String, f64)>| match f() {
-                Some((text, value)) => Cell::number(&text, value),
-                None => Cell::text(""),
+                Some((text, value)) => TableCell::number(&text, value),
+                None => TableCell::text(""),
             };
             vec![
-                Cell::text(&words::rung(rung)),
+                TableCell::text(&words::rung(rung)),
                 percents(rung.fit),
                 percents(rung.check),
                 of(&|| evidence.map(|e| (percent(Some(e.gain)), e.gain))),
@@ -85,7 +85,7 @@ pub(crate) fn ladder(findings: &Findings) -> String {
             ]
         })
         .collect();
-    let check = format!("#error, {}", findings.judged.short());
+    let check = format!("#error, {}", findings.validation.label());
     table(
         "",
         &[
@@ -101,9 +101,9 @@ pub(crate) fn ladder(findings: &Findings) -> String {
 }
 
 /// Errors of each drive before and after, beside the noise.
-pub(crate) fn drives(findings: &Findings) -> String {
-    let nrms = |version: &Version, d: usize| -> f64 {
-        let runs = version.judged();
+pub(crate) fn drives(findings: &DiagnosisFindings) -> String {
+    let nrms = |version: &ModelVersion, d: usize| -> f64 {
+        let runs = version.validation_runs();
         let error = version.errors(&runs, d);
         let force = runs.iter().flat_map(|k| &version.runs[*k].measured[d]);
         let size: f64 = force.map(|f| f * f).sum();
@@ -115,7 +115,7 @@ pub(crate) fn drives(findings: &Findings) -> String {
         }
     };
     let before = &findings.before;
-    let rows: Vec<Vec<Cell>> = before
+    let rows: Vec<Vec<TableCell>> = before
         .model
         .drives()
         .iter()
@@ -123,14 +123,14 @@ pub(crate) fn drives(findings: &Findings) -> String {
         .map(|(d, drive)| {
             let unit = force_unit(&before.model, d);
             let noise = findings.answer.problem.noise[d];
-            let mut row = vec![Cell::text(drive)];
+            let mut row = vec![TableCell::text(drive)];
             let first = nrms(before, d);
-            row.push(Cell::number(&percent(Some(first)), first));
+            row.push(TableCell::number(&percent(Some(first)), first));
             if let Ok(after) = &findings.after {
                 let last = nrms(after, d);
-                row.push(Cell::number(&percent(Some(last)), last));
+                row.push(TableCell::number(&percent(Some(last)), last));
             }
-            row.push(Cell::number(
+            row.push(TableCell::number(
                 &format!("{} {unit}", significant(noise, 2)),
                 noise,
             ));
@@ -146,14 +146,14 @@ pub(crate) fn drives(findings: &Findings) -> String {
 }
 
 /// What was found: values, what cannot be told from it, what it is.
-pub(crate) fn effects(findings: &Findings) -> String {
+pub(crate) fn effects(findings: &DiagnosisFindings) -> String {
     let answer = &findings.answer;
     let mut html = String::new();
     for found in &answer.diagnosis.effects {
         let _ = writeln!(
             html,
             "<h3>{}</h3>",
-            escape(&capital(&words::effect(&found.effect)))
+            escape(&capitalise(&words::effect(&found.effect)))
         );
         let kind = answer
             .candidates
@@ -169,7 +169,7 @@ pub(crate) fn effects(findings: &Findings) -> String {
                 "<code>{}</code> = {} {}",
                 escape(&p.symbol),
                 significant(*value, 4),
-                escape(&pretty(&p.unit))
+                escape(&typographic_unit(&p.unit))
             )
         });
         let constants = found.constants.iter().map(|(name, value)| {
@@ -216,7 +216,7 @@ pub(crate) fn effects(findings: &Findings) -> String {
     html
 }
 
-fn capital(text: &str) -> String {
+fn capitalise(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().map_or_else(String::new, |first| {
         first.to_uppercase().chain(letters).collect()
@@ -224,7 +224,7 @@ fn capital(text: &str) -> String {
 }
 
 /// What became of the candidates; those behind the first are folded.
-pub(crate) fn candidates(findings: &Findings) -> String {
+pub(crate) fn candidates(findings: &DiagnosisFindings) -> String {
     let all = &findings.diagnosis.candidates;
     let head = [
         "kind",
@@ -233,20 +233,20 @@ pub(crate) fn candidates(findings: &Findings) -> String {
         "#gain beside what was found",
         "verdict",
     ];
-    let row = |c: &Considered| -> Vec<Cell> {
-        let verdict = match &c.refused {
-            None => Cell::html("<b>found</b>".to_owned()),
-            Some(why) => Cell::text(why),
+    let row = |c: &CandidateOutcome| -> Vec<TableCell> {
+        let verdict = match &c.rejection_reason {
+            None => TableCell::html("<b>found</b>".to_owned()),
+            Some(why) => TableCell::text(why),
         };
         vec![
-            Cell::text(&words::kind(&c.effect.kind)),
-            Cell::text(&c.effect.at.join(", ")),
-            share(c.explained),
-            share(c.gain),
+            TableCell::text(&words::kind(&c.effect.kind)),
+            TableCell::text(&c.effect.at.join(", ")),
+            percent_cell(c.explained),
+            percent_cell(c.gain),
             verdict,
         ]
     };
-    let rows: Vec<Vec<Cell>> = all.iter().map(row).collect();
+    let rows: Vec<Vec<TableCell>> = all.iter().map(row).collect();
     let split = FIRST.min(rows.len());
     let mut html = table("sortable", &head, &rows[..split]);
     if split < rows.len() {
@@ -261,7 +261,7 @@ pub(crate) fn candidates(findings: &Findings) -> String {
 }
 
 /// A share in per cent, of which less than a tenth is nothing.
-fn share(value: f64) -> Cell {
+fn percent_cell(value: f64) -> TableCell {
     let percents = 100.0 * value;
     let text = if percents.abs() < 0.05 {
         "0 %".to_owned()
@@ -270,29 +270,29 @@ fn share(value: f64) -> Cell {
     } else {
         format!("{percents:.0} %")
     };
-    Cell::number(&text.replace('-', "−"), value)
+    TableCell::number(&text.replace('-', "−"), value)
 }
 
 /// Identified parameters beside nominal ones.
-pub(crate) fn parameters(version: &Version) -> String {
+pub(crate) fn parameters(version: &ModelVersion) -> String {
     let Some(result) = &version.identified else {
         return "<p>All parameters are held at their nominal values.</p>\n".to_owned();
     };
-    let row = |(k, p): (usize, &FitParameter)| -> Vec<Cell> {
+    let row = |(k, p): (usize, &FitParameter)| -> Vec<TableCell> {
         // The nominal value of an effect that was just added is its estimate.
         let nominal = p
             .nominal
             .filter(|_| !version.model.is_effect(k) && version.model.has_nominal(k));
-        let number = |v: f64| Cell::number(&significant(v, 4), v);
-        let none = || Cell::text("");
-        let std = p.std.filter(|_| p.status == Status::Identified);
+        let number = |v: f64| TableCell::number(&significant(v, 4), v);
+        let none = || TableCell::text("");
+        let std = p.std.filter(|_| p.status == ParameterStatus::Identified);
         let off = match (nominal, std) {
             (Some(nominal), Some(std)) if std > 0.0 => Some((p.value - nominal).abs() / std),
             _ => None,
         };
         vec![
-            Cell::text(&p.name),
-            Cell::html(format!(
+            TableCell::text(&p.name),
+            TableCell::html(format!(
                 "<code class=\"expression\" title=\"{}\">{}</code>",
                 attribute(&p.expression),
                 escape(&p.expression)
@@ -300,25 +300,25 @@ pub(crate) fn parameters(version: &Version) -> String {
             nominal.map_or_else(none, number),
             number(p.value),
             match (p.status, std) {
-                (Status::Identified, Some(std)) => {
-                    Cell::number(&format!("± {}", significant(std, 2)), std)
+                (ParameterStatus::Identified, Some(std)) => {
+                    TableCell::number(&format!("± {}", significant(std, 2)), std)
                 }
-                (Status::Known, _) => Cell::text("known"),
-                (Status::Undetermined, _) => Cell::text("not determined"),
+                (ParameterStatus::Known, _) => TableCell::text("known"),
+                (ParameterStatus::Undetermined, _) => TableCell::text("not determined"),
                 _ => none(),
             },
-            Cell::text(&pretty(&p.unit)),
+            TableCell::text(&typographic_unit(&p.unit)),
             off.map_or_else(none, |off| {
                 let text = if off >= 1000.0 {
                     "> 1000".to_owned()
                 } else {
                     significant(off, 2)
                 };
-                Cell::number(&text, off)
+                TableCell::number(&text, off)
             }),
         ]
     };
-    let rows: Vec<Vec<Cell>> = result.fit.parameters.iter().enumerate().map(row).collect();
+    let rows: Vec<Vec<TableCell>> = result.fit.parameters.iter().enumerate().map(row).collect();
     table(
         "sortable",
         &[
@@ -335,8 +335,8 @@ pub(crate) fn parameters(version: &Version) -> String {
 }
 
 /// Recordings and what was done to them.
-pub(crate) fn data(findings: &Findings, spelling: &dyn Spelling) -> String {
-    let rows: Vec<Vec<Cell>> = findings
+pub(crate) fn data(findings: &DiagnosisFindings, spelling: &dyn AdviceFormatter) -> String {
+    let rows: Vec<Vec<TableCell>> = findings
         .before
         .runs
         .iter()
@@ -352,11 +352,11 @@ pub(crate) fn data(findings: &Findings, spelling: &dyn Spelling) -> String {
                 0.0
             };
             vec![
-                Cell::text(&run.name),
-                Cell::text(if run.is_check { "check" } else { "fit" }),
-                Cell::number(&n.to_string(), n as f64),
-                Cell::number(&format!("{} s", significant(span, 3)), span),
-                Cell::number(&format!("{} Hz", significant(rate, 4)), rate),
+                TableCell::text(&run.name),
+                TableCell::text(if run.is_check { "check" } else { "fit" }),
+                TableCell::number(&n.to_string(), n as f64),
+                TableCell::number(&format!("{} s", significant(span, 3)), span),
+                TableCell::number(&format!("{} Hz", significant(rate, 4)), rate),
             ]
         })
         .collect();
@@ -372,13 +372,13 @@ pub(crate) fn data(findings: &Findings, spelling: &dyn Spelling) -> String {
     html.push_str("<ul class=\"notes\">\n");
     for note in &findings.notes {
         let (class, word) = match note.severity {
-            Severity::Warning => ("warning", "Warning: "),
-            Severity::Info => ("info", ""),
+            NoteSeverity::Warning => ("warning", "Warning: "),
+            NoteSeverity::Info => ("info", ""),
         };
         let _ = writeln!(
             html,
             "<li class=\"{class}\">{word}{}</li>",
-            escape(&spelling.text(&note.says))
+            escape(&spelling.format_text(&note.says))
         );
     }
     html.push_str("</ul>\n");

@@ -30,6 +30,6 @@ pub(crate) fn variable_unit(model: &Model, name: &str) -> String {
 }
 
 /// A unit as it is written by hand: `kg m^2` as `kg m²`.
-pub(crate) fn pretty(unit: &str) -> String {
+pub(crate) fn typographic_unit(unit: &str) -> String {
     unit.replace("^2", "²").replace("^3", "³")
 }

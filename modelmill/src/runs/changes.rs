@@ -1,25 +1,25 @@
 //! What a change is in physics.
 
-use modelmill_identify::changes::{Candidate, Change, Values};
-use modelmill_spec::{DriveKind, Place};
+use modelmill_identify::changes::{PossibleChange, SelectedChange, JointValues};
+use modelmill_spec::{DriveKind, EffectPlace};
 use nalgebra::DVector;
 
-use crate::audit::events::Event;
+use crate::audit::events::ContactEvent;
 use crate::model::Model;
-use crate::runs::layout::Layout;
-use crate::runs::payload::{Payloads, TEN};
+use crate::runs::layout::RunColumnLayout;
+use crate::runs::payload::{PayloadColumns, TEN};
 use crate::text::table::{significant, with_deviation};
 
 /// A value with its standard deviation.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Estimate {
+pub struct ChangeEstimate {
     /// The value.
     pub value: f64,
     /// Its standard deviation.
     pub deviation: f64,
 }
 
-impl Estimate {
+impl ChangeEstimate {
     fn text(self, unit: &str) -> String {
         let [value, deviation] = with_deviation(self.value, self.deviation);
         format!("{value} +- {deviation} {unit}")
@@ -35,24 +35,24 @@ impl Estimate {
 
 /// What changed.
 #[derive(Clone, Debug, PartialEq)]
-pub enum What {
+pub enum PhysicalChange {
     /// Another load on a body.
     Payload {
         /// The frame that carries it.
         frame: String,
         /// What it weighs, kg; `None` where the motion does not tell.
-        mass: Option<Estimate>,
+        mass: Option<ChangeEstimate>,
         /// Its centre in the frame, m; `None` for directions that the motion does not tell.
-        centre: [Option<Estimate>; 3],
+        centre: [Option<ChangeEstimate>; 3],
     },
     /// Other friction of a drive.
     Friction {
         /// The drive.
         drive: String,
         /// Dry friction, N or N m.
-        dry: Estimate,
+        dry: ChangeEstimate,
         /// Viscous friction, N or N m per m/s or rad/s.
-        viscous: Estimate,
+        viscous: ChangeEstimate,
         /// Both as parts of what the first run has, where the model has such friction.
         parts: [Option<f64>; 2],
     },
@@ -61,19 +61,19 @@ pub enum What {
         /// The drive.
         drive: String,
         /// The force.
-        force: Estimate,
+        force: ChangeEstimate,
     },
     /// Another scale of a drive's measured force.
     Scale {
         /// The drive.
         drive: String,
         /// The factor; 1 where nothing changed.
-        factor: Estimate,
+        factor: ChangeEstimate,
     },
     /// Another clock.
     Clock {
         /// How many times as fast as its time stamps say the run was; 1 where nothing changed.
-        factor: Estimate,
+        factor: ChangeEstimate,
     },
     /// A contact or a push within the run.
     ContactEvent {
@@ -87,21 +87,21 @@ pub enum What {
         /// The coordinate.
         coordinate: String,
         /// By how much the true position lies above the recorded one, rad or m.
-        shift: Estimate,
+        shift: ChangeEstimate,
     },
 }
 
 /// A value with its name and unit.
-pub type Named = (&'static str, Estimate, &'static str);
+pub type NamedEstimate = (&'static str, ChangeEstimate, &'static str);
 
-impl What {
+impl PhysicalChange {
     /// What scripts call it, where it is, and its values with their names and units; `unit` is that of the force or coordinate.
-    pub fn parts(&self, unit: &'static str) -> (&'static str, Vec<&str>, Vec<Named>) {
+    pub fn parts(&self, unit: &'static str) -> (&'static str, Vec<&str>, Vec<NamedEstimate>) {
         let (kind, at, estimates) = match self {
             Self::ContactEvent { drives, interval } => {
                 let names = drives.iter().map(|(name, _)| name.as_str()).collect();
                 // An event is told by its samples, which lie a step apart.
-                let [from, to] = interval.map(|value| Estimate {
+                let [from, to] = interval.map(|value| ChangeEstimate {
                     value,
                     deviation: 0.0,
                 });
@@ -126,7 +126,7 @@ impl What {
             } => (
                 "friction",
                 drive,
-                vec![("Fc", *dry, unit), ("Fv", *viscous, per_rate(unit))],
+                vec![("Fc", *dry, unit), ("Fv", *viscous, viscous_unit(unit))],
             ),
             Self::Offset { drive, force } => ("offset", drive, vec![("F0", *force, unit)]),
             Self::Scale { drive, factor } => ("drive_gain", drive, vec![("gain", *factor, "1")]),
@@ -143,9 +143,9 @@ impl What {
 
 /// A change of a run against the first one.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Changed {
+pub struct RunChange {
     /// What it is.
-    pub what: What,
+    pub change: PhysicalChange,
     /// By how much the sum of squares of the white residual would rise without it; 0 for events, which are looked for by
     /// themselves.
     pub gain: f64,
@@ -159,7 +159,7 @@ pub struct Changed {
 
 /// Kinds of change, each with the drive or frame that it belongs to.
 #[derive(Clone, Debug)]
-pub(crate) enum Kind {
+pub(crate) enum ChangeKind {
     Payload(String),
     Friction(usize),
     Offset(usize),
@@ -170,10 +170,10 @@ pub(crate) enum Kind {
 
 /// A change that is possible.
 #[derive(Clone, Debug)]
-pub(crate) struct Possible {
-    pub(crate) kind: Kind,
+pub(crate) struct ChangeHypothesis {
+    pub(crate) kind: ChangeKind,
     /// What the search knows of it.
-    pub(crate) candidate: Candidate,
+    pub(crate) candidate: PossibleChange,
 }
 
 /// What a drive's other scale is charged beside its value: friction changes every day, sensors, torque constants and gears
@@ -181,19 +181,19 @@ pub(crate) struct Possible {
 const RARE: f64 = 0.2;
 
 /// All changes that are possible.
-pub(crate) fn possible(model: &Model, payloads: &Payloads, layout: Layout) -> Vec<Possible> {
-    let possible = |kind: Kind, columns: Vec<usize>| {
+pub(crate) fn possible_changes(model: &Model, payloads: &PayloadColumns, layout: RunColumnLayout) -> Vec<ChangeHypothesis> {
+    let possible = |kind: ChangeKind, columns: Vec<usize>| {
         let (most, rarity) = match kind {
             // Dry and viscous friction rise and fall together.
-            Kind::Friction(_) => (1, 0.0),
-            Kind::Scale(_) => (1, RARE),
+            ChangeKind::Friction(_) => (1, 0.0),
+            ChangeKind::Scale(_) => (1, RARE),
             _ => (columns.len(), 0.0),
         };
-        Possible {
+        ChangeHypothesis {
             kind,
-            candidate: Candidate {
+            candidate: PossibleChange {
                 columns,
-                most,
+                max_charged_values: most,
                 rarity,
             },
         }
@@ -202,39 +202,39 @@ pub(crate) fn possible(model: &Model, payloads: &Payloads, layout: Layout) -> Ve
     for (f, frame) in payloads.frames.iter().enumerate() {
         let at = layout.payload(f);
         all.push(possible(
-            Kind::Payload(frame.clone()),
+            ChangeKind::Payload(frame.clone()),
             (at..at + TEN).collect(),
         ));
     }
     for drive in 0..model.drives().len() {
         let friction = layout.friction(drive);
         for (kind, columns) in [
-            (Kind::Friction(drive), vec![friction, friction + 1]),
-            (Kind::Offset(drive), vec![layout.offset(drive)]),
-            (Kind::Scale(drive), vec![layout.scale(drive)]),
+            (ChangeKind::Friction(drive), vec![friction, friction + 1]),
+            (ChangeKind::Offset(drive), vec![layout.offset(drive)]),
+            (ChangeKind::Scale(drive), vec![layout.scale(drive)]),
         ] {
             all.push(possible(kind, columns));
         }
     }
-    all.push(possible(Kind::Clock, vec![layout.clock()]));
+    all.push(possible(ChangeKind::Clock, vec![layout.clock()]));
     let zeros =
-        (0..layout.coordinates).map(|i| possible(Kind::EncoderZero(i), vec![layout.zero(i)]));
+        (0..layout.coordinates).map(|i| possible(ChangeKind::EncoderZero(i), vec![layout.zero(i)]));
     all.extend(zeros);
     all
 }
 
 /// A change that was found, with what it is; `values` are the base parameters of the first run that are no known numbers.
-pub(crate) fn told(
+pub(crate) fn identified_change(
     model: &Model,
-    possible: &[Possible],
-    found: &Change,
+    possible: &[ChangeHypothesis],
+    found: &SelectedChange,
     values: &DVector<f64>,
-) -> Changed {
-    let what = what(model, &possible[found.which].kind, found, values);
-    Changed {
-        says: says(model, &what),
-        unit: unit(model, &possible[found.which].kind),
-        what,
+) -> RunChange {
+    let what = physical_change(model, &possible[found.candidate].kind, found, values);
+    RunChange {
+        says: change_text(model, &what),
+        unit: unit(model, &possible[found.candidate].kind),
+        change: what,
         gain: found.gain,
         rivals: found
             .rivals
@@ -245,90 +245,90 @@ pub(crate) fn told(
 }
 
 /// A contact or a push within a run.
-pub(crate) fn event(model: &Model, event: &Event) -> Changed {
+pub(crate) fn event(model: &Model, event: &ContactEvent) -> RunChange {
     let names = model.drives();
     let drives = event.drives.iter();
-    let what = What::ContactEvent {
+    let what = PhysicalChange::ContactEvent {
         drives: drives
             .map(|(d, largest, _)| (names[*d].clone(), *largest))
             .collect(),
         interval: [event.from, event.to],
     };
-    Changed {
-        says: says(model, &what),
+    RunChange {
+        says: change_text(model, &what),
         unit: "s",
-        what,
+        change: what,
         gain: 0.0,
         rivals: Vec::new(),
     }
 }
 
-fn what(model: &Model, kind: &Kind, found: &Change, values: &DVector<f64>) -> What {
-    let estimate = |i: usize| Estimate {
+fn physical_change(model: &Model, kind: &ChangeKind, found: &SelectedChange, values: &DVector<f64>) -> PhysicalChange {
+    let estimate = |i: usize| ChangeEstimate {
         value: found.values[i],
         deviation: found.covariance[(i, i)].max(0.0).sqrt(),
     };
     let drive = |d: &usize| model.drives()[*d].clone();
     match kind {
-        Kind::Payload(frame) => {
+        ChangeKind::Payload(frame) => {
             let mass = found.determined[0]
                 .then(|| estimate(0))
                 .filter(|m| m.is_known());
-            What::Payload {
+            PhysicalChange::Payload {
                 frame: frame.clone(),
                 mass,
-                centre: centre(&Values {
+                centre: centre(&JointValues {
                     values: found.values.clone(),
                     covariance: found.covariance.clone(),
                     determined: found.determined.clone(),
                 }),
             }
         }
-        Kind::Friction(d) => {
+        ChangeKind::Friction(d) => {
             let before = friction(model, *d).map(|k| k.map(|k| values[k]));
             let part = |i: usize| before[i].filter(|f| *f != 0.0).map(|f| found.values[i] / f);
-            What::Friction {
+            PhysicalChange::Friction {
                 drive: drive(d),
                 dry: estimate(0),
                 viscous: estimate(1),
                 parts: [part(0), part(1)],
             }
         }
-        Kind::Offset(d) => What::Offset {
+        ChangeKind::Offset(d) => PhysicalChange::Offset {
             drive: drive(d),
             force: estimate(0),
         },
-        Kind::Scale(d) => What::Scale {
+        ChangeKind::Scale(d) => PhysicalChange::Scale {
             drive: drive(d),
-            factor: one_more(estimate(0)),
+            factor: one_plus(estimate(0)),
         },
-        Kind::Clock => What::Clock {
-            factor: one_more(estimate(0)),
+        ChangeKind::Clock => PhysicalChange::Clock {
+            factor: one_plus(estimate(0)),
         },
-        Kind::EncoderZero(i) => What::EncoderZero {
-            coordinate: model.active()[*i].clone(),
+        ChangeKind::EncoderZero(i) => PhysicalChange::EncoderZero {
+            coordinate: model.active_coordinates()[*i].clone(),
             shift: estimate(0),
         },
     }
 }
 
 /// The unit of a force of a drive, or of a coordinate.
-fn unit(model: &Model, kind: &Kind) -> &'static str {
+fn unit(model: &Model, kind: &ChangeKind) -> &'static str {
     match kind {
-        Kind::Friction(d) | Kind::Offset(d) | Kind::Scale(d) => model.force_unit(*d),
-        Kind::EncoderZero(i) if model.motions()[*i].1 => "rad",
-        Kind::EncoderZero(_) | Kind::Payload(_) => "m",
-        Kind::Clock => "1",
+        ChangeKind::Friction(d) | ChangeKind::Offset(d) | ChangeKind::Scale(d) => model.force_unit(*d),
+        ChangeKind::EncoderZero(i) if model.motions()[*i].1 => "rad",
+        ChangeKind::EncoderZero(_) | ChangeKind::Payload(_) => "m",
+        ChangeKind::Clock => "1",
     }
 }
 
 /// The unit of viscous friction of a drive whose force has the unit.
-pub(crate) fn per_rate(unit: &str) -> &'static str {
+pub(crate) fn viscous_unit(unit: &str) -> &'static str {
     if unit == "N" { "N s/m" } else { "N m s/rad" }
 }
 
-fn one_more(part: Estimate) -> Estimate {
-    Estimate {
+fn one_plus(part: ChangeEstimate) -> ChangeEstimate {
+    ChangeEstimate {
         value: 1.0 + part.value,
         ..part
     }
@@ -347,23 +347,23 @@ pub(crate) fn offset(model: &Model, drive: usize) -> Option<usize> {
 /// The column of a kind of effect with one parameter on a drive.
 fn column_of(model: &Model, drive: usize, kind: &str) -> Option<usize> {
     let mechanism = &model.derivation.mechanism;
-    let is_here = |place: &Place| match (place, mechanism.drives[drive].kind) {
-        (Place::Drive(d), _) => d.0 == drive,
-        (Place::Coordinate(a), DriveKind::Joint(b)) => *a == b,
+    let is_here = |place: &EffectPlace| match (place, mechanism.drives[drive].kind) {
+        (EffectPlace::Drive(d), _) => d.0 == drive,
+        (EffectPlace::Coordinate(a), DriveKind::Joint(b)) => *a == b,
         _ => false,
     };
     let mut effects = mechanism.effects.iter();
     let effect = effects.find(|e| e.kind == kind && e.places.iter().all(is_here))?;
     let name = &mechanism.parameters[effect.terms.first()?.parameter.0].name;
-    let infos = model.infos();
+    let infos = model.parameter_infos();
     let mut unknown = (0..model.base.len()).filter(|k| !model.is_known(*k));
     unknown.position(|k| infos[k].expression == *name)
 }
 
 /// The centre of a body whose first four values are mass and first moments: first moment over mass, with the deviations of both
 /// and what they share; `None` for directions that are not told.
-pub(crate) fn centre(found: &Values) -> [Option<Estimate>; 3] {
-    let estimate = |i: usize| Estimate {
+pub(crate) fn centre(found: &JointValues) -> [Option<ChangeEstimate>; 3] {
+    let estimate = |i: usize| ChangeEstimate {
         value: found.values[i],
         deviation: found.covariance[(i, i)].max(0.0).sqrt(),
     };
@@ -373,7 +373,7 @@ pub(crate) fn centre(found: &Values) -> [Option<Estimate>; 3] {
         let value = found.values[i] / mass.value;
         let c = |a: usize, b: usize| found.covariance[(a, b)];
         let variance = c(i, i) - 2.0 * value * c(0, i) + value * value * c(0, 0);
-        found.determined[i].then(|| Estimate {
+        found.determined[i].then(|| ChangeEstimate {
             value,
             deviation: variance.max(0.0).sqrt() / mass.value.abs(),
         })
@@ -381,25 +381,25 @@ pub(crate) fn centre(found: &Values) -> [Option<Estimate>; 3] {
 }
 
 /// What a kind of change is called.
-pub(crate) fn name(model: &Model, kind: &Kind) -> String {
+pub(crate) fn name(model: &Model, kind: &ChangeKind) -> String {
     let drive = |d: &usize| model.drives()[*d].clone();
     match kind {
-        Kind::Payload(frame) => format!("a load on {frame}"),
-        Kind::Friction(d) => format!("friction of {}", drive(d)),
-        Kind::Offset(d) => format!("a constant force on {}", drive(d)),
-        Kind::Scale(d) => format!("the scale of {}", drive(d)),
-        Kind::Clock => "the clock".to_owned(),
-        Kind::EncoderZero(i) => format!("the zero of {}", model.active()[*i]),
+        ChangeKind::Payload(frame) => format!("a load on {frame}"),
+        ChangeKind::Friction(d) => format!("friction of {}", drive(d)),
+        ChangeKind::Offset(d) => format!("a constant force on {}", drive(d)),
+        ChangeKind::Scale(d) => format!("the scale of {}", drive(d)),
+        ChangeKind::Clock => "the clock".to_owned(),
+        ChangeKind::EncoderZero(i) => format!("the zero of {}", model.active_coordinates()[*i]),
     }
 }
 
-fn says(model: &Model, what: &What) -> String {
+fn change_text(model: &Model, what: &PhysicalChange) -> String {
     let unit = |name: &str| {
         let at = model.drives().iter().position(|drive| drive == name);
         at.map_or("", |d| model.force_unit(d))
     };
     match what {
-        What::Payload {
+        PhysicalChange::Payload {
             frame,
             mass,
             centre,
@@ -410,7 +410,7 @@ fn says(model: &Model, what: &What) -> String {
                 );
             };
             let more = if mass.value > 0.0 { "more" } else { "less" };
-            let weighs = Estimate {
+            let weighs = ChangeEstimate {
                 value: mass.value.abs(),
                 ..*mass
             };
@@ -425,7 +425,7 @@ fn says(model: &Model, what: &What) -> String {
             };
             format!("{} {more} on {frame}{there}", weighs.text("kg"))
         }
-        What::Friction {
+        PhysicalChange::Friction {
             drive,
             dry,
             viscous,
@@ -441,27 +441,27 @@ fn says(model: &Model, what: &What) -> String {
             };
             format!(
                 "friction of {drive}: dry {} {}{}, viscous {} {}{}; {why}",
-                signed(*dry),
+                signed_text(*dry),
                 unit(drive),
                 part(parts[0]),
-                signed(*viscous),
-                per_rate(unit(drive)),
+                signed_text(*viscous),
+                viscous_unit(unit(drive)),
                 part(parts[1]),
             )
         }
-        What::Offset { drive, force } => format!(
+        PhysicalChange::Offset { drive, force } => format!(
             "a constant force of {} on {drive}: the zero of its sensor, or weight that this motion does not turn",
             force.text(unit(drive))
         ),
-        What::Scale { drive, factor } => format!(
+        PhysicalChange::Scale { drive, factor } => format!(
             "measured force of {drive} scaled by {}: its sensor, torque constant or gear",
             factor.text("")
         ),
-        What::Clock { factor } => format!(
+        PhysicalChange::Clock { factor } => format!(
             "the time base: this run was {} times as fast as its time stamps say",
             factor.text("")
         ),
-        What::ContactEvent {
+        PhysicalChange::ContactEvent {
             drives,
             interval: [from, to],
         } => {
@@ -478,7 +478,7 @@ fn says(model: &Model, what: &What) -> String {
                 drives.join(", ")
             )
         }
-        What::EncoderZero { coordinate, shift } => {
+        PhysicalChange::EncoderZero { coordinate, shift } => {
             let is_angle = |(name, is): &(String, bool)| name == coordinate && *is;
             let is_angle = model.motions().iter().any(is_angle);
             format!(
@@ -489,7 +489,7 @@ fn says(model: &Model, what: &What) -> String {
     }
 }
 
-fn signed(estimate: Estimate) -> String {
+fn signed_text(estimate: ChangeEstimate) -> String {
     let sign = if estimate.value > 0.0 { "+" } else { "" };
     format!("{sign}{}", estimate.text(""))
 }

@@ -1,37 +1,37 @@
 //! The rows of a stretch: base columns, and those of everything that may have changed.
 
-use modelmill_codegen::Evaluator;
-use modelmill_identify::diagnose::Column;
+use modelmill_codegen::ModelEvaluator;
+use modelmill_identify::diagnose::ForceColumn;
 use nalgebra::DVector;
 
-use crate::along::{self, decimated, measured};
+use crate::along::{self, filter_and_decimate, measured_forces};
 use crate::error::Outcome;
 use crate::model::Model;
 use crate::regressors::regressor;
-use crate::runs::payload::Payloads;
-use crate::stretch::Stretch;
+use crate::runs::payload::PayloadColumns;
+use crate::stretch::RecordingSegment;
 
 /// The part by which a clock, and the rad or m by which an encoder is turned to see what that does.
 const TURNED: f64 = 1e-3;
 
 /// The rows of one stretch, drive by drive.
-pub(crate) struct Laid {
-    columns: Vec<Column>,
+pub(crate) struct SegmentRows {
+    columns: Vec<ForceColumn>,
     /// Measured forces less those of known parameters, `[drive][sample]`.
     pub(crate) forces: Vec<Vec<f64>>,
     /// Which of them count.
     counts: Vec<Vec<bool>>,
 }
 
-impl Laid {
+impl SegmentRows {
     /// The base columns alone.
-    pub(crate) fn base(model: &Model, stretch: &Stretch) -> Outcome<Self> {
+    pub(crate) fn base_columns(model: &Model, stretch: &RecordingSegment) -> Outcome<Self> {
         let base = regressor(
             &[(stretch, false)],
-            &Evaluator::new(&model.derivation),
+            &ModelEvaluator::new(&model.derivation),
             model,
         )?;
-        let mut forces = measured(stretch)?;
+        let mut forces = measured_forces(stretch)?;
         let mut columns = Vec::new();
         for (k, column) in base.into_iter().enumerate() {
             if model.is_known(k) {
@@ -46,10 +46,10 @@ impl Laid {
         }
         let counts = counts(stretch, &forces);
         for (force, counts) in forces.iter_mut().zip(&counts) {
-            silence(force, counts);
+            zero_uncounted(force, counts);
         }
         for column in &mut columns {
-            leave_out(column, &counts);
+            clear_uncounted(column, &counts);
         }
         Ok(Self {
             columns,
@@ -59,18 +59,18 @@ impl Laid {
     }
 
     /// All columns; `values` are base parameters on which scales, clocks and encoders' zeros are built.
-    pub(crate) fn all(
+    pub(crate) fn all_columns(
         model: &Model,
-        stretch: &Stretch,
-        payloads: &Payloads,
+        stretch: &RecordingSegment,
+        payloads: &PayloadColumns,
         values: &DVector<f64>,
     ) -> Outcome<Self> {
-        let mut laid = Self::base(model, stretch)?;
-        let mut further = of_payloads(model, stretch, payloads)?;
-        further.extend(of_drives(model, stretch, laid.samples())?);
-        further.extend(of_prediction(model, stretch, &laid, values)?);
+        let mut laid = Self::base_columns(model, stretch)?;
+        let mut further = payload_columns(model, stretch, payloads)?;
+        further.extend(drive_columns(model, stretch, laid.samples())?);
+        further.extend(prediction_columns(model, stretch, &laid, values)?);
         for column in &mut further {
-            leave_out(column, &laid.counts);
+            clear_uncounted(column, &laid.counts);
         }
         laid.columns.extend(further);
         Ok(laid)
@@ -85,7 +85,7 @@ impl Laid {
     }
 
     /// What values of the first columns leave of a drive's force.
-    pub(crate) fn rest(&self, drive: usize, values: &DVector<f64>) -> Vec<f64> {
+    pub(crate) fn residual(&self, drive: usize, values: &DVector<f64>) -> Vec<f64> {
         let mut rest = self.forces[drive].clone();
         for (k, value) in values.iter().enumerate() {
             let column = self.column(k, drive).unwrap_or_default();
@@ -114,7 +114,7 @@ impl Laid {
 }
 
 /// Which forces count, `[drive][sample]`. A kept sample has heard of all that its filter saw.
-fn counts(stretch: &Stretch, forces: &[Vec<f64>]) -> Vec<Vec<bool>> {
+fn counts(stretch: &RecordingSegment, forces: &[Vec<f64>]) -> Vec<Vec<bool>> {
     let n = forces.len();
     let weighs = |drive: usize, i: usize| {
         let weights = stretch.weights.as_ref();
@@ -123,25 +123,25 @@ fn counts(stretch: &Stretch, forces: &[Vec<f64>]) -> Vec<Vec<bool>> {
     let of_drive = |(drive, force): (usize, &Vec<f64>)| {
         let samples = 0..force.len();
         samples
-            .map(|i| weighs(drive, i) && !stretch.hears_of_faults(drive, i))
+            .map(|i| weighs(drive, i) && !stretch.has_excluded_input(drive, i))
             .collect()
     };
     forces.iter().enumerate().map(of_drive).collect()
 }
 
 /// Ten columns for each body.
-fn of_payloads(model: &Model, stretch: &Stretch, payloads: &Payloads) -> Outcome<Vec<Column>> {
-    let evaluator = Evaluator::new(&payloads.derivation);
+fn payload_columns(model: &Model, stretch: &RecordingSegment, payloads: &PayloadColumns) -> Outcome<Vec<ForceColumn>> {
+    let evaluator = ModelEvaluator::new(&payloads.derivation);
     let columns = regressor(&[(stretch, false)], &evaluator, model)?;
     let of = |k: &Option<usize>| k.map(|k| columns[k].clone()).unwrap_or_default();
     Ok(payloads.columns.iter().flatten().map(of).collect())
 }
 
 /// Dry and viscous friction of each drive, then a constant force on each.
-fn of_drives(model: &Model, stretch: &Stretch, samples: usize) -> Outcome<Vec<Column>> {
+fn drive_columns(model: &Model, stretch: &RecordingSegment, samples: usize) -> Outcome<Vec<ForceColumn>> {
     let n = model.drives().len();
     let only = |drive: usize, values: Vec<f64>| {
-        let mut column = Column(vec![None; n]);
+        let mut column = ForceColumn(vec![None; n]);
         column.0[drive] = Some(values);
         column
     };
@@ -149,7 +149,7 @@ fn of_drives(model: &Model, stretch: &Stretch, samples: usize) -> Outcome<Vec<Co
     for (drive, rate) in along::drive_rates(model, stretch)?.into_iter().enumerate() {
         let sign = |x: &f64| if *x == 0.0 { 0.0 } else { x.signum() };
         let signs = rate.iter().map(sign).collect();
-        let both = decimated(vec![signs, rate], stretch)?;
+        let both = filter_and_decimate(vec![signs, rate], stretch)?;
         columns.extend(both.into_iter().map(|values| only(drive, values)));
     }
     columns.extend((0..n).map(|drive| only(drive, vec![1.0; samples])));
@@ -157,7 +157,7 @@ fn of_drives(model: &Model, stretch: &Stretch, samples: usize) -> Outcome<Vec<Co
 }
 
 /// Puts 0 where a sample does not count.
-fn silence(values: &mut [f64], counts: &[bool]) {
+fn zero_uncounted(values: &mut [f64], counts: &[bool]) {
     for (value, _) in values
         .iter_mut()
         .zip(counts)
@@ -168,27 +168,27 @@ fn silence(values: &mut [f64], counts: &[bool]) {
 }
 
 /// A column without the samples that do not count.
-fn leave_out(column: &mut Column, counts: &[Vec<bool>]) {
+fn clear_uncounted(column: &mut ForceColumn, counts: &[Vec<bool>]) {
     for (values, counts) in column.0.iter_mut().zip(counts) {
         if let Some(values) = values {
-            silence(values, counts);
+            zero_uncounted(values, counts);
         }
     }
 }
 
 /// Columns that are built on predicted forces: a scale of each drive; a clock that runs by a part slower, so that rates and
 /// accelerations come out larger by once and twice that part; and each encoder with another zero.
-fn of_prediction(
+fn prediction_columns(
     model: &Model,
-    stretch: &Stretch,
-    laid: &Laid,
+    stretch: &RecordingSegment,
+    laid: &SegmentRows,
     values: &DVector<f64>,
-) -> Outcome<Vec<Column>> {
+) -> Outcome<Vec<ForceColumn>> {
     let n = laid.forces.len();
     let mut columns = Vec::new();
     for drive in 0..n {
-        let rest = laid.rest(drive, values);
-        let mut column = Column(vec![None; n]);
+        let rest = laid.residual(drive, values);
+        let mut column = ForceColumn(vec![None; n]);
         let pairs = laid.forces[drive].iter().zip(&rest);
         column.0[drive] = Some(pairs.map(|(y, r)| y - r).collect());
         columns.push(column);
@@ -203,11 +203,11 @@ fn of_prediction(
             }
         })
         .collect();
-    let forces = |turned: &Stretch| {
-        along::forces(model, turned, &all).and_then(|forces| decimated(forces, stretch))
+    let forces = |turned: &RecordingSegment| {
+        along::forces(model, turned, &all).and_then(|forces| filter_and_decimate(forces, stretch))
     };
     // Central differences.
-    let slope = |turn: &dyn Fn(&mut Stretch, f64)| -> Outcome<Column> {
+    let slope = |turn: &dyn Fn(&mut RecordingSegment, f64)| -> Outcome<ForceColumn> {
         let [ahead, back] = [TURNED, -TURNED].map(|by| {
             let mut turned = stretch.clone();
             turn(&mut turned, by);
@@ -220,7 +220,7 @@ fn of_prediction(
                 .map(|(a, b)| (a - b) / (2.0 * TURNED))
                 .collect()
         };
-        Ok(Column::new(pairs.map(of_drive).collect()))
+        Ok(ForceColumn::new(pairs.map(of_drive).collect()))
     };
     let scaled = |values: &mut [Vec<f64>], factor: f64| {
         for x in values.iter_mut().flatten() {

@@ -1,26 +1,26 @@
 //! Where the columns of a run stand: those of the base parameters, and behind them those of everything that may change.
 
 use crate::model::Model;
-use crate::runs::payload::{Payloads, TEN};
+use crate::runs::payload::{PayloadColumns, TEN};
 
 /// Where columns stand.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Layout {
+pub(crate) struct RunColumnLayout {
     pub(crate) base: usize,
     pub(crate) payloads: usize,
     pub(crate) drives: usize,
     pub(crate) coordinates: usize,
 }
 
-impl Layout {
-    pub(crate) fn new(model: &Model, payloads: &Payloads) -> Self {
+impl RunColumnLayout {
+    pub(crate) fn new(model: &Model, payloads: &PayloadColumns) -> Self {
         Self {
             base: (0..model.base.len())
                 .filter(|k| !model.is_known(*k))
                 .count(),
             payloads: payloads.frames.len(),
             drives: model.drives().len(),
-            coordinates: model.active().len(),
+            coordinates: model.active_coordinates().len(),
         }
     }
 

@@ -16,25 +16,25 @@ mod sums;
 
 use std::borrow::Borrow;
 
-use modelmill_identify::changes::{Change, Moments, Runs, Search, search, within};
-use modelmill_identify::diagnose::Column;
-use modelmill_identify::{Note, ParameterInfo};
+use modelmill_identify::changes::{SelectedChange, NormalEquations, RunPair, ChangeHypotheses, search_changes, within_run_spread};
+use modelmill_identify::diagnose::ForceColumn;
+use modelmill_identify::{RecordingNote, ParameterInfo};
 use nalgebra::DVector;
 
-use crate::audit::events::{self, Event};
+use crate::audit::events::{self, ContactEvent};
 use crate::error::{Error, Outcome};
 use crate::model::Model;
-use crate::recording::Recording;
-use crate::stretch::Stretch;
+use crate::recording::PreparedRecording;
+use crate::stretch::RecordingSegment;
 
-pub use changes::{Changed, Estimate, Named, What};
-use changes::{Possible, centre};
-use layout::Layout;
-use payload::Payloads;
-pub use per_run::{KnownLoad, PerRun, SharedFit, Valued};
-pub use points::{ChangePoint, Step};
-use rows::{Rows, Sizes, White};
-pub use sums::{CommonGround, RunSums};
+pub use changes::{RunChange, ChangeEstimate, NamedEstimate, PhysicalChange};
+use changes::{ChangeHypothesis, centre};
+use layout::RunColumnLayout;
+use payload::PayloadColumns;
+pub use per_run::{KnownLoad, PerRunSelection, SharedFit, RunValue};
+pub use points::{ChangePoint, ParameterStep};
+use rows::{RunRows, MeasuredMoments, WhitenedRun};
+pub use sums::{ReferenceFit, RunSums};
 
 /// A difference of a base parameter counts as moved from this many standard deviations on.
 const MOVED: f64 = 4.0;
@@ -50,16 +50,16 @@ const AROUND: f64 = 0.2;
 
 /// A value with its standard deviation.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Fitted {
+pub struct FittedValue {
     /// The value, in the unit of the parameter.
     pub value: f64,
     /// Its standard deviation; `None` where the run does not determine the parameter.
     pub deviation: Option<f64>,
 }
 
-impl Fitted {
+impl FittedValue {
     /// The standard deviation of its difference from another one.
-    pub fn beside(self, other: Self) -> f64 {
+    pub fn difference_deviation(self, other: Self) -> f64 {
         let [a, b] = [self, other].map(|one| one.deviation.unwrap_or(0.0));
         a.hypot(b)
     }
@@ -67,22 +67,22 @@ impl Fitted {
 
 /// One run.
 #[derive(Clone, Debug)]
-pub struct OneRun {
+pub struct RunReport {
     /// What messages call its recording.
     pub file: String,
     /// Samples that were used.
     pub samples: usize,
     /// Base parameters fitted to this run alone.
-    pub alone: Vec<Fitted>,
+    pub alone: Vec<FittedValue>,
     /// Base parameters, by position, that differ from those of the first run by more than four deviations.
     pub moved: Vec<usize>,
     /// What changed against the first run, the largest first, and events within this run.
-    pub changes: Vec<Changed>,
+    pub changes: Vec<RunChange>,
 }
 
 /// A run that gave no answer.
 #[derive(Debug)]
-pub struct Unread {
+pub struct UnreadRun {
     /// What messages call its recording.
     pub file: String,
     /// Why.
@@ -91,31 +91,31 @@ pub struct Unread {
 
 /// What is asked of runs beside what changed.
 #[derive(Clone, Debug, Default)]
-pub struct Asked {
+pub struct RunsOptions {
     /// What each run has of its own in one fit of all runs; no such fit without any.
-    pub per_run: Vec<PerRun>,
+    pub per_run: Vec<PerRunSelection>,
     /// Loads of known mass, from which the scales of all measured forces follow.
     pub loads: Vec<KnownLoad>,
 }
 
 /// What differs between runs.
-pub struct Compared {
+pub struct RunsComparison {
     /// Name of the model.
     pub model: String,
     /// The base parameters.
     pub parameters: Vec<ParameterInfo>,
     /// Base parameters fitted to all runs at once.
-    pub together: Vec<Fitted>,
+    pub together: Vec<FittedValue>,
     /// All runs that gave an answer; the first is the one that the others are held against.
-    pub runs: Vec<OneRun>,
+    pub runs: Vec<RunReport>,
     /// Runs that gave none.
-    pub unread: Vec<Unread>,
+    pub unread: Vec<UnreadRun>,
     /// When parameters changed and stayed changed, in the order of the runs.
     pub points: Vec<ChangePoint>,
     /// The fit of all runs in which some values are each run's own, if one was asked for.
     pub shared: Option<SharedFit>,
     /// Remarks on the recordings.
-    pub notes: Vec<Note>,
+    pub notes: Vec<RecordingNote>,
 }
 
 impl Model {
@@ -126,51 +126,51 @@ impl Model {
     ///
     /// Fails with fewer than two runs, where the first cannot be read or no later one can, where no force was measured, or where
     /// `asked` names what the model does not have.
-    pub fn runs<R: Borrow<Recording>>(
+    pub fn runs<R: Borrow<PreparedRecording>>(
         &self,
-        recordings: impl IntoIterator<Item = Result<R, Unread>>,
-        asked: &Asked,
-    ) -> Outcome<Compared> {
-        let payloads = Payloads::new(self)?;
-        let bench = Bench::new(self, &payloads);
+        recordings: impl IntoIterator<Item = Result<R, UnreadRun>>,
+        asked: &RunsOptions,
+    ) -> Outcome<RunsComparison> {
+        let payloads = PayloadColumns::new(self)?;
+        let bench = RunAnalyser::new(self, &payloads);
         let layout = bench.layout;
-        let mut shared = per_run::Asking::new(self, &payloads, layout, asked)?;
+        let mut shared = per_run::SharedFitBuilder::new(self, &payloads, layout, asked)?;
         let mut recordings = recordings.into_iter();
         let total = recordings.size_hint().0;
         self.host()
-            .watched("holding runs against the first", total, |job| {
+            .run_job("holding runs against the first", total, |job| {
                 let Some(first) = recordings.next() else {
                     return Err(Error::options("there is no recording; give two or more"));
                 };
                 let first = first.map_err(|unread| unread.error)?;
                 let first = first.borrow();
-                let before = bench.looked_at(first, None)?;
-                let mut all = vec![bench.one(&before, &before)];
-                let mut notes: Vec<Note> = first.notes().cloned().collect();
-                let mut wholes = vec![before.white.whole()];
+                let before = bench.analyse_run(first, None)?;
+                let mut all = vec![bench.run_report(&before, &before)];
+                let mut notes: Vec<RecordingNote> = first.notes().cloned().collect();
+                let mut wholes = vec![before.white.total()];
                 let mut withins = vec![before.within];
                 let mut unread = Vec::new();
-                shared.take(&before.file, &before.white);
+                shared.add_run(&before.file, &before.white);
                 job.step(1)?;
                 for recording in recordings {
                     let looked_at = recording.and_then(|recording| {
                         let recording = recording.borrow();
                         notes.extend(recording.notes().cloned());
                         let file = recording.file().to_owned();
-                        let run = bench.looked_at(recording, Some(&before.values));
-                        run.map_err(|error| Unread { file, error })
+                        let run = bench.analyse_run(recording, Some(&before.values));
+                        run.map_err(|error| UnreadRun { file, error })
                     });
                     job.step(1)?;
                     match looked_at {
                         Ok(run) => {
-                            let mut one = bench.one(&run, &before);
+                            let mut one = bench.run_report(&run, &before);
                             one.changes.extend(bench.changes(&before, &run));
                             all.push(one);
-                            wholes.push(run.white.whole());
+                            wholes.push(run.white.total());
                             withins.push(run.within);
-                            shared.take(&run.file, &run.white);
+                            shared.add_run(&run.file, &run.white);
                         }
-                        Err(Unread {
+                        Err(UnreadRun {
                             error: Error::Cancelled,
                             ..
                         }) => return Err(Error::Cancelled),
@@ -178,11 +178,11 @@ impl Model {
                     }
                 }
                 if all.len() < 2 {
-                    return Err(alone(&before.file, &unread));
+                    return Err(too_few_runs_error(&before.file, &unread));
                 }
                 let base: Vec<usize> = (0..layout.base).collect();
-                let alone: Vec<&[Fitted]> = all.iter().map(|run| &run.alone[..]).collect();
-                let points = points::found(
+                let alone: Vec<&[FittedValue]> = all.iter().map(|run| &run.alone[..]).collect();
+                let points = points::find_change_points(
                     &bench,
                     &alone,
                     &wholes,
@@ -190,14 +190,14 @@ impl Model {
                     &before.sizes,
                     &before.values,
                 );
-                let mut together = Moments::new(layout.base);
+                let mut together = NormalEquations::new(layout.base);
                 for whole in &wholes {
-                    together.merge(&whole.of(&base));
+                    together.merge(&whole.select_columns(&base));
                 }
-                Ok(Compared {
+                Ok(RunsComparison {
                     model: self.name.clone(),
-                    parameters: self.infos(),
-                    together: fitted(self, &together),
+                    parameters: self.parameter_infos(),
+                    together: fit_parameters(self, &together),
                     points,
                     runs: all,
                     unread,
@@ -209,7 +209,7 @@ impl Model {
 }
 
 /// There is nothing to hold the first run against.
-fn alone(first: &str, unread: &[Unread]) -> Error {
+fn too_few_runs_error(first: &str, unread: &[UnreadRun]) -> Error {
     match unread {
         [] => Error::options(format!(
             "{first} is the only recording; what changed is told between two or more, the first of which is how things were"
@@ -225,36 +225,36 @@ fn alone(first: &str, unread: &[Unread]) -> Error {
 }
 
 /// What all runs are looked at with.
-pub(crate) struct Bench<'a> {
+pub(crate) struct RunAnalyser<'a> {
     model: &'a Model,
-    payloads: &'a Payloads,
-    layout: Layout,
-    possible: Vec<Possible>,
-    search: Search,
+    payloads: &'a PayloadColumns,
+    layout: RunColumnLayout,
+    possible: Vec<ChangeHypothesis>,
+    search: ChangeHypotheses,
 }
 
 /// One run as sums.
-pub(crate) struct LookedAt {
+pub(crate) struct RunStatistics {
     file: String,
     samples: usize,
-    pub(crate) events: Vec<Changed>,
+    pub(crate) events: Vec<RunChange>,
     /// Base parameters of the first run.
     values: DVector<f64>,
-    white: White,
+    white: WhitenedRun,
     /// By what its parts differ among themselves.
     within: f64,
     /// Its rows as they were measured.
-    sizes: Sizes,
+    sizes: MeasuredMoments,
 }
 
 /// Events of forces that were measured; those that follow each other at once are one.
-fn pushes(events: Vec<Event>, stretch: &Stretch) -> Vec<Event> {
-    let mut all: Vec<Event> = Vec::new();
+fn merged_contact_events(events: Vec<ContactEvent>, stretch: &RecordingSegment) -> Vec<ContactEvent> {
+    let mut all: Vec<ContactEvent> = Vec::new();
     for mut event in events {
         let (from, to) = (event.from, event.to);
         event
             .drives
-            .retain(|(d, ..)| was_measured(stretch, *d, from, to));
+            .retain(|(d, ..)| is_measured(stretch, *d, from, to));
         if event.drives.is_empty() {
             continue;
         }
@@ -275,7 +275,7 @@ fn pushes(events: Vec<Event>, stretch: &Stretch) -> Vec<Event> {
 }
 
 /// Whether most forces of a drive between two times were measured: what stands in the place of others is no push.
-fn was_measured(stretch: &Stretch, drive: usize, from: f64, to: f64) -> bool {
+fn is_measured(stretch: &RecordingSegment, drive: usize, from: f64, to: f64) -> bool {
     let Some(out) = stretch.run.left_out.get(drive) else {
         return true;
     };
@@ -289,11 +289,11 @@ fn was_measured(stretch: &Stretch, drive: usize, from: f64, to: f64) -> bool {
     2 * lost < n
 }
 
-impl<'a> Bench<'a> {
-    fn new(model: &'a Model, payloads: &'a Payloads) -> Self {
-        let layout = Layout::new(model, payloads);
-        let possible = changes::possible(model, payloads, layout);
-        let search = Search {
+impl<'a> RunAnalyser<'a> {
+    fn new(model: &'a Model, payloads: &'a PayloadColumns) -> Self {
+        let layout = RunColumnLayout::new(model, payloads);
+        let possible = changes::possible_changes(model, payloads, layout);
+        let search = ChangeHypotheses {
             shared: (0..layout.total()).collect(),
             changes: possible.iter().map(|one| one.candidate.clone()).collect(),
         };
@@ -306,16 +306,16 @@ impl<'a> Bench<'a> {
         }
     }
 
-    fn looked_at(&self, recording: &Recording, values: Option<&DVector<f64>>) -> Outcome<LookedAt> {
-        let mut stretches = recording.stretches.clone();
+    fn analyse_run(&self, recording: &PreparedRecording, values: Option<&DVector<f64>>) -> Outcome<RunStatistics> {
+        let mut stretches = recording.segments.clone();
         let mut told = Vec::new();
         for stretch in &mut stretches {
             let found = events::events(self.model, stretch).unwrap_or_default();
-            let found = pushes(found, stretch);
+            let found = merged_contact_events(found, stretch);
             // The beginning and the end of a push hardly rise above what is usual.
             let wide = found.iter().map(|event| {
                 let room = AROUND * (event.to - event.from);
-                Event {
+                ContactEvent {
                     from: event.from - room,
                     to: event.to + room,
                     drives: Vec::new(),
@@ -327,16 +327,16 @@ impl<'a> Bench<'a> {
                 .filter(|event| event.to - event.from >= SHORTEST_PUSH);
             told.extend(lasting.map(|event| changes::event(self.model, event)));
         }
-        let rows = Rows::new(self.model, &stretches, self.payloads, values)?;
-        let white = rows.white()?;
-        Ok(LookedAt {
+        let rows = RunRows::new(self.model, &stretches, self.payloads, values)?;
+        let white = rows.whitened_run()?;
+        Ok(RunStatistics {
             file: recording.file().to_owned(),
             samples: stretches
                 .iter()
                 .map(|one| one.samples().div_ceil(one.decimation()))
                 .sum(),
             events: told,
-            within: within(&white.blocks, &self.search),
+            within: within_run_spread(&white.blocks, &self.search),
             white,
             values: rows.values.clone(),
             sizes: rows.sizes(),
@@ -344,20 +344,20 @@ impl<'a> Bench<'a> {
     }
 
     /// A run fitted alone.
-    fn one(&self, run: &LookedAt, before: &LookedAt) -> OneRun {
+    fn run_report(&self, run: &RunStatistics, before: &RunStatistics) -> RunReport {
         let base: Vec<usize> = (0..self.layout.base).collect();
-        let of = |run: &LookedAt| fitted(self.model, &run.white.whole().of(&base));
+        let of = |run: &RunStatistics| fit_parameters(self.model, &run.white.total().select_columns(&base));
         let (alone, reference) = (of(run), of(before));
-        let differs = |(a, b): (&Fitted, &Fitted)| {
+        let differs = |(a, b): (&FittedValue, &FittedValue)| {
             let is_known = a.deviation.is_some() && b.deviation.is_some();
-            is_known && (a.value - b.value).abs() > MOVED * a.beside(*b)
+            is_known && (a.value - b.value).abs() > MOVED * a.difference_deviation(*b)
         };
         let pairs = alone.iter().zip(&reference).map(differs);
         let moved = pairs
             .enumerate()
             .filter_map(|(k, d)| d.then_some(k))
             .collect();
-        OneRun {
+        RunReport {
             file: run.file.clone(),
             samples: run.samples,
             alone,
@@ -367,77 +367,77 @@ impl<'a> Bench<'a> {
     }
 
     /// What changed in a run, the largest first; what hardly moves any drive is left out.
-    fn changes(&self, before: &LookedAt, run: &LookedAt) -> Vec<Changed> {
-        self.told(&self.found(before, run), &before.values)
+    fn changes(&self, before: &RunStatistics, run: &RunStatistics) -> Vec<RunChange> {
+        self.identified_changes(&self.find_changes(before, run), &before.values)
     }
 
-    fn found(&self, before: &LookedAt, run: &LookedAt) -> Vec<Change> {
-        let runs = Runs {
+    fn find_changes(&self, before: &RunStatistics, run: &RunStatistics) -> Vec<SelectedChange> {
+        let runs = RunPair {
             reference: before.white.blocks.clone(),
             later: run.white.blocks.clone(),
-            within: before.within.max(run.within),
+            within_run_spread: before.within.max(run.within),
         };
-        self.large(&runs, &run.sizes)
+        self.significant_changes(&runs, &run.sizes)
     }
 
     /// What a search finds, without what hardly moves any drive.
-    fn large(&self, runs: &Runs, sizes: &Sizes) -> Vec<Change> {
-        let mut found = search(runs, &self.search);
+    fn significant_changes(&self, runs: &RunPair, sizes: &MeasuredMoments) -> Vec<SelectedChange> {
+        let mut found = search_changes(runs, &self.search);
         found.retain(|one| {
-            let columns = &self.possible[one.which].candidate.columns;
-            sizes.part(columns, &one.values) > LEAST
+            let columns = &self.possible[one.candidate].candidate.columns;
+            sizes.force_fraction(columns, &one.values) > LEAST
         });
         found
     }
 
-    fn told(&self, found: &[Change], values: &DVector<f64>) -> Vec<Changed> {
+    fn identified_changes(&self, found: &[SelectedChange], values: &DVector<f64>) -> Vec<RunChange> {
         let told = found.iter();
-        told.map(|one| changes::told(self.model, &self.possible, one, values))
+        told.map(|one| changes::identified_change(self.model, &self.possible, one, values))
             .collect()
     }
 }
 
 /// A change between two recordings, with the force that it is.
-pub(crate) struct Difference {
+pub(crate) struct RecordingDifference {
     /// The recording before.
     pub(crate) first: String,
     /// The later one.
     pub(crate) later: String,
     /// What changed.
-    pub(crate) changed: Changed,
+    pub(crate) changed: RunChange,
     /// What the forces of the later one have besides, along all recordings.
-    pub(crate) force: Column,
+    pub(crate) force: ForceColumn,
 }
 
 /// What later recordings do not share with the first, with the forces that that makes.
-pub(crate) fn differences(model: &Model, recordings: &[&Recording]) -> Outcome<Vec<Difference>> {
+pub(crate) fn differences(model: &Model, recordings: &[&PreparedRecording]) -> Outcome<Vec<RecordingDifference>> {
     let [first, later @ ..] = recordings else {
         return Ok(Vec::new());
     };
-    let payloads = Payloads::new(model)?;
-    let bench = Bench::new(model, &payloads);
-    let before = bench.looked_at(first, None)?;
+    let payloads = PayloadColumns::new(model)?;
+    let bench = RunAnalyser::new(model, &payloads);
+    let before = bench.analyse_run(first, None)?;
     let samples =
-        |one: &Recording| -> usize { one.stretches.iter().map(|one| one.time().len()).sum() };
+        |one: &PreparedRecording| -> usize { one.segments.iter().map(|one| one.time().len()).sum() };
     let total: usize = recordings.iter().map(|one| samples(one)).sum();
     let mut start = samples(first);
     let mut differences = Vec::new();
     for recording in later {
-        let run = bench.looked_at(recording, Some(&before.values))?;
+        let run = bench.analyse_run(recording, Some(&before.values))?;
         let end = start + samples(recording);
-        let found = bench.found(&before, &run);
+        let found = bench.find_changes(&before, &run);
         let rows = match found[..] {
             [] => None,
-            _ => Some(Rows::new(
+            _ => Some(RunRows::new(
                 model,
-                &recording.stretches,
+                &recording.segments,
                 &payloads,
                 Some(&before.values),
             )?),
         };
-        for (one, changed) in found.iter().zip(bench.told(&found, &before.values)) {
+        for (one, changed) in found.iter().zip(bench.identified_changes(&found, &before.values)) {
             let Some(rows) = &rows else { continue };
-            let own = rows.force(&bench.possible[one.which].candidate.columns, &one.values)?;
+            let own = rows.force(&bench.possible[one.candidate].candidate.columns, &one.values)?;
             let along_all = |values: Vec<f64>| {
                 let mut all = vec![0.0; total];
                 if values.len() == end - start {
@@ -445,11 +445,11 @@ pub(crate) fn differences(model: &Model, recordings: &[&Recording]) -> Outcome<V
                 }
                 all
             };
-            differences.push(Difference {
+            differences.push(RecordingDifference {
                 first: first.file().to_owned(),
                 later: recording.file().to_owned(),
                 changed,
-                force: Column::new(own.into_iter().map(along_all).collect()),
+                force: ForceColumn::new(own.into_iter().map(along_all).collect()),
             });
         }
         start = end;
@@ -458,21 +458,21 @@ pub(crate) fn differences(model: &Model, recordings: &[&Recording]) -> Outcome<V
 }
 
 /// The base parameters that some rows of variance 1 give; those that are numbers of the file keep them.
-fn fitted(model: &Model, moments: &Moments) -> Vec<Fitted> {
+fn fit_parameters(model: &Model, moments: &NormalEquations) -> Vec<FittedValue> {
     let solved = moments.solve();
-    let noise = (solved.rest / (moments.rows as f64 - solved.rank as f64).max(1.0)).max(1.0);
-    beside_known(model, |i| Fitted {
+    let noise = (solved.residual_squares / (moments.rows as f64 - solved.rank as f64).max(1.0)).max(1.0);
+    merge_known(model, |i| FittedValue {
         value: solved.values[i],
         deviation: solved.determined[i].then(|| (noise * solved.covariance[(i, i)]).sqrt()),
     })
 }
 
 /// All base parameters, of which those that are no numbers of the file are asked for by their place among themselves.
-fn beside_known(model: &Model, unknown: impl Fn(usize) -> Fitted) -> Vec<Fitted> {
+fn merge_known(model: &Model, unknown: impl Fn(usize) -> FittedValue) -> Vec<FittedValue> {
     let mut next = 0;
     let of = |k: usize| {
         if model.is_known(k) {
-            return Fitted {
+            return FittedValue {
                 value: model.nominal[k],
                 deviation: Some(0.0),
             };

@@ -2,7 +2,7 @@
 //! and inertia about the frame's origin.
 
 use modelmill_codegen::{Derivation, derive_columns};
-use modelmill_spec::{Exact, FrameIdx, Inertial, Mechanism, Parameter, ParameterIdx, Part, Symbol};
+use modelmill_spec::{ExactExpression, FrameIdx, PartInertia, Mechanism, DynamicParameter, ParameterIdx, ModelPart, ModelSymbol};
 
 use crate::error::{Error, Outcome};
 use crate::model::Model;
@@ -11,7 +11,7 @@ use crate::model::Model;
 pub(crate) const TEN: usize = 10;
 
 /// Columns of further bodies.
-pub(crate) struct Payloads {
+pub(crate) struct PayloadColumns {
     /// Frames that carry them, one after the other.
     pub(crate) frames: Vec<String>,
     /// For each frame the columns of the derivation that are those of its ten parameters; `None` where one has no effect.
@@ -20,7 +20,7 @@ pub(crate) struct Payloads {
     pub(crate) derivation: Derivation,
 }
 
-impl Payloads {
+impl PayloadColumns {
     /// Of all frames that carry parts or lumped masses.
     pub(crate) fn new(model: &Model) -> Outcome<Self> {
         let mechanism = &model.derivation.mechanism;
@@ -34,7 +34,7 @@ impl Payloads {
         frames.sort_by_key(|frame| frame.0);
         let (variant, own) = with_bodies(mechanism, &frames);
         let is_wanted =
-            |product: &modelmill_codegen::Monomial| matches!(product.0[..], [(p, 1)] if p >= own);
+            |product: &modelmill_codegen::ParameterMonomial| matches!(product.0[..], [(p, 1)] if p >= own);
         let derivation = derive_columns(&variant, &is_wanted)
             .map_err(|error| Error::derivation(&model.path, error))?;
         let reduction = &derivation.reduction;
@@ -63,11 +63,11 @@ fn with_bodies(mechanism: &Mechanism, frames: &[FrameIdx]) -> (Mechanism, usize)
     let own = variant.parameters.len();
     for frame in frames {
         let first = variant.parameters.len();
-        let value = |i: usize| Exact::Symbol(Symbol::Parameter(ParameterIdx(first + i)));
-        variant.parts.push(Part {
+        let value = |i: usize| ExactExpression::Symbol(ModelSymbol::Parameter(ParameterIdx(first + i)));
+        variant.parts.push(ModelPart {
             name: format!("payload of {}", variant.frames[frame.0].name),
             frame: *frame,
-            inertial: Inertial::Linear {
+            inertial: PartInertia::Linear {
                 mass: value(0),
                 first_moment: std::array::from_fn(|i| value(1 + i)),
                 inertia: std::array::from_fn(|i| value(4 + i)),
@@ -79,7 +79,7 @@ fn with_bodies(mechanism: &Mechanism, frames: &[FrameIdx]) -> (Mechanism, usize)
                 1..=3 => "kg m",
                 _ => "kg m^2",
             };
-            variant.parameters.push(Parameter {
+            variant.parameters.push(DynamicParameter {
                 name: format!("payload{first}_{i}"),
                 nominal: 0.0,
                 unit: unit.to_owned(),

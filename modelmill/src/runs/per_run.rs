@@ -2,20 +2,20 @@
 //! from a load of known mass.
 
 use modelmill_identify::ParameterInfo;
-use modelmill_identify::changes::{Joint, Part, Values, joint};
+use modelmill_identify::changes::{JointFit, JointRun, JointValues, fit_jointly};
 
 use crate::error::{Error, Outcome};
 use crate::model::Model;
-use crate::runs::changes::{friction, offset, per_rate};
-use crate::runs::layout::Layout;
-use crate::runs::payload::{Payloads, TEN};
-use crate::runs::rows::White;
-use crate::runs::{Estimate, Fitted, centre};
+use crate::runs::changes::{friction, offset, viscous_unit};
+use crate::runs::layout::RunColumnLayout;
+use crate::runs::payload::{PayloadColumns, TEN};
+use crate::runs::rows::WhitenedRun;
+use crate::runs::{ChangeEstimate, FittedValue, centre};
 
 /// Kinds of values that a run may have of its own.
 const KINDS: [&str; 6] = ["payload", "friction", "offset", "gain", "clock", "zero"];
 /// What a body's ten parameters are called, with their units.
-const OF_BODY: [(&str, &str); TEN] = [
+const BODY_PARAMETERS: [(&str, &str); TEN] = [
     ("mass", "kg"),
     ("mx", "kg m"),
     ("my", "kg m"),
@@ -30,12 +30,12 @@ const OF_BODY: [(&str, &str); TEN] = [
 
 /// Values that each run has of its own: a kind, and where.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct PerRun {
+pub struct PerRunSelection {
     what: String,
     at: Option<String>,
 }
 
-impl PerRun {
+impl PerRunSelection {
     /// Reads `payload@FRAME`, `friction`, `friction@DRIVE`, `offset`, `offset@DRIVE`, `gain`, `gain@DRIVE`, `clock`, `zero`,
     /// `zero@COORDINATE`, or the name of a base parameter.
     ///
@@ -101,9 +101,9 @@ impl KnownLoad {
 
 /// A value of one run.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Valued {
+pub struct RunValue {
     /// What it belongs to, as it was asked for: `payload@flange`, `friction@joint1`.
-    pub of: String,
+    pub quantity: String,
     /// Its name there.
     pub name: String,
     /// Its unit.
@@ -111,23 +111,23 @@ pub struct Valued {
     /// Whether it is told against the first run, which has none of it, rather than as it is.
     pub is_against_first: bool,
     /// The value.
-    pub value: Fitted,
+    pub value: FittedValue,
 }
 
 /// All runs in one fit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SharedFit {
     /// Shared base parameters, by position; `None` for those that are each run's own.
-    pub shared: Vec<Option<Fitted>>,
+    pub shared: Vec<Option<FittedValue>>,
     /// By which factor each drive's measured force becomes the true one, where a known load tells.
-    pub gains: Vec<(String, Fitted)>,
+    pub gains: Vec<(String, FittedValue)>,
     /// The runs, each with its own values.
-    pub runs: Vec<(String, Vec<Valued>)>,
+    pub runs: Vec<(String, Vec<RunValue>)>,
 }
 
 /// Columns that belong to one thing that was asked for.
-struct Own {
-    of: String,
+struct PerRunColumns {
+    quantity: String,
     columns: Vec<usize>,
     /// Names and units of the values.
     names: Vec<(String, String)>,
@@ -137,29 +137,29 @@ struct Own {
 }
 
 /// A fit that gathers its runs.
-pub(crate) struct Asking<'a> {
+pub(crate) struct SharedFitBuilder<'a> {
     model: &'a Model,
-    layout: Layout,
-    own: Vec<Own>,
+    layout: RunColumnLayout,
+    own: Vec<PerRunColumns>,
     loads: &'a [KnownLoad],
     /// First column of each load's body.
     loaded: Vec<usize>,
     /// Columns that are used at all.
     used: Vec<usize>,
-    runs: Vec<(String, Vec<modelmill_identify::changes::Moments>)>,
+    runs: Vec<(String, Vec<modelmill_identify::changes::NormalEquations>)>,
 }
 
-impl<'a> Asking<'a> {
+impl<'a> SharedFitBuilder<'a> {
     pub(crate) fn new(
         model: &'a Model,
-        payloads: &Payloads,
-        layout: Layout,
-        asked: &'a super::Asked,
+        payloads: &PayloadColumns,
+        layout: RunColumnLayout,
+        asked: &'a super::RunsOptions,
     ) -> Outcome<Self> {
-        let infos = model.infos();
-        let mut own: Vec<Own> = Vec::new();
+        let infos = model.parameter_infos();
+        let mut own: Vec<PerRunColumns> = Vec::new();
         for one in &asked.per_run {
-            for further in owned(model, payloads, layout, &infos, one)? {
+            for further in per_run_columns(model, payloads, layout, &infos, one)? {
                 if own.iter().all(|other| other.columns != further.columns) {
                     own.push(further);
                 }
@@ -187,19 +187,19 @@ impl<'a> Asking<'a> {
         })
     }
 
-    fn is_asked(&self) -> bool {
+    fn is_requested(&self) -> bool {
         !self.own.is_empty() || !self.loads.is_empty()
     }
 
     /// Takes what the fit needs of a run.
-    pub(crate) fn take(&mut self, file: &str, white: &White) {
-        if !self.is_asked() {
+    pub(crate) fn add_run(&mut self, file: &str, white: &WhitenedRun) {
+        if !self.is_requested() {
             return;
         }
         let sums = if self.loads.is_empty() {
-            vec![white.whole().of(&self.used)]
+            vec![white.total().select_columns(&self.used)]
         } else {
-            white.drives.iter().map(|one| one.of(&self.used)).collect()
+            white.drives.iter().map(|one| one.select_columns(&self.used)).collect()
         };
         self.runs.push((file.to_owned(), sums));
     }
@@ -210,26 +210,26 @@ impl<'a> Asking<'a> {
 
     /// The fit; `None` if none was asked for.
     pub(crate) fn answer(self) -> Outcome<Option<SharedFit>> {
-        if !self.is_asked() {
+        if !self.is_requested() {
             return Ok(None);
         }
-        let loads: Outcome<Vec<usize>> = self.loads.iter().map(|load| self.run(load)).collect();
+        let loads: Outcome<Vec<usize>> = self.loads.iter().map(|load| self.run_of_load(load)).collect();
         let loads = loads?;
         let absolute = (self.own.iter()).filter(|one| !one.is_against_first);
         let not_shared: Vec<usize> = absolute.flat_map(|one| one.columns.clone()).collect();
         let shared: Vec<usize> = (0..self.layout.base)
             .filter(|k| !not_shared.contains(k))
             .collect();
-        let parts: Vec<(Part, Vec<&Own>)> =
-            (0..self.runs.len()).map(|r| self.part(r, &loads)).collect();
-        let (parts, owns): (Vec<Part>, Vec<Vec<&Own>>) = parts.into_iter().unzip();
+        let parts: Vec<(JointRun, Vec<&PerRunColumns>)> =
+            (0..self.runs.len()).map(|r| self.run_part(r, &loads)).collect();
+        let (parts, owns): (Vec<JointRun>, Vec<Vec<&PerRunColumns>>) = parts.into_iter().unzip();
         let places: Vec<usize> = shared.iter().map(|k| self.place(*k)).collect();
-        let found = joint(&parts, &places, !self.loads.is_empty());
-        Ok(Some(self.told(&found, &shared, &parts, &owns)))
+        let found = fit_jointly(&parts, &places, !self.loads.is_empty());
+        Ok(Some(self.shared_fit(&found, &shared, &parts, &owns)))
     }
 
     /// Which run carries a load.
-    fn run(&self, load: &KnownLoad) -> Outcome<usize> {
+    fn run_of_load(&self, load: &KnownLoad) -> Outcome<usize> {
         let names = self.runs.iter().enumerate();
         let found: Vec<usize> = names
             .filter(|(_, (file, _))| {
@@ -254,8 +254,8 @@ impl<'a> Asking<'a> {
     }
 
     /// What a run has of its own.
-    fn part(&self, r: usize, loads: &[usize]) -> (Part, Vec<&Own>) {
-        let owns: Vec<&Own> = (self.own.iter())
+    fn run_part(&self, r: usize, loads: &[usize]) -> (JointRun, Vec<&PerRunColumns>) {
+        let owns: Vec<&PerRunColumns> = (self.own.iter())
             .filter(|one| r > 0 || !one.is_against_first)
             .collect();
         let mut own: Vec<usize> = owns.iter().flat_map(|one| one.columns.clone()).collect();
@@ -272,7 +272,7 @@ impl<'a> Asking<'a> {
         }
         let is_known = |k: &usize| known.iter().any(|(at, _)| at == k);
         let own = own.into_iter().map(|k| self.place(k));
-        let part = Part {
+        let part = JointRun {
             channels: self.runs[r].1.clone(),
             own: own.filter(|k| !is_known(k)).collect(),
             known,
@@ -280,31 +280,31 @@ impl<'a> Asking<'a> {
         (part, owns)
     }
 
-    fn told(
+    fn shared_fit(
         &self,
-        found: &Joint,
+        found: &JointFit,
         shared: &[usize],
-        parts: &[Part],
-        owns: &[Vec<&Own>],
+        parts: &[JointRun],
+        owns: &[Vec<&PerRunColumns>],
     ) -> SharedFit {
         let unknown: Vec<usize> = (0..self.model.base.len())
             .filter(|k| !self.model.is_known(*k))
             .collect();
         let of_base = |k: usize| match unknown.iter().position(|one| *one == k) {
-            None => Some(Fitted {
+            None => Some(FittedValue {
                 value: self.model.nominal[k],
                 deviation: Some(0.0),
             }),
             Some(column) => {
                 let at = shared.iter().position(|one| *one == column)?;
-                Some(fitted(&found.shared, at))
+                Some(fitted_value(&found.shared, at))
             }
         };
         let gain = |(d, drive): (usize, String)| {
-            let scale = fitted(&found.shared, shared.len() + d);
+            let scale = fitted_value(&found.shared, shared.len() + d);
             let value = scale.value.recip();
             let deviation = scale.deviation.map(|one| one * value * value);
-            (drive, Fitted { value, deviation })
+            (drive, FittedValue { value, deviation })
         };
         let drives = self.model.drives().into_iter().enumerate();
         let runs = self.runs.iter().zip(parts).zip(owns).zip(&found.own);
@@ -323,22 +323,22 @@ impl<'a> Asking<'a> {
     }
 
     /// Values of one thing in a run.
-    fn values(&self, own: &Own, part: &Part, values: &Values) -> Vec<Valued> {
+    fn values(&self, own: &PerRunColumns, part: &JointRun, values: &JointValues) -> Vec<RunValue> {
         let at = |column: &usize| {
             let place = self.place(*column);
             part.own.iter().position(|one| *one == place)
         };
         let places: Vec<Option<usize>> = own.columns.iter().map(at).collect();
-        let valued = |name: &str, unit: &str, value: Fitted| Valued {
-            of: own.of.clone(),
+        let valued = |name: &str, unit: &str, value: FittedValue| RunValue {
+            quantity: own.quantity.clone(),
             name: name.to_owned(),
             unit: unit.to_owned(),
             is_against_first: own.is_against_first,
             value,
         };
-        let mut told: Vec<Valued> = (own.names.iter().zip(&places))
+        let mut told: Vec<RunValue> = (own.names.iter().zip(&places))
             .filter_map(|((name, unit), place)| {
-                let mut one = fitted(values, (*place)?);
+                let mut one = fitted_value(values, (*place)?);
                 one.value += own.origin;
                 Some(valued(name, unit, one))
             })
@@ -351,7 +351,7 @@ impl<'a> Asking<'a> {
                 .copied()
                 .collect::<Option<Vec<usize>>>(),
         ) {
-            let four = Values {
+            let four = JointValues {
                 values: values.values.select_rows(&places),
                 covariance: values
                     .covariance
@@ -361,30 +361,30 @@ impl<'a> Asking<'a> {
             };
             let axes = ["x", "y", "z"].into_iter().zip(centre(&four));
             told.extend(axes.filter_map(|(axis, at)| {
-                let Estimate { value, deviation } = at?;
+                let ChangeEstimate { value, deviation } = at?;
                 let deviation = Some(deviation);
-                Some(valued(axis, "m", Fitted { value, deviation }))
+                Some(valued(axis, "m", FittedValue { value, deviation }))
             }));
         }
         told
     }
 }
 
-fn fitted(values: &Values, at: usize) -> Fitted {
+fn fitted_value(values: &JointValues, at: usize) -> FittedValue {
     let variance = values.covariance[(at, at)].max(0.0);
-    Fitted {
+    FittedValue {
         value: values.values[at],
         deviation: values.determined[at].then(|| variance.sqrt()),
     }
 }
 
 /// Position of a frame among those that may carry a load.
-fn frame(payloads: &Payloads, name: &str) -> Outcome<usize> {
+fn frame(payloads: &PayloadColumns, name: &str) -> Outcome<usize> {
     let at = payloads.frames.iter().position(|frame| frame == name);
-    at.ok_or_else(|| no_such("body", name, &payloads.frames))
+    at.ok_or_else(|| unknown_name_error("body", name, &payloads.frames))
 }
 
-fn no_such(what: &str, name: &str, names: &[String]) -> Error {
+fn unknown_name_error(what: &str, name: &str, names: &[String]) -> Error {
     Error::options(format!(
         "there is no {what} `{name}`; there are {}",
         names.join(", ")
@@ -392,19 +392,19 @@ fn no_such(what: &str, name: &str, names: &[String]) -> Error {
 }
 
 /// The columns that something asked for has.
-fn owned(
+fn per_run_columns(
     model: &Model,
-    payloads: &Payloads,
-    layout: Layout,
+    payloads: &PayloadColumns,
+    layout: RunColumnLayout,
     infos: &[ParameterInfo],
-    asked: &PerRun,
-) -> Outcome<Vec<Own>> {
-    let PerRun { what, at } = asked;
+    asked: &PerRunSelection,
+) -> Outcome<Vec<PerRunColumns>> {
+    let PerRunSelection { what, at } = asked;
     let places = |what: &str, names: Vec<String>| match at {
         None => Ok((0..names.len()).collect::<Vec<usize>>()),
         Some(at) => match names.iter().position(|name| name == at) {
             Some(k) => Ok(vec![k]),
-            None => Err(no_such(what, at, &names)),
+            None => Err(unknown_name_error(what, at, &names)),
         },
     };
     let named = |all: &[(&str, &str)]| -> Vec<(String, String)> {
@@ -416,10 +416,10 @@ fn owned(
         "payload" => {
             let name = at.as_deref().unwrap_or_default();
             let start = layout.payload(frame(payloads, name)?);
-            vec![Own {
-                of: format!("payload@{name}"),
+            vec![PerRunColumns {
+                quantity: format!("payload@{name}"),
                 columns: (start..start + TEN).collect(),
-                names: named(&OF_BODY),
+                names: named(&BODY_PARAMETERS),
                 is_against_first: true,
                 origin: 0.0,
             }]
@@ -434,10 +434,10 @@ fn owned(
                     [Some(dry), Some(viscous)] => (vec![dry, viscous], false),
                     _ => (vec![start, start + 1], true),
                 };
-                Own {
-                    of: format!("friction@{}", drives[d]),
+                PerRunColumns {
+                    quantity: format!("friction@{}", drives[d]),
                     columns,
-                    names: named(&[("Fc", unit), ("Fv", per_rate(unit))]),
+                    names: named(&[("Fc", unit), ("Fv", viscous_unit(unit))]),
                     is_against_first,
                     origin: 0.0,
                 }
@@ -446,8 +446,8 @@ fn owned(
         "offset" => (places("drive", drives.clone())?.into_iter())
             .map(|d| {
                 let own = offset(model, d);
-                Own {
-                    of: format!("offset@{}", drives[d]),
+                PerRunColumns {
+                    quantity: format!("offset@{}", drives[d]),
                     columns: vec![own.unwrap_or(layout.offset(d))],
                     names: named(&[("F0", model.force_unit(d))]),
                     is_against_first: own.is_none(),
@@ -456,24 +456,24 @@ fn owned(
             })
             .collect(),
         "gain" => (places("drive", drives.clone())?.into_iter())
-            .map(|d| Own {
-                of: format!("gain@{}", drives[d]),
+            .map(|d| PerRunColumns {
+                quantity: format!("gain@{}", drives[d]),
                 columns: vec![layout.scale(d)],
                 names: named(&[("gain", "1")]),
                 is_against_first: true,
                 origin: 1.0,
             })
             .collect(),
-        "clock" => vec![Own {
-            of: "clock".to_owned(),
+        "clock" => vec![PerRunColumns {
+            quantity: "clock".to_owned(),
             columns: vec![layout.clock()],
             names: named(&[("factor", "1")]),
             is_against_first: true,
             origin: 1.0,
         }],
-        "zero" => (places("coordinate", model.active())?.into_iter())
-            .map(|i| Own {
-                of: format!("zero@{}", model.active()[i]),
+        "zero" => (places("coordinate", model.active_coordinates())?.into_iter())
+            .map(|i| PerRunColumns {
+                quantity: format!("zero@{}", model.active_coordinates()[i]),
                 columns: vec![layout.zero(i)],
                 names: named(&[("shift", if model.motions()[i].1 { "rad" } else { "m" })]),
                 is_against_first: true,
@@ -487,10 +487,10 @@ fn owned(
 /// A base parameter by its name.
 fn base_parameter(
     model: &Model,
-    payloads: &Payloads,
+    payloads: &PayloadColumns,
     infos: &[ParameterInfo],
     name: &str,
-) -> Outcome<Own> {
+) -> Outcome<PerRunColumns> {
     let unknown: Vec<usize> = (0..model.base.len())
         .filter(|k| !model.is_known(*k))
         .collect();
@@ -503,8 +503,8 @@ fn base_parameter(
             model.drives().first().map_or("drive", String::as_str)
         )));
     };
-    Ok(Own {
-        of: name.to_owned(),
+    Ok(PerRunColumns {
+        quantity: name.to_owned(),
         columns: vec![column],
         names: vec![(name.to_owned(), infos[unknown[column]].unit.clone())],
         is_against_first: false,

@@ -4,15 +4,15 @@
 use std::ops::Range;
 
 use modelmill_identify::LeastSquares;
-use modelmill_identify::changes::{Coloured, Moments};
+use modelmill_identify::changes::{AutoregressiveNoise, NormalEquations};
 use nalgebra::DVector;
 
 use crate::error::{Error, Outcome};
 use crate::model::Model;
-use crate::runs::columns::Laid;
-use crate::runs::layout::Layout;
-use crate::runs::payload::Payloads;
-use crate::stretch::Stretch;
+use crate::runs::columns::SegmentRows;
+use crate::runs::layout::RunColumnLayout;
+use crate::runs::payload::PayloadColumns;
+use crate::stretch::RecordingSegment;
 
 /// Blocks of a run that decide for each other.
 pub(crate) const BLOCKS: usize = 8;
@@ -26,31 +26,31 @@ const PIECE: usize = 4096;
 const KEPT: usize = 2;
 
 /// The rows of one run.
-pub(crate) struct Rows<'a> {
+pub(crate) struct RunRows<'a> {
     model: &'a Model,
-    payloads: &'a Payloads,
-    pieces: Vec<Stretch>,
-    kept: Option<Vec<Laid>>,
+    payloads: &'a PayloadColumns,
+    pieces: Vec<RecordingSegment>,
+    kept: Option<Vec<SegmentRows>>,
     /// Base parameters on which scales and clocks are built: those of the first run.
     pub(crate) values: DVector<f64>,
     /// Sums over the rows of each drive as they were measured.
-    sums: Vec<Moments>,
+    sums: Vec<NormalEquations>,
 }
 
 /// A run whose rows are white: what it says.
-pub(crate) struct White {
+pub(crate) struct WhitenedRun {
     /// Block by block, all drives together.
-    pub(crate) blocks: Vec<Moments>,
+    pub(crate) blocks: Vec<NormalEquations>,
     /// Drive by drive, the whole run.
-    pub(crate) drives: Vec<Moments>,
+    pub(crate) drives: Vec<NormalEquations>,
     /// The base columns alone, all drives together: a triangle keeps the digits that sums of products lose.
     pub(crate) base: LeastSquares,
 }
 
-impl White {
+impl WhitenedRun {
     /// The whole run.
-    pub(crate) fn whole(&self) -> Moments {
-        let mut whole = Moments::new(self.blocks[0].rhs.len());
+    pub(crate) fn total(&self) -> NormalEquations {
+        let mut whole = NormalEquations::new(self.blocks[0].rhs.len());
         for block in &self.blocks {
             whole.merge(block);
         }
@@ -58,27 +58,27 @@ impl White {
     }
 }
 
-impl<'a> Rows<'a> {
+impl<'a> RunRows<'a> {
     /// The rows of stretches; `values` are base parameters of the run before, in whose place come those of this run where there
     /// is none before.
     pub(crate) fn new(
         model: &'a Model,
-        stretches: &[Stretch],
-        payloads: &'a Payloads,
+        stretches: &[RecordingSegment],
+        payloads: &'a PayloadColumns,
         values: Option<&DVector<f64>>,
     ) -> Outcome<Self> {
-        let layout = Layout::new(model, payloads);
-        let pieces: Vec<Stretch> = (stretches.iter())
+        let layout = RunColumnLayout::new(model, payloads);
+        let pieces: Vec<RecordingSegment> = (stretches.iter())
             .flat_map(|stretch| stretch.pieces(PIECE))
             .collect();
         let values = match values {
             Some(values) => values.clone(),
             None => {
-                let mut sums = vec![Moments::new(layout.base); layout.drives];
+                let mut sums = vec![NormalEquations::new(layout.base); layout.drives];
                 for piece in &pieces {
-                    add(&mut sums, &Laid::base(model, piece)?);
+                    add_rows(&mut sums, &SegmentRows::base_columns(model, piece)?);
                 }
-                weighed(&sums)?
+                weighted_least_squares(&sums)?
             }
         };
         let mut rows = Self {
@@ -90,33 +90,33 @@ impl<'a> Rows<'a> {
             sums: Vec::new(),
         };
         if rows.pieces.len() <= KEPT {
-            let laid = rows.pieces.iter().map(|piece| rows.laid(piece));
+            let laid = rows.pieces.iter().map(|piece| rows.segment_rows(piece));
             rows.kept = Some(laid.collect::<Outcome<_>>()?);
         }
-        let mut sums = vec![Moments::new(layout.total()); layout.drives];
+        let mut sums = vec![NormalEquations::new(layout.total()); layout.drives];
         rows.visit(|laid| {
-            add(&mut sums, laid);
+            add_rows(&mut sums, laid);
             Ok(())
         })?;
         rows.sums = sums;
         Ok(rows)
     }
 
-    fn laid(&self, piece: &Stretch) -> Outcome<Laid> {
-        Laid::all(self.model, piece, self.payloads, &self.values)
+    fn segment_rows(&self, piece: &RecordingSegment) -> Outcome<SegmentRows> {
+        SegmentRows::all_columns(self.model, piece, self.payloads, &self.values)
     }
 
     /// Shows the columns, one piece after the other.
-    fn visit(&self, mut look: impl FnMut(&Laid) -> Outcome) -> Outcome {
+    fn visit(&self, mut look: impl FnMut(&SegmentRows) -> Outcome) -> Outcome {
         match &self.kept {
             Some(kept) => kept.iter().try_for_each(look),
-            None => (self.pieces.iter()).try_for_each(|piece| look(&self.laid(piece)?)),
+            None => (self.pieces.iter()).try_for_each(|piece| look(&self.segment_rows(piece)?)),
         }
     }
 
     /// Sums over the rows as they were measured.
-    pub(crate) fn sizes(self) -> Sizes {
-        Sizes(self.sums)
+    pub(crate) fn sizes(self) -> MeasuredMoments {
+        MeasuredMoments(self.sums)
     }
 
     /// The force of some columns along the run, drive by drive.
@@ -139,14 +139,14 @@ impl<'a> Rows<'a> {
     }
 
     /// The rows with the memory of each drive's noise taken out, as sums.
-    pub(crate) fn white(&self) -> Outcome<White> {
-        let layout = Layout::new(self.model, self.payloads);
+    pub(crate) fn whitened_run(&self) -> Outcome<WhitenedRun> {
+        let layout = RunColumnLayout::new(self.model, self.payloads);
         let columns = layout.total();
-        let values = weighed(&self.sums)?;
+        let values = weighted_least_squares(&self.sums)?;
         let mut rests: Vec<Vec<Vec<f64>>> = vec![Vec::new(); self.sums.len()];
         self.visit(|laid| {
             for (drive, rests) in rests.iter_mut().enumerate() {
-                let rest = laid.rest(drive, &values);
+                let rest = laid.residual(drive, &values);
                 rests.extend(
                     laid.pieces(drive)
                         .into_iter()
@@ -155,27 +155,27 @@ impl<'a> Rows<'a> {
             }
             Ok(())
         })?;
-        let noise = |(rests, sums): (&Vec<Vec<f64>>, &Moments)| {
+        let noise = |(rests, sums): (&Vec<Vec<f64>>, &NormalEquations)| {
             let rests: Vec<&[f64]> = rests.iter().map(Vec::as_slice).collect();
-            Coloured::of(&rests, FLOOR * size(sums, sums.total))
+            AutoregressiveNoise::from_residual(&rests, FLOOR * effective_value(sums, sums.total))
         };
-        let noise: Vec<Coloured> = rests.iter().zip(&self.sums).map(noise).collect();
+        let noise: Vec<AutoregressiveNoise> = rests.iter().zip(&self.sums).map(noise).collect();
         let length: usize = (self.pieces.iter())
             .map(|piece| piece.samples().div_ceil(piece.decimation()))
             .sum();
-        let mut white = White {
-            blocks: vec![Moments::new(columns); BLOCKS],
-            drives: vec![Moments::new(columns); self.sums.len()],
+        let mut white = WhitenedRun {
+            blocks: vec![NormalEquations::new(columns); BLOCKS],
+            drives: vec![NormalEquations::new(columns); self.sums.len()],
             base: LeastSquares::with_channels(layout.base, layout.drives),
         };
         let mut before = 0;
         let zeros = [0.0; TOGETHER];
         self.visit(|laid| {
-            for (drive, noise) in noise.iter().enumerate().filter(|(_, n)| n.deviation > 0.0) {
+            for (drive, noise) in noise.iter().enumerate().filter(|(_, n)| n.standard_deviation > 0.0) {
                 for some in laid.pieces(drive) {
                     let start = before + some.start;
                     whiten(laid, drive, some, noise, columns, |i, z, y| {
-                        let mut sums = Moments::new(columns);
+                        let mut sums = NormalEquations::new(columns);
                         sums.add_rows(z, y);
                         // Neighbouring blocks, each of the same part of the run.
                         let block = BLOCKS * (start + i) / length.max(1);
@@ -203,17 +203,17 @@ impl<'a> Rows<'a> {
 
 /// Sums over the rows of each drive as they were measured.
 #[derive(Clone)]
-pub(crate) struct Sizes(pub(crate) Vec<Moments>);
+pub(crate) struct MeasuredMoments(pub(crate) Vec<NormalEquations>);
 
-impl Sizes {
+impl MeasuredMoments {
     /// What the best base parameters leave of the force of each drive, as a part of it: with `base` columns at the front.
-    pub(crate) fn left(&self, base: usize) -> Outcome<Vec<f64>> {
+    pub(crate) fn residual_ratios(&self, base: usize) -> Outcome<Vec<f64>> {
         let base: Vec<usize> = (0..base).collect();
-        let sums: Vec<Moments> = self.0.iter().map(|one| one.of(&base)).collect();
-        let values = weighed(&sums)?;
-        let part = |one: &Moments| {
+        let sums: Vec<NormalEquations> = self.0.iter().map(|one| one.select_columns(&base)).collect();
+        let values = weighted_least_squares(&sums)?;
+        let part = |one: &NormalEquations| {
             if one.total > 0.0 {
-                (one.rest(&values) / one.total).sqrt()
+                (one.residual_squares(&values) / one.total).sqrt()
             } else {
                 0.0
             }
@@ -222,9 +222,9 @@ impl Sizes {
     }
 
     /// How large the force of some columns is on the drive where it is largest, as a part of what that drive does.
-    pub(crate) fn part(&self, columns: &[usize], values: &DVector<f64>) -> f64 {
-        let of_drive = |sums: &Moments| {
-            let force = values.dot(&(sums.of(columns).gram * values));
+    pub(crate) fn force_fraction(&self, columns: &[usize], values: &DVector<f64>) -> f64 {
+        let of_drive = |sums: &NormalEquations| {
+            let force = values.dot(&(sums.select_columns(columns).gram * values));
             if sums.total > 0.0 {
                 (force.max(0.0) / sums.total).sqrt()
             } else {
@@ -244,14 +244,14 @@ const TOGETHER: usize = 256;
 
 /// Shows white rows of a stretch of samples by their columns, some hundreds at a time, with the place of the first.
 fn whiten(
-    laid: &Laid,
+    laid: &SegmentRows,
     drive: usize,
     some: Range<usize>,
-    noise: &Coloured,
+    noise: &AutoregressiveNoise,
     columns: usize,
     mut show: impl FnMut(usize, &[Option<&[f64]>], &[f64]) -> Outcome,
 ) -> Outcome {
-    let white = |values: &[f64]| noise.whitened(&values[some.clone()]);
+    let white = |values: &[f64]| noise.whiten(&values[some.clone()]);
     let y = white(&laid.forces[drive]);
     let z: Vec<Option<Vec<f64>>> = (0..columns)
         .map(|k| laid.column(k, drive).map(white))
@@ -268,7 +268,7 @@ fn whiten(
 }
 
 /// Adds the rows of a stretch to sums of each drive.
-fn add(sums: &mut [Moments], laid: &Laid) {
+fn add_rows(sums: &mut [NormalEquations], laid: &SegmentRows) {
     for (drive, sums) in sums.iter_mut().enumerate() {
         let columns = 0..sums.rhs.len();
         let z: Vec<Option<&[f64]>> = columns.map(|k| laid.column(k, drive)).collect();
@@ -277,20 +277,20 @@ fn add(sums: &mut [Moments], laid: &Laid) {
 }
 
 /// Effective value of so large a sum of squares over the rows of a drive.
-fn size(sums: &Moments, squares: f64) -> f64 {
+fn effective_value(sums: &NormalEquations, squares: f64) -> f64 {
     (squares / sums.rows.max(1) as f64).sqrt()
 }
 
 /// Least squares with every drive weighed by what is left on it.
-fn weighed(sums: &[Moments]) -> Outcome<DVector<f64>> {
-    let mut deviations: Vec<f64> = sums.iter().map(|one| size(one, one.total)).collect();
+fn weighted_least_squares(sums: &[NormalEquations]) -> Outcome<DVector<f64>> {
+    let mut deviations: Vec<f64> = sums.iter().map(|one| effective_value(one, one.total)).collect();
     let floors: Vec<f64> = deviations.iter().map(|size| 1e-6 * size).collect();
     let mut values = DVector::zeros(0);
     for _ in 0..=ROUNDS {
-        let mut all = Moments::new(sums.first().map_or(0, |one| one.rhs.len()));
+        let mut all = NormalEquations::new(sums.first().map_or(0, |one| one.rhs.len()));
         for (one, deviation) in sums.iter().zip(&deviations) {
             if *deviation > 0.0 {
-                all.merge(&one.times(deviation.powi(-2)));
+                all.merge(&one.scale_weight(deviation.powi(-2)));
             }
         }
         values = all.solve().values;
@@ -299,7 +299,7 @@ fn weighed(sums: &[Moments]) -> Outcome<DVector<f64>> {
                 "a run has numbers that are too large to be fitted; look at its units".to_owned(),
             ));
         }
-        let left = sums.iter().map(|one| size(one, one.rest(&values)));
+        let left = sums.iter().map(|one| effective_value(one, one.residual_squares(&values)));
         deviations = left.zip(&floors).map(|(d, floor)| d.max(*floor)).collect();
     }
     Ok(values)

@@ -3,10 +3,10 @@
 
 pub mod variances;
 
-use modelmill_codegen::{PoseFault, PoseReason, States};
+use modelmill_codegen::{PoseFault, PoseReason, MotionStates};
 use modelmill_identify::decimate_time;
 use modelmill_identify::diagnose::Disturbance;
-use modelmill_identify::{Note, Run, place_word};
+use modelmill_identify::{RecordingNote, PreparedRun, sample_place_word};
 
 use crate::error::{Error, Outcome};
 use crate::model::Model;
@@ -16,9 +16,9 @@ pub const BLOCK: usize = 4096;
 
 /// A stretch of a recording that is ready for a model.
 #[derive(Clone)]
-pub struct Stretch {
+pub struct RecordingSegment {
     /// The states and forces.
-    pub run: Run,
+    pub run: PreparedRun,
     /// Variances of the forces, `[drive][sample]`, where the recording has the columns `DRIVE_var`.
     pub variance: Option<Vec<Vec<f64>>>,
     /// What each equation counts beside the estimator's weights, interleaved per kept sample; all the same if there are
@@ -32,9 +32,9 @@ pub struct Stretch {
     pub faults: Vec<Disturbance>,
 }
 
-impl From<Run> for Stretch {
+impl From<PreparedRun> for RecordingSegment {
     /// A run without variances whose equations count all the same.
-    fn from(run: Run) -> Self {
+    fn from(run: PreparedRun) -> Self {
         Self {
             run,
             variance: None,
@@ -46,7 +46,7 @@ impl From<Run> for Stretch {
     }
 }
 
-impl Stretch {
+impl RecordingSegment {
     /// Samples before decimation.
     pub fn samples(&self) -> usize {
         self.run.samples()
@@ -69,7 +69,7 @@ impl Stretch {
             let cut = |all: &[Vec<f64>]| all.iter().map(|one| one[start..end].to_vec()).collect();
             let run = &self.run;
             Self {
-                run: Run {
+                run: PreparedRun {
                     time: run.time[start..end].to_vec(),
                     q: cut(&run.q),
                     qd: cut(&run.qd),
@@ -81,7 +81,7 @@ impl Stretch {
                     lines: run.lines.get(start..end).unwrap_or_default().to_vec(),
                     file: run.file.clone(),
                     missing_force: run.missing_force.clone(),
-                    repeats: run.repeats.clone(),
+                    repeatability: run.repeatability.clone(),
                     prepared: run.prepared.clone(),
                     notes: Vec::new(),
                 },
@@ -97,7 +97,7 @@ impl Stretch {
     }
 
     /// Whether a kept sample has heard, through the filter before it, of a force of a drive that does not count.
-    pub(crate) fn hears_of_faults(&self, drive: usize, kept: usize) -> bool {
+    pub(crate) fn has_excluded_input(&self, drive: usize, kept: usize) -> bool {
         let every = self.decimation();
         self.run.left_out.get(drive).is_some_and(|out| {
             let to = if every == 1 {
@@ -116,19 +116,19 @@ impl Stretch {
     }
 
     /// Keeps a remark, and passes it on to whoever watches.
-    pub(crate) fn note(&mut self, model: &Model, note: Note) {
+    pub(crate) fn note(&mut self, model: &Model, note: RecordingNote) {
         model.host().note(&note);
         self.run.notes.push(note);
     }
 
     /// Whether both hold the same numbers.
-    pub(crate) fn is_twin_of(&self, other: &Self) -> bool {
+    pub(crate) fn has_same_samples(&self, other: &Self) -> bool {
         let (a, b) = (&self.run, &other.run);
         a.time == b.time && a.q == b.q && a.qd == b.qd && a.qdd == b.qdd && a.force == b.force
     }
 
     /// Remarks, for the JSON.
-    pub fn notes(&self) -> &[Note] {
+    pub fn notes(&self) -> &[RecordingNote] {
         &self.run.notes
     }
 
@@ -136,7 +136,7 @@ impl Stretch {
     pub fn for_each_block<E: From<Error>>(
         &self,
         model: &Model,
-        mut visit: impl FnMut(&States<'_>) -> Result<Result<(), PoseFault>, E>,
+        mut visit: impl FnMut(&MotionStates<'_>) -> Result<Result<(), PoseFault>, E>,
     ) -> Result<(), E> {
         self.check_load(model)?;
         let n = self.samples();
@@ -144,15 +144,15 @@ impl Stretch {
         while start < n {
             let end = (start + BLOCK).min(n);
             let states = self.states(start, end);
-            visit(&states)?.map_err(|fault| self.fault(model, fault, start))?;
+            visit(&states)?.map_err(|fault| self.pose_error(model, fault, start))?;
             start = end;
         }
         Ok(())
     }
 
     /// Some of the states.
-    pub fn states(&self, start: usize, end: usize) -> States<'_> {
-        States {
+    pub fn states(&self, start: usize, end: usize) -> MotionStates<'_> {
+        MotionStates {
             q: slices(&self.run.q, start, end),
             qd: slices(&self.run.qd, start, end),
             qdd: slices(&self.run.qdd, start, end),
@@ -166,7 +166,7 @@ impl Stretch {
     }
 
     fn check_load(&self, model: &Model) -> Outcome {
-        let effects = model.load_dependent();
+        let effects = model.load_dependent_effects();
         if effects.is_empty() || self.load.is_some() || self.run.force.is_some() {
             return Ok(());
         }
@@ -180,13 +180,13 @@ impl Stretch {
     }
 
     /// A pose without answer, with its place in the recording.
-    pub fn fault(&self, model: &Model, fault: PoseFault, start: usize) -> Error {
+    pub fn pose_error(&self, model: &Model, fault: PoseFault, start: usize) -> Error {
         let sample = start + fault.sample;
         let time = self.run.time.get(sample).copied().unwrap_or(f64::NAN);
         let line = self.run.lines.get(sample).copied().unwrap_or(0);
-        let place = place_word(&self.run.file);
+        let place = sample_place_word(&self.run.file);
         let pose: Vec<String> = model
-            .active()
+            .active_coordinates()
             .iter()
             .zip(&self.run.q)
             .map(|(name, q)| format!("{name} = {:.6}", q.get(sample).copied().unwrap_or(f64::NAN)))

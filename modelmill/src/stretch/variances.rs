@@ -1,7 +1,7 @@
 //! Variances of the measured forces, where a recording has them: columns `DRIVE_var`, as the mean of many periods leaves
 //! them beside it.
 
-use modelmill_identify::{Recording, Run, place_word};
+use modelmill_identify::{SignalRecording, PreparedRun, sample_place_word};
 
 use crate::error::{Error, Outcome};
 
@@ -11,12 +11,12 @@ pub fn column(drive: &str) -> String {
 }
 
 /// Variances for the samples of a run, `[drive][sample]`; nothing unless all drives have them.
-pub fn recorded(
-    recording: &Recording,
-    run: &Run,
+pub fn recorded_variances(
+    recording: &SignalRecording,
+    run: &PreparedRun,
     drives: &[String],
 ) -> Outcome<Option<Vec<Vec<f64>>>> {
-    if drives.is_empty() || !drives.iter().all(|drive| recording.has(&column(drive))) {
+    if drives.is_empty() || !drives.iter().all(|drive| recording.has_column(&column(drive))) {
         return Ok(None);
     }
     // A run may have lost samples at its ends and at gaps; lines of the file tell which are left.
@@ -49,7 +49,7 @@ pub fn recorded(
 /// What rows are multiplied by: one over the standard deviation, interleaved per sample; every `every`-th sample.
 pub fn factors(
     variance: &[Vec<f64>],
-    run: &Run,
+    run: &PreparedRun,
     drives: &[String],
     every: usize,
 ) -> Outcome<Vec<f64>> {
@@ -63,7 +63,7 @@ pub fn factors(
                     "{}, {} {}: {} = {value}, but a variance must be a positive number for option `weights` = `variance`; leave such \
                      samples out of the recording",
                     run.file,
-                    place_word(&run.file),
+                    sample_place_word(&run.file),
                     run.lines.get(sample).copied().unwrap_or(0),
                     column(drive)
                 )));

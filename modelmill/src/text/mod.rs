@@ -5,4 +5,4 @@ pub mod style;
 pub mod svg;
 pub mod table;
 
-pub use style::Style;
+pub use style::TerminalStyle;

@@ -2,9 +2,9 @@
 
 /// Marks text for the terminal, or leaves it as it is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Style(bool);
+pub struct TerminalStyle(bool);
 
-impl Style {
+impl TerminalStyle {
     /// With ANSI escape sequences for colours.
     pub const COLOURED: Self = Self(true);
     /// Without any mark.

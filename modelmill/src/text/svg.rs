@@ -32,7 +32,7 @@ const STYLE: &str = "\
 
 /// How a panel looks, beyond what its curves say.
 #[derive(Default)]
-pub struct Look<'a> {
+pub struct PanelStyle<'a> {
     /// Largest magnitude that is shown, what is beyond is cut off; that of the curves if absent.
     pub limit: Option<f64>,
     /// Times of vertical lines, s.
@@ -40,14 +40,14 @@ pub struct Look<'a> {
 }
 
 /// A figure as it grows.
-pub struct Figure<'a> {
+pub struct SvgFigure<'a> {
     title: String,
     time: &'a [f64],
     body: String,
     panels: usize,
 }
 
-impl<'a> Figure<'a> {
+impl<'a> SvgFigure<'a> {
     /// A figure over the given times, s.
     pub fn new(title: &str, time: &'a [f64]) -> Self {
         Self {
@@ -60,11 +60,11 @@ impl<'a> Figure<'a> {
 
     /// Adds a panel with its curves, one value for each time.
     pub fn panel(&mut self, title: &str, curves: &[(&str, &[f64])]) {
-        self.panel_with(title, curves, &Look::default());
+        self.panel_with(title, curves, &PanelStyle::default());
     }
 
     /// The same with a scale of its own or marks.
-    pub fn panel_with(&mut self, title: &str, curves: &[(&str, &[f64])], look: &Look<'_>) {
+    pub fn panel_with(&mut self, title: &str, curves: &[(&str, &[f64])], look: &PanelStyle<'_>) {
         let top = TOP + GAP + self.panels as f64 * (PANEL + GAP);
         let largest = curves
             .iter()
@@ -126,7 +126,7 @@ impl<'a> Figure<'a> {
             let colour = k % COLOURS;
             let n = values.len().max(2) - 1;
             let mut points = String::new();
-            for (i, value) in thinned(values, POINTS) {
+            for (i, value) in thin_out(values, POINTS) {
                 let x = LEFT + plot_width * i as f64 / n as f64;
                 let _ = write!(points, "{x:.1},{:.1} ", y(value));
             }
@@ -179,7 +179,7 @@ pub fn sheet(title: &str, left: f64, height: f64, body: &str) -> String {
 
 /// Least and largest value of each of half as many stretches as points are wanted, with their places; all values where
 /// they are few enough.
-pub fn thinned(values: &[f64], wanted: usize) -> Vec<(usize, f64)> {
+pub fn thin_out(values: &[f64], wanted: usize) -> Vec<(usize, f64)> {
     if values.len() <= wanted {
         return values.iter().copied().enumerate().collect();
     }

@@ -2,7 +2,7 @@
 
 /// How a column stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Align {
+pub enum ColumnAlignment {
     /// Text.
     Left,
     /// Numbers.
@@ -10,7 +10,7 @@ pub enum Align {
 }
 
 /// Lays out rows under a head, two blanks between columns, `indent` blanks in front; no trailing blanks.
-pub fn table(indent: usize, columns: &[(&str, Align)], rows: &[Vec<String>]) -> Vec<String> {
+pub fn table(indent: usize, columns: &[(&str, ColumnAlignment)], rows: &[Vec<String>]) -> Vec<String> {
     let head: Vec<String> = columns.iter().map(|(name, _)| (*name).to_owned()).collect();
     let all: Vec<&Vec<String>> = std::iter::once(&head).chain(rows).collect();
     let widths: Vec<usize> = (0..columns.len())
@@ -29,8 +29,8 @@ pub fn table(indent: usize, columns: &[(&str, Align)], rows: &[Vec<String>]) -> 
                 let cell = row.get(j).map_or("", String::as_str);
                 let fill = " ".repeat(widths[j] - cell.chars().count());
                 let parts = match align {
-                    Align::Left => [cell, &fill],
-                    Align::Right => [&fill, cell],
+                    ColumnAlignment::Left => [cell, &fill],
+                    ColumnAlignment::Right => [&fill, cell],
                 };
                 line.extend(parts);
                 line.push_str("  ");
@@ -86,12 +86,12 @@ pub fn percent(value: Option<f64>) -> String {
     match value {
         None => "-".to_owned(),
         Some(0.0) => "0 %".to_owned(),
-        Some(value) => format!("{} %", short(100.0 * value)),
+        Some(value) => format!("{} %", three_digits(100.0 * value)),
     }
 }
 
 /// Three significant digits, with an exponent below a thousandth.
-fn short(value: f64) -> String {
+fn three_digits(value: f64) -> String {
     if value.abs() < 1e-3 {
         format!("{value:.2e}")
     } else {
@@ -129,7 +129,7 @@ mod tests {
             vec!["a".to_owned(), "1".to_owned()],
             vec!["long".to_owned(), "10".to_owned()],
         ];
-        let lines = table(2, &[("name", Align::Left), ("n", Align::Right)], &rows);
+        let lines = table(2, &[("name", ColumnAlignment::Left), ("n", ColumnAlignment::Right)], &rows);
         assert_eq!(lines, ["  name   n", "  a      1", "  long  10"]);
     }
 }

@@ -1,27 +1,27 @@
 //! What of one model is what of another: coordinates and drives of the same name.
 
-use modelmill_identify::{Note, Run};
+use modelmill_identify::{RecordingNote, PreparedRun};
 
 use crate::error::{Error, Outcome};
 use crate::model::Model;
 use crate::recording::free::free_bodies;
-use crate::stretch::Stretch;
+use crate::stretch::RecordingSegment;
 
 /// Coordinates and drives that two models share.
-pub(super) struct Counterparts {
+pub(super) struct ModelCounterparts {
     /// For each active coordinate of the second model its place among those of the first.
     coordinates: Vec<usize>,
     /// Drives that both have, by their places in the first and in the second model.
     pub(super) drives: Vec<[usize; 2]>,
     /// What is left out.
-    pub(super) notes: Vec<Note>,
+    pub(super) notes: Vec<RecordingNote>,
 }
 
-impl Counterparts {
+impl ModelCounterparts {
     /// Matches by names.
     ///
     /// Fails when one model moves where the other does not, or no drive is in both.
-    pub(super) fn between(models: [&Model; 2]) -> Outcome<Self> {
+    pub(super) fn match_models(models: [&Model; 2]) -> Outcome<Self> {
         let coordinates = coordinates(models)?;
         let [before, after] = models.map(|model| &model.derivation.mechanism.drives);
         let is_shared = models
@@ -29,7 +29,7 @@ impl Counterparts {
             .all(|model| !model.derivation.mechanism.shared_drives.is_empty());
         let mut notes = Vec::new();
         if is_shared {
-            notes.push(Note::info(
+            notes.push(RecordingNote::info(
                 "There are more drives than degrees of freedom: figures are of what all of them do together along each coordinate.",
             ));
         }
@@ -40,14 +40,14 @@ impl Counterparts {
             };
             let units = [models[0].force_unit(d), models[1].force_unit(e)];
             if !(drive.is_driven && after[e].is_driven || is_shared) {
-                notes.push(Note::info(format!(
+                notes.push(RecordingNote::info(format!(
                     "Nothing drives {}, so that it is left out.",
                     drive.name
                 )));
             } else if units[0] == units[1] {
                 drives.push([d, e]);
             } else {
-                notes.push(Note::warning(format!(
+                notes.push(RecordingNote::warning(format!(
                     "{} is left out: its force is in {} in {} and in {} in {}.",
                     drive.name, units[0], models[0].path, units[1], models[1].path
                 )));
@@ -58,7 +58,7 @@ impl Counterparts {
             let alone = all[here].iter().filter(|name| !all[there].contains(name));
             let alone: Vec<&str> = alone.map(String::as_str).collect();
             if !alone.is_empty() {
-                notes.push(Note::warning(format!(
+                notes.push(RecordingNote::warning(format!(
                     "Left out, since only {} has them: drives {}.",
                     models[here].path,
                     alone.join(", ")
@@ -85,14 +85,14 @@ impl Counterparts {
     pub(super) fn own_states(
         &self,
         models: [&Model; 2],
-        motion: &Stretch,
-    ) -> Outcome<[Stretch; 2]> {
+        motion: &RecordingSegment,
+    ) -> Outcome<[RecordingSegment; 2]> {
         let in_order = |columns: &[Vec<f64>]| -> Vec<Vec<f64>> {
             let places = self.coordinates.iter();
             places.map(|i| columns[*i].clone()).collect()
         };
         let before = without_forces(&motion.run);
-        let after = Run {
+        let after = PreparedRun {
             q: in_order(&before.q),
             qd: in_order(&before.qd),
             qdd: in_order(&before.qdd),
@@ -106,8 +106,8 @@ impl Counterparts {
 }
 
 /// The motion of a run alone.
-fn without_forces(run: &Run) -> Run {
-    Run {
+fn without_forces(run: &PreparedRun) -> PreparedRun {
+    PreparedRun {
         force: None,
         left_out: Vec::new(),
         notes: Vec::new(),
@@ -116,8 +116,8 @@ fn without_forces(run: &Run) -> Run {
 }
 
 /// The states with what the drives carry where effects depend on it: the model's forces without these effects.
-fn with_own_load(model: &Model, mut states: Stretch) -> Outcome<Stretch> {
-    if !model.load_dependent().is_empty() {
+fn with_own_load(model: &Model, mut states: RecordingSegment) -> Outcome<RecordingSegment> {
+    if !model.load_dependent_effects().is_empty() {
         states.load = Some(vec![vec![0.0; states.samples()]; model.drives().len()]);
         states.load = Some(super::forces_of(model, &states)?);
     }

@@ -2,7 +2,7 @@
 
 /// What a drive has to give. Power is force times the rate along which the drive acts.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Effort {
+pub struct DriveEffort {
     /// The largest magnitude of the force, N or N m.
     pub peak: f64,
     /// Root mean square of the force over all samples, N or N m.
@@ -19,7 +19,7 @@ pub struct Effort {
 
 /// Sums over samples.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Gathered {
+pub(super) struct EffortSums {
     samples: usize,
     peak: f64,
     squares: f64,
@@ -29,7 +29,7 @@ pub(super) struct Gathered {
     net_work: f64,
 }
 
-impl Gathered {
+impl EffortSums {
     /// Adds a motion: times, forces and rates, a number for each sample. Between samples power is taken to be linear.
     pub(super) fn add(&mut self, time: &[f64], force: &[f64], rate: &[f64]) {
         let power: Vec<f64> = force.iter().zip(rate).map(|(f, v)| f * v).collect();
@@ -48,9 +48,9 @@ impl Gathered {
     }
 
     /// The figures of all that was added.
-    pub(super) fn effort(self) -> Effort {
+    pub(super) fn effort(self) -> DriveEffort {
         let mean = |squares: f64| (squares / self.samples.max(1) as f64).sqrt();
-        Effort {
+        DriveEffort {
             peak: self.peak,
             rms: mean(self.squares),
             peak_power: self.peak_power,
@@ -84,7 +84,7 @@ mod tests {
         let time: Vec<f64> = (0..=n).map(angle).collect();
         let force: Vec<f64> = time.iter().map(|t| 3.0 * t.sin()).collect();
         let rate: Vec<f64> = time.iter().map(|t| 2.0 * t.cos()).collect();
-        let mut gathered = Gathered::default();
+        let mut gathered = EffortSums::default();
         gathered.add(&time, &force, &rate);
         // Power is 3 sin(2 t): its positive halves hold 3 J each, and nothing is left of a whole turn.
         let found = gathered.effort();
@@ -101,7 +101,7 @@ mod tests {
 
     #[test]
     fn only_what_is_given_counts_as_work() {
-        let mut gathered = Gathered::default();
+        let mut gathered = EffortSums::default();
         // One second from 2 W to -1 W: two thirds of it give 2/3 J; the rest takes 1/6 J up.
         gathered.add(&[0.0, 1.0], &[2.0, -1.0], &[1.0, 1.0]);
         let found = gathered.effort();

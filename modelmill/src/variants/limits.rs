@@ -1,18 +1,18 @@
 //! Limits of the model files along motions: which the variant exceeds, and which both do.
 
-use modelmill_identify::excite::{Margin, Motion, Plant};
+use modelmill_identify::excite::{LimitMargin, ExcitationMotion, ExcitationPlant};
 
 use crate::error::{Error, Outcome};
-use crate::excite::plant::{AXES, ModelPlant, used};
+use crate::excite::plant::{AXES, ModelPlant, used_fraction};
 use crate::model::Model;
-use crate::stretch::{BLOCK, Stretch};
+use crate::stretch::{BLOCK, RecordingSegment};
 
 /// The part beyond 1 that is rounding.
 const ROUNDING: f64 = 1e-9;
 
 /// How two models keep a limit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Crossing {
+pub enum LimitCrossing {
     /// The second model exceeds it, the first one does not.
     NowExceeded,
     /// Both exceed it.
@@ -36,30 +36,30 @@ pub struct LimitUse {
 
 impl LimitUse {
     /// Whether it is exceeded, and by which.
-    pub fn crossing(&self) -> Crossing {
+    pub fn crossing(&self) -> LimitCrossing {
         let is_beyond = self
             .used
             .map(|used| used.is_some_and(|used| used > 1.0 + ROUNDING));
         match is_beyond {
-            [false, true] => Crossing::NowExceeded,
-            [true, true] => Crossing::StillExceeded,
-            [true, false] => Crossing::NoLongerExceeded,
-            [false, false] => Crossing::Kept,
+            [false, true] => LimitCrossing::NowExceeded,
+            [true, true] => LimitCrossing::StillExceeded,
+            [true, false] => LimitCrossing::NoLongerExceeded,
+            [false, false] => LimitCrossing::Kept,
         }
     }
 }
 
 /// The limits of two models, as far as they were used.
-pub(super) struct Limits {
+pub(super) struct VariantLimits {
     found: Vec<LimitUse>,
     /// The limits that poses tell, without those of forces: these come from forces under the model's own load.
-    of_poses: [modelmill_spec::Limits; 2],
+    of_poses: [modelmill_spec::MotionLimits; 2],
 }
 
-impl Limits {
+impl VariantLimits {
     /// The limits of both files, without motion yet.
-    pub(super) fn of(models: [&Model; 2]) -> Self {
-        let of_poses = models.map(|model| modelmill_spec::Limits {
+    pub(super) fn from_models(models: [&Model; 2]) -> Self {
+        let of_poses = models.map(|model| modelmill_spec::MotionLimits {
             forces: Vec::new(),
             ..model.derivation.mechanism.limits.clone()
         });
@@ -73,7 +73,7 @@ impl Limits {
     pub(super) fn add(
         &mut self,
         models: [&Model; 2],
-        states: &[Stretch; 2],
+        states: &[RecordingSegment; 2],
         forces: [&[Vec<f64>]; 2],
     ) -> Outcome {
         for (m, model) in models.into_iter().enumerate() {
@@ -92,14 +92,14 @@ impl Limits {
                 ];
                 for (name, range, values) in ranges {
                     if let Some(range) = range {
-                        self.see(m, &name, Some(range), within(values, range));
+                        self.record_use(m, &name, Some(range), used_fraction(values, range));
                     }
                 }
             }
             for (drive, range) in &mechanism.limits.forces {
                 let name = &mechanism.drives[drive.0].name;
                 let values = &forces[m][drive.0];
-                self.see(m, name, Some(*range), within(values, *range));
+                self.record_use(m, name, Some(*range), used_fraction(values, *range));
             }
             self.add_poses(m, model, &states[m])?;
         }
@@ -107,7 +107,7 @@ impl Limits {
     }
 
     /// Passive coordinates, points and distances from singular poses.
-    fn add_poses(&mut self, m: usize, model: &Model, states: &Stretch) -> Outcome {
+    fn add_poses(&mut self, m: usize, model: &Model, states: &RecordingSegment) -> Outcome {
         let limits = self.of_poses[m].clone();
         let plant = ModelPlant::new(model, &limits);
         let names = plant.limits();
@@ -117,14 +117,14 @@ impl Limits {
         let what = format!("holding {} against its limits", model.name);
         let run = &states.run;
         let samples = states.samples();
-        let found = model.host().watched(&what, samples, |job| {
+        let found = model.host().run_job(&what, samples, |job| {
             let mut most = vec![f64::NEG_INFINITY; names.len()];
             for start in (0..samples).step_by(BLOCK) {
                 let end = (start + BLOCK).min(samples);
                 job.step(end - start)?;
                 let piece =
                     |all: &[Vec<f64>]| all.iter().map(|one| one[start..end].to_vec()).collect();
-                let motion = Motion {
+                let motion = ExcitationMotion {
                     q: piece(&run.q),
                     qd: piece(&run.qd),
                     qdd: piece(&run.qdd),
@@ -143,18 +143,18 @@ impl Limits {
         })??;
         for (name, excess) in names.into_iter().zip(found) {
             let range = range_of(model, &limits, &name);
-            let margin = Margin {
+            let margin = LimitMargin {
                 name,
                 excess,
                 proven: false,
             };
-            self.see(m, &margin.name, range, used(&margin));
+            self.record_use(m, &margin.name, range, used_fraction(&margin));
         }
         Ok(())
     }
 
     /// Keeps the largest part of a limit that a model uses.
-    fn see(&mut self, m: usize, name: &str, range: Option<[f64; 2]>, used: f64) {
+    fn record_use(&mut self, m: usize, name: &str, range: Option<[f64; 2]>, used: f64) {
         let known = self.found.iter().position(|one| one.limit == name);
         let k = known.unwrap_or_else(|| {
             self.found.push(LimitUse {
@@ -170,20 +170,20 @@ impl Limits {
     }
 
     /// All limits.
-    pub(super) fn found(self) -> Vec<LimitUse> {
+    pub(super) fn into_uses(self) -> Vec<LimitUse> {
         self.found
     }
 }
 
 /// The part of a range that values use, from its middle.
-fn within(values: &[f64], [low, high]: [f64; 2]) -> f64 {
+fn used_fraction(values: &[f64], [low, high]: [f64; 2]) -> f64 {
     let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
     let far = values.iter().map(|v| (v - middle).abs() / half);
     far.fold(0.0, f64::max)
 }
 
 /// The range of a passive coordinate or of a point along an axis.
-fn range_of(model: &Model, limits: &modelmill_spec::Limits, name: &str) -> Option<[f64; 2]> {
+fn range_of(model: &Model, limits: &modelmill_spec::MotionLimits, name: &str) -> Option<[f64; 2]> {
     let mechanism = &model.derivation.mechanism;
     let coordinates = limits.coordinates.iter();
     let mut coordinates = coordinates.filter(|(i, _)| mechanism.coordinates[i.0].name == name);

@@ -6,21 +6,21 @@ mod effort;
 mod limits;
 mod terms;
 
-use modelmill_identify::{Figures, Note};
+use modelmill_identify::{ErrorFigures, RecordingNote};
 
 use crate::along;
 use crate::compare;
 use crate::error::{Error, Outcome};
 use crate::model::Model;
-use crate::recording::Recording;
-use crate::stretch::Stretch;
+use crate::recording::PreparedRecording;
+use crate::stretch::RecordingSegment;
 
-use counterparts::Counterparts;
-use effort::Gathered;
-use terms::Terms;
+use counterparts::ModelCounterparts;
+use effort::EffortSums;
+use terms::SummandColumns;
 
-pub use effort::Effort;
-pub use limits::{Crossing, LimitUse};
+pub use effort::DriveEffort;
+pub use limits::{LimitCrossing, LimitUse};
 pub use terms::{ProductShare, TermShare};
 
 /// A difference of forces below this part of them is rounding: nothing makes it.
@@ -28,7 +28,7 @@ const ROUNDING: f64 = 1e-8;
 
 /// Two models of one machine along the same motions.
 #[derive(Clone, Debug)]
-pub struct Variants {
+pub struct VariantComparison {
     /// Names of the recordings whose motions these are.
     pub recordings: Vec<String>,
     /// Samples of all recordings.
@@ -40,9 +40,9 @@ pub struct Variants {
     /// The limits of both files; those that neither model exceeds as well.
     pub limits: Vec<LimitUse>,
     /// Error figures against measured forces, as [`Model::compare`] gives them; `None` where a model was held against none.
-    pub errors: [Option<Figures>; 2],
+    pub errors: [Option<ErrorFigures>; 2],
     /// What was left out and taken for granted, and what each recording is to be read with.
-    pub notes: Vec<Note>,
+    pub notes: Vec<RecordingNote>,
 }
 
 /// A drive in both models.
@@ -53,28 +53,28 @@ pub struct DriveVariants {
     /// Unit of its force: N or N m.
     pub unit: &'static str,
     /// What the first model asks of it.
-    pub before: Effort,
+    pub before: DriveEffort,
     /// What the second model asks of it.
-    pub after: Effort,
+    pub after: DriveEffort,
     /// The force of the second model less that of the first, sample by sample.
-    pub difference: Difference,
+    pub difference: ForceDifference,
     /// What makes the difference, the largest share first; empty where there is none. Shares add up to 1.
     pub products: Vec<ProductShare>,
 }
 
 /// A difference of forces along motions, N or N m.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Difference {
+pub struct ForceDifference {
     /// The largest magnitude.
     pub peak: f64,
     /// Root mean square over all samples.
     pub rms: f64,
 }
 
-impl Variants {
+impl VariantComparison {
     /// Fails where two models cannot be held beside each other, as [`Variants::along`] would, before any recording is read.
     pub fn check(models: [&Model; 2]) -> Outcome {
-        Counterparts::between(models).map(|_| ())
+        ModelCounterparts::match_models(models).map(|_| ())
     }
 
     /// Holds two models beside each other along the motions of recordings: `runs` are the same recordings as the first and as
@@ -82,30 +82,30 @@ impl Variants {
     /// depend on the load see the force that their own model has without them, so that a recording needs no forces.
     ///
     /// Fails when the models do not have the same active coordinates, have no drive in common, or cannot follow a motion.
-    pub fn along(models: [&Model; 2], runs: [&[&Recording]; 2]) -> Outcome<Self> {
-        let counterparts = Counterparts::between(models)?;
-        let stretches = |runs: &[&Recording]| -> Vec<Stretch> {
-            runs.iter().flat_map(|one| one.stretches.clone()).collect()
+    pub fn along_recordings(models: [&Model; 2], runs: [&[&PreparedRecording]; 2]) -> Outcome<Self> {
+        let counterparts = ModelCounterparts::match_models(models)?;
+        let stretches = |runs: &[&PreparedRecording]| -> Vec<RecordingSegment> {
+            runs.iter().flat_map(|one| one.segments.clone()).collect()
         };
         let motions = stretches(runs[0]);
         let mut notes = counterparts.notes.clone();
-        notes.extend(by_load(models));
+        notes.extend(load_note(models));
         for note in models.into_iter().flat_map(|m| m.nominal_values().notes) {
             if !notes.contains(&note) {
                 notes.push(note);
             }
         }
-        let mut terms = Terms::between(models);
-        let mut limits = limits::Limits::of(models);
+        let mut terms = SummandColumns::from_models(models);
+        let mut limits = limits::VariantLimits::from_models(models);
         let n = counterparts.drives.len();
-        let mut gathered = vec![[Gathered::default(); 2]; n];
+        let mut gathered = vec![[EffortSums::default(); 2]; n];
         let mut differences = vec![(0.0_f64, 0.0_f64); n];
         let (mut samples, mut seconds) = (0, 0.0);
         for motion in &motions {
             let time = &motion.run.time;
             let own = counterparts.own_states(models, motion)?;
-            let forces = both(|m| forces_of(models[m], &own[m]))?;
-            let rates = both(|m| along::drive_rates(models[m], &own[m]))?;
+            let forces = for_both(|m| forces_of(models[m], &own[m]))?;
+            let rates = for_both(|m| along::drive_rates(models[m], &own[m]))?;
             let mut rest = Vec::new();
             for (k, [d, e]) in counterparts.drives.iter().copied().enumerate() {
                 for (m, i) in [d, e].into_iter().enumerate() {
@@ -128,7 +128,7 @@ impl Variants {
                 .map_or(0.0, |(end, start)| end - start);
         }
         let drives = (counterparts.drives.iter().enumerate()).map(|(k, [d, _])| {
-            let [before, after] = gathered[k].map(Gathered::effort);
+            let [before, after] = gathered[k].map(EffortSums::effort);
             let (peak, squares) = differences[k];
             let rms = (squares / samples.max(1) as f64).sqrt();
             let is_rounding = rms <= ROUNDING * before.rms.max(after.rms);
@@ -137,7 +137,7 @@ impl Variants {
                 unit: models[0].force_unit(*d),
                 before,
                 after,
-                difference: Difference { peak, rms },
+                difference: ForceDifference { peak, rms },
                 products: if is_rounding {
                     Vec::new()
                 } else {
@@ -146,9 +146,9 @@ impl Variants {
             }
         });
         let drives = drives.collect();
-        let errors = both(|m| errors(models[m], &stretches(runs[m])))?;
+        let errors = for_both(|m| errors(models[m], &stretches(runs[m])))?;
         if errors.iter().all(Option::is_none) {
-            notes.push(Note::info(
+            notes.push(RecordingNote::info(
                 "No recording has the forces of all drives, so that neither model is held against measured ones.",
             ));
         }
@@ -157,7 +157,7 @@ impl Variants {
             samples,
             seconds,
             drives,
-            limits: limits.found(),
+            limits: limits.into_uses(),
             errors,
             notes,
         })
@@ -165,12 +165,12 @@ impl Variants {
 }
 
 /// Something of the first model and of the second.
-fn both<T>(mut of: impl FnMut(usize) -> Outcome<T>) -> Outcome<[T; 2]> {
+fn for_both<T>(mut of: impl FnMut(usize) -> Outcome<T>) -> Outcome<[T; 2]> {
     Ok([of(0)?, of(1)?])
 }
 
 /// Forces of a model for the values of its file, `[drive][sample]`.
-fn forces_of(model: &Model, states: &Stretch) -> Outcome<Vec<Vec<f64>>> {
+fn forces_of(model: &Model, states: &RecordingSegment) -> Outcome<Vec<Vec<f64>>> {
     along::forces(model, states, &model.nominal).map_err(|error| match error {
         Error::Cancelled => error,
         // Which of both models cannot follow is not seen from the recording.
@@ -179,12 +179,12 @@ fn forces_of(model: &Model, states: &Stretch) -> Outcome<Vec<Vec<f64>>> {
 }
 
 /// Which effects see the load, and what they take for it.
-fn by_load(models: [&Model; 2]) -> Option<Note> {
-    let mut effects: Vec<&str> = models.iter().flat_map(|m| m.load_dependent()).collect();
+fn load_note(models: [&Model; 2]) -> Option<RecordingNote> {
+    let mut effects: Vec<&str> = models.iter().flat_map(|m| m.load_dependent_effects()).collect();
     effects.sort_unstable();
     effects.dedup();
     (!effects.is_empty()).then(|| {
-        Note::info(format!(
+        RecordingNote::info(format!(
             "What a drive carries, on which {} depends, is the force of each model itself without that effect, not the measured \
              one; errors take the measured one, as `compare` does.",
             effects.join(", ")
@@ -193,7 +193,7 @@ fn by_load(models: [&Model; 2]) -> Option<Note> {
 }
 
 /// Error figures of a model along those recordings that have forces.
-fn errors(model: &Model, runs: &[Stretch]) -> Outcome<Option<Figures>> {
+fn errors(model: &Model, runs: &[RecordingSegment]) -> Outcome<Option<ErrorFigures>> {
     let mut measured = runs.to_vec();
     measured.retain(|one| one.run.force.is_some());
     if measured.is_empty() {

@@ -9,11 +9,11 @@
 
 use std::collections::BTreeMap;
 
-use modelmill_codegen::{Evaluator, PoseFault, review};
+use modelmill_codegen::{ModelEvaluator, PoseFault, review};
 
 use crate::error::{Error, Outcome};
 use crate::model::Model;
-use crate::stretch::Stretch;
+use crate::stretch::RecordingSegment;
 
 /// Shares below this are rounding and left out.
 const ROUNDING: f64 = 1e-12;
@@ -50,16 +50,16 @@ pub struct TermShare {
 }
 
 /// A summand in both models.
-struct Slot {
+struct SummandPair {
     product: String,
     retained: String,
     /// Where it stands in each model.
-    places: [Option<Place>; 2],
+    places: [Option<SummandPlace>; 2],
 }
 
 /// A summand in a model.
 #[derive(Clone, Copy)]
-struct Place {
+struct SummandPlace {
     base: usize,
     /// Position in p_g; none where the base parameter is taken as a whole.
     product: Option<usize>,
@@ -67,15 +67,15 @@ struct Place {
 }
 
 /// Summands, and their columns held against the differences of forces.
-pub(super) struct Terms {
-    slots: Vec<Slot>,
+pub(super) struct SummandColumns {
+    slots: Vec<SummandPair>,
     /// For each model `<h_k, f' - f>`, by pair of drives and base parameter.
     inner: [Vec<Vec<f64>>; 2],
 }
 
-impl Terms {
+impl SummandColumns {
     /// The summands of both models, without samples yet.
-    pub(super) fn between(models: [&Model; 2]) -> Self {
+    pub(super) fn from_models(models: [&Model; 2]) -> Self {
         let is_whole = |retained: &str| {
             models.iter().any(|model| {
                 let mut base = model.base.iter().zip(0..);
@@ -83,13 +83,13 @@ impl Terms {
             })
         };
         let mut places: BTreeMap<(String, String), usize> = BTreeMap::new();
-        let mut slots: Vec<Slot> = Vec::new();
+        let mut slots: Vec<SummandPair> = Vec::new();
         for (m, model) in models.into_iter().enumerate() {
             for (product, place) in summands(model, &is_whole) {
                 let retained = model.base[place.base].retained.clone();
                 let key = (retained.clone(), product.clone());
                 let slot = *places.entry(key).or_insert_with(|| {
-                    slots.push(Slot {
+                    slots.push(SummandPair {
                         product,
                         retained,
                         places: [None; 2],
@@ -109,7 +109,7 @@ impl Terms {
     pub(super) fn add(
         &mut self,
         models: [&Model; 2],
-        states: &[Stretch; 2],
+        states: &[RecordingSegment; 2],
         pairs: &[[usize; 2]],
         rest: &[Vec<f64>],
     ) -> Outcome {
@@ -117,13 +117,13 @@ impl Terms {
             let n = model.base.len();
             let sums = &mut self.inner[m];
             sums.resize(pairs.len(), vec![0.0; n]);
-            let evaluator = Evaluator::new(&model.derivation);
+            let evaluator = ModelEvaluator::new(&model.derivation);
             let what = format!(
                 "seeing what makes the difference along {}",
                 states[m].run.file
             );
             let mut start = 0;
-            model.host().watched(&what, states[m].samples(), |job| {
+            model.host().run_job(&what, states[m].samples(), |job| {
                 states[m].for_each_block(model, |block| {
                     job.step(block.len())?;
                     let found = evaluator.regressor_blocks(block, |len, columns| {
@@ -197,16 +197,16 @@ impl Terms {
     }
 }
 
-impl Slot {
+impl SummandPair {
     /// The place in the second model, or in the first where there is none.
-    fn last<'a>(&self, models: [&'a Model; 2]) -> Option<(&'a Model, Place)> {
+    fn latest_place<'a>(&self, models: [&'a Model; 2]) -> Option<(&'a Model, SummandPlace)> {
         let last = |m: usize| Some((models[m], self.places[m]?));
         last(1).or_else(|| last(0))
     }
 
     /// The summand as people read it.
     fn text(&self, models: [&Model; 2]) -> String {
-        let last = self.last(models);
+        let last = self.latest_place(models);
         let text = last.map(|(model, place)| match place.product {
             Some(product) => review::base_summand(&model.derivation, place.base, product).text(),
             None => model.base[place.base].expression.clone(),
@@ -215,7 +215,7 @@ impl Slot {
     }
 
     fn unit(&self, models: [&Model; 2]) -> String {
-        let last = self.last(models);
+        let last = self.latest_place(models);
         last.map_or_else(String::new, |(model, place)| {
             model.base[place.base].unit.clone()
         })
@@ -223,7 +223,7 @@ impl Slot {
 }
 
 /// What the base parameters of a model are sums of, with the products in words; one that `is_whole` names is one summand.
-fn summands(model: &Model, is_whole: &dyn Fn(&str) -> bool) -> Vec<(String, Place)> {
+fn summands(model: &Model, is_whole: &dyn Fn(&str) -> bool) -> Vec<(String, SummandPlace)> {
     let mechanism = &model.derivation.mechanism;
     let reduction = &model.derivation.reduction;
     let parameters: Vec<f64> = mechanism.parameters.iter().map(|p| p.nominal).collect();
@@ -232,7 +232,7 @@ fn summands(model: &Model, is_whole: &dyn Fn(&str) -> bool) -> Vec<(String, Plac
     let mut found = Vec::new();
     for (base, one) in model.base.iter().enumerate() {
         if is_whole(&one.retained) {
-            let place = Place {
+            let place = SummandPlace {
                 base,
                 product: None,
                 value: model.nominal[base],
@@ -246,7 +246,7 @@ fn summands(model: &Model, is_whole: &dyn Fn(&str) -> bool) -> Vec<(String, Plac
         let retained = std::iter::once((reduction.retained[base], 1.0));
         for (product, factor) in retained.chain(dependent) {
             let monomial = &reduction.products[product];
-            let place = Place {
+            let place = SummandPlace {
                 base,
                 product: Some(product),
                 value: factor * monomial.value(&parameters),

@@ -6,8 +6,8 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use modelmill::Model;
-use modelmill_codegen::{Derivation, Evaluator, States};
-use modelmill_spec::Coordinate;
+use modelmill_codegen::{Derivation, ModelEvaluator, MotionStates};
+use modelmill_spec::JointCoordinate;
 
 use crate::draws::Draws;
 
@@ -66,7 +66,7 @@ pub(crate) fn with_part(name: &str, part: &str) -> Model {
 }
 
 /// How far a coordinate goes, rad or m; loops leave less room.
-fn reach(derivation: &Derivation, coordinate: &Coordinate) -> f64 {
+fn reach(derivation: &Derivation, coordinate: &JointCoordinate) -> f64 {
     let wide = if derivation.mechanism.loops.is_empty() {
         1.0
     } else {
@@ -122,7 +122,7 @@ fn read_more(made: Made, joint: usize, carried: &[Vec<f64>], sample: usize) -> f
 /// A recording of a model that is derived already.
 pub(crate) fn run_of(model: &Model, name: &str, seed: u64, made: Made) -> PathBuf {
     let mut draws = Draws(seed);
-    let active = model.active();
+    let active = model.active_coordinates();
     let mut columns = [(); 3].map(|()| vec![vec![0.0; SAMPLES]; active.len()]);
     let coordinates = &model.derivation.mechanism.coordinates;
     for (i, coordinate) in coordinates.iter().filter(|c| !c.passive).enumerate() {
@@ -143,25 +143,25 @@ pub(crate) fn run_of(model: &Model, name: &str, seed: u64, made: Made) -> PathBu
     let [q, qd, qdd]: [Vec<&[f64]>; 3] = columns
         .each_ref()
         .map(|all| all.iter().map(Vec::as_slice).collect());
-    let at_rest = States {
+    let at_rest = MotionStates {
         q: q.clone(),
         qd: vec![&[0.0; SAMPLES]; active.len()],
         qdd: vec![&[0.0; SAMPLES]; active.len()],
         load: Vec::new(),
     };
-    let states = States {
+    let states = MotionStates {
         q,
         qd,
         qdd,
         load: Vec::new(),
     };
-    let evaluator = Evaluator::new(&model.derivation);
+    let evaluator = ModelEvaluator::new(&model.derivation);
     let mut forces = evaluator
         .inverse_dynamics(&states, &model.nominal)
         .expect("forces");
     if let Made::Push(pushed, times, from, to) = made {
         let [with, without] = [pushed, model].map(|model| {
-            let evaluator = Evaluator::new(&model.derivation);
+            let evaluator = ModelEvaluator::new(&model.derivation);
             let forces = evaluator.inverse_dynamics(&at_rest, &model.nominal);
             forces.expect("forces")
         });
@@ -171,7 +171,7 @@ pub(crate) fn run_of(model: &Model, name: &str, seed: u64, made: Made) -> PathBu
         hose(&mut forces[joint], &columns[0][joint], most, way);
     }
     let carried = forces.clone();
-    let motion = evaluator.drives(&states).expect("drives");
+    let motion = evaluator.drive_motion(&states).expect("drives");
     let drives = model.drives();
     let mut clock = 1.0;
     for (d, force) in forces.iter_mut().enumerate() {

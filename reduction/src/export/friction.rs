@@ -1,13 +1,13 @@
 //! Effects that descriptions of robots know: friction, inertia of drives and springs of joints and tendons, and elements
 //! between two points.
 
-use modelmill_spec::{DriveKind, Effect, Mechanics, Mechanism, Place, PointIdx};
+use modelmill_spec::{DriveKind, ModelEffect, Mechanics, Mechanism, EffectPlace, PointIdx};
 
-use super::Format;
+use super::DescriptionFormat;
 
 /// What a joint or tendon has by itself.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Passive {
+pub(super) struct PassiveProperties {
     /// N s/m or N m s/rad
     pub(super) damping: f64,
     /// N or N m
@@ -22,24 +22,24 @@ pub(super) struct Passive {
 
 /// Effects by what has them.
 #[derive(Clone, Debug)]
-pub(super) struct Friction {
+pub(super) struct PassiveEffects {
     /// Of each coordinate.
-    pub(super) joints: Vec<Passive>,
+    pub(super) joints: Vec<PassiveProperties>,
     /// Of each drive that is a line between two points.
-    pub(super) drives: Vec<Passive>,
+    pub(super) drives: Vec<PassiveProperties>,
     /// Elements between two points.
-    pub(super) elements: Vec<([PointIdx; 2], Passive)>,
+    pub(super) elements: Vec<([PointIdx; 2], PassiveProperties)>,
 }
 
 /// Sorts the effects of a mechanism; those that a format does not know become remarks.
-pub(super) fn friction(
+pub(super) fn passive_effects(
     mechanism: &Mechanism,
-    format: Format,
+    format: DescriptionFormat,
     remarks: &mut Vec<String>,
-) -> Friction {
-    let mut found = Friction {
-        joints: vec![Passive::default(); mechanism.coordinates.len()],
-        drives: vec![Passive::default(); mechanism.drives.len()],
+) -> PassiveEffects {
+    let mut found = PassiveEffects {
+        joints: vec![PassiveProperties::default(); mechanism.coordinates.len()],
+        drives: vec![PassiveProperties::default(); mechanism.drives.len()],
         elements: Vec::new(),
     };
     for effect in &mechanism.effects {
@@ -47,8 +47,8 @@ pub(super) fn friction(
         if !effect.terms.is_empty() && effect.terms.iter().all(|term| is_zero(&term.parameter.0)) {
             continue;
         }
-        if !said(mechanism, effect, format, &mut found) {
-            let places: Vec<String> = effect.places.iter().map(|p| name(mechanism, *p)).collect();
+        if !add_effect(mechanism, effect, format, &mut found) {
+            let places: Vec<String> = effect.places.iter().map(|p| place_text(mechanism, *p)).collect();
             remarks.push(format!(
                 "`{}` at {} is left out: {} has nothing like it",
                 effect.kind,
@@ -61,7 +61,7 @@ pub(super) fn friction(
 }
 
 /// Takes an effect in; false if the format has nothing like it.
-fn said(mechanism: &Mechanism, effect: &Effect, format: Format, found: &mut Friction) -> bool {
+fn add_effect(mechanism: &Mechanism, effect: &ModelEffect, format: DescriptionFormat, found: &mut PassiveEffects) -> bool {
     let value = |symbol: &str| {
         let term = effect.terms.iter().find(|term| term.symbol == symbol);
         term.map_or(0.0, |term| mechanism.parameters[term.parameter.0].nominal)
@@ -74,7 +74,7 @@ fn said(mechanism: &Mechanism, effect: &Effect, format: Format, found: &mut Fric
     };
     if effect.mechanics == Some(Mechanics::Strut) {
         let (stiffness, constant) = (value("k"), value("F0"));
-        let [Place::Point(from), Place::Point(to)] = effect.places[..] else {
+        let [EffectPlace::Point(from), EffectPlace::Point(to)] = effect.places[..] else {
             return false;
         };
         // A pull of `F0 + k l` is a spring with the length at rest of `-F0/k`, which must be one.
@@ -83,14 +83,14 @@ fn said(mechanism: &Mechanism, effect: &Effect, format: Format, found: &mut Fric
         } else {
             -constant / stiffness
         };
-        if format != Format::Mjcf || !rest.is_finite() || rest < 0.0 {
+        if format != DescriptionFormat::Mjcf || !rest.is_finite() || rest < 0.0 {
             return false;
         }
-        let passive = Passive {
+        let passive = PassiveProperties {
             damping: value("Fv"),
             stiffness,
             rest,
-            ..Passive::default()
+            ..PassiveProperties::default()
         };
         found.elements.push(([from, to], passive));
         return true;
@@ -99,7 +99,7 @@ fn said(mechanism: &Mechanism, effect: &Effect, format: Format, found: &mut Fric
     let is_body = effect
         .places
         .iter()
-        .all(|place| matches!(place, Place::Point(_)));
+        .all(|place| matches!(place, EffectPlace::Point(_)));
     if matches!(
         effect.mechanics,
         Some(Mechanics::Part | Mechanics::Placement | Mechanics::Tilt)
@@ -107,11 +107,11 @@ fn said(mechanism: &Mechanism, effect: &Effect, format: Format, found: &mut Fric
     {
         return true;
     }
-    let change: &dyn Fn(&mut Passive) = match effect.kind.as_str() {
+    let change: &dyn Fn(&mut PassiveProperties) = match effect.kind.as_str() {
         "viscous_friction" => &|one| one.damping += value("Fv"),
         "coulomb_friction" => &|one| one.friction += value("Fc"),
-        "drive_inertia" if format == Format::Mjcf => &|one| one.armature += value("Ia"),
-        "spring" if format == Format::Mjcf => &|one| {
+        "drive_inertia" if format == DescriptionFormat::Mjcf => &|one| one.armature += value("Ia"),
+        "spring" if format == DescriptionFormat::Mjcf => &|one| {
             let (k, rest) = (value("k"), constant("rest"));
             let sum = one.stiffness + k;
             one.rest = (one.stiffness * one.rest + k * rest) / sum;
@@ -121,27 +121,27 @@ fn said(mechanism: &Mechanism, effect: &Effect, format: Format, found: &mut Fric
     };
     for place in &effect.places {
         match *place {
-            Place::Coordinate(i) => change(&mut found.joints[i.0]),
-            Place::Drive(d) => match mechanism.drives[d.0].kind {
+            EffectPlace::Coordinate(i) => change(&mut found.joints[i.0]),
+            EffectPlace::Drive(d) => match mechanism.drives[d.0].kind {
                 DriveKind::Joint(i) => change(&mut found.joints[i.0]),
-                DriveKind::Linear { .. } if format == Format::Mjcf => {
+                DriveKind::Linear { .. } if format == DescriptionFormat::Mjcf => {
                     change(&mut found.drives[d.0]);
                 }
                 DriveKind::Linear { .. } => return false,
             },
-            Place::Point(_) | Place::Part(_) | Place::Base | Place::Force => return false,
+            EffectPlace::Point(_) | EffectPlace::Part(_) | EffectPlace::Base | EffectPlace::Force => return false,
         }
     }
     true
 }
 
-fn name(mechanism: &Mechanism, place: Place) -> String {
+fn place_text(mechanism: &Mechanism, place: EffectPlace) -> String {
     match place {
-        Place::Drive(d) => format!("`{}`", mechanism.drives[d.0].name),
-        Place::Coordinate(i) => format!("`{}`", mechanism.coordinates[i.0].name),
-        Place::Point(p) => format!("`{}`", mechanism.points[p.0].name),
-        Place::Part(p) => format!("`{}`", mechanism.parts[p.0].name),
-        Place::Base => "`base`".to_owned(),
-        Place::Force => "`force`".to_owned(),
+        EffectPlace::Drive(d) => format!("`{}`", mechanism.drives[d.0].name),
+        EffectPlace::Coordinate(i) => format!("`{}`", mechanism.coordinates[i.0].name),
+        EffectPlace::Point(p) => format!("`{}`", mechanism.points[p.0].name),
+        EffectPlace::Part(p) => format!("`{}`", mechanism.parts[p.0].name),
+        EffectPlace::Base => "`base`".to_owned(),
+        EffectPlace::Force => "`force`".to_owned(),
     }
 }

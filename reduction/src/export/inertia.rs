@@ -1,22 +1,22 @@
 //! What links carry: the inertia of parts, lumped masses and such effects as are bodies, added up.
 
-use modelmill_spec::{Exact, FrameIdx, Inertial, LumpedMass, Mechanism, Part, Place};
+use modelmill_spec::{ExactExpression, FrameIdx, PartInertia, LumpedMass, Mechanism, ModelPart, EffectPlace};
 use nalgebra::{Matrix3, Vector3};
 
 use super::ExportError;
-use super::tree::{Placed, Tree};
+use super::tree::{LinkPlacement, LinkTree};
 
 /// Below this share of a link's own size, numbers are rounding.
 const ROUNDING: f64 = 1e-12;
 
 /// Radius of gyration of a link that never turns, m.
-const UNFELT_RADIUS: f64 = 0.05;
+const DEFAULT_RADIUS_OF_GYRATION: f64 = 0.05;
 /// Moments across the direction about which a link turns, as parts of that about it: a body somewhat thicker than a plate.
-const ACROSS: f64 = 0.6;
+const TRANSVERSE_RATIO: f64 = 0.6;
 
 /// Ten numbers about the origin of a link, in its axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Body {
+pub(super) struct LinkInertia {
     /// kg
     pub(super) mass: f64,
     /// kg m
@@ -25,7 +25,7 @@ pub(super) struct Body {
     pub(super) inertia: Matrix3<f64>,
 }
 
-impl Body {
+impl LinkInertia {
     const NONE: Self = Self {
         mass: 0.0,
         first: Vector3::new(0.0, 0.0, 0.0),
@@ -33,7 +33,7 @@ impl Body {
     };
 
     /// Centre of mass, m; the origin where there is no mass.
-    pub(super) fn centre(&self) -> Vector3<f64> {
+    pub(super) fn centre_of_mass(&self) -> Vector3<f64> {
         if self.mass == 0.0 {
             return Vector3::zeros();
         }
@@ -41,18 +41,18 @@ impl Body {
     }
 
     /// About the centre of mass, kg m^2.
-    pub(super) fn central(&self) -> Matrix3<f64> {
-        let c = self.centre();
+    pub(super) fn central_inertia(&self) -> Matrix3<f64> {
+        let c = self.centre_of_mass();
         self.inertia - self.mass * (c.norm_squared() * Matrix3::identity() - c * c.transpose())
     }
 
     /// Whether there is nothing.
-    pub(super) fn is_none(&self) -> bool {
+    pub(super) fn is_zero(&self) -> bool {
         *self == Self::NONE
     }
 
     /// The same body about the origin of a frame in which its own one is placed.
-    fn seen(&self, placed: &Placed) -> Self {
+    fn in_outer_frame(&self, placed: &LinkPlacement) -> Self {
         let (r, t) = (placed.rotation, placed.origin);
         let turned = r * self.first;
         let square =
@@ -75,19 +75,19 @@ impl Body {
 }
 
 /// What each link carries.
-pub(super) fn bodies(mechanism: &Mechanism, tree: &Tree) -> Result<Vec<Body>, ExportError> {
-    let value = |exact: &Exact| exact.evaluate(&|symbol| mechanism.symbol_nominal(symbol));
-    let vector = |exact: &[Exact; 3]| Vector3::from_fn(|k, _| value(&exact[k]));
-    let mut bodies = vec![Body::NONE; tree.links.len()];
-    let mut add = |frame: FrameIdx, body: &Body| {
+pub(super) fn bodies(mechanism: &Mechanism, tree: &LinkTree) -> Result<Vec<LinkInertia>, ExportError> {
+    let value = |exact: &ExactExpression| exact.evaluate(&|symbol| mechanism.symbol_nominal(symbol));
+    let vector = |exact: &[ExactExpression; 3]| Vector3::from_fn(|k, _| value(&exact[k]));
+    let mut bodies = vec![LinkInertia::NONE; tree.links.len()];
+    let mut add = |frame: FrameIdx, body: &LinkInertia| {
         let link = tree.link_of[frame.0];
-        let placed = tree.links[link].placed.sees(&tree.frames[frame.0]);
-        bodies[link].add(&body.seen(&placed));
+        let placed = tree.links[link].placed.relative_placement(&tree.frames[frame.0]);
+        bodies[link].add(&body.in_outer_frame(&placed));
     };
     let of_effects = mechanism.effects.iter().map(|effect| &effect.bodies);
     let parts = mechanism.parts.iter();
     for part in parts.chain(of_effects.clone().flat_map(|bodies| &bodies.parts)) {
-        add(part.frame, &of_part(part, &value, &vector));
+        add(part.frame, &from_part(part, &value, &vector));
     }
     let lumps = mechanism.lumped_masses.iter();
     for lump in lumps.chain(of_effects.flat_map(|bodies| &bodies.lumped_masses)) {
@@ -100,15 +100,15 @@ pub(super) fn bodies(mechanism: &Mechanism, tree: &Tree) -> Result<Vec<Body>, Ex
             )));
         }
         let share = lump_share(lump);
-        add(lump.frame, &point(share * value(&lump.mass), forces));
+        add(lump.frame, &point_mass(share * value(&lump.mass), forces));
     }
     for effect in mechanism.effects.iter().filter(|e| e.mechanics.is_none()) {
         for place in &effect.places {
-            let Place::Point(at) = place else { continue };
+            let EffectPlace::Point(at) = place else { continue };
             let at = &mechanism.points[at.0];
             for term in &effect.terms {
                 let mass = mechanism.parameters[term.parameter.0].nominal * value(&term.expression);
-                add(at.frame, &point(mass, vector(&at.at)));
+                add(at.frame, &point_mass(mass, vector(&at.at)));
             }
         }
     }
@@ -116,42 +116,42 @@ pub(super) fn bodies(mechanism: &Mechanism, tree: &Tree) -> Result<Vec<Body>, Ex
 }
 
 fn lump_share(lump: &LumpedMass) -> f64 {
-    Exact::Rational(lump.share.clone()).evaluate(&|_| 0.0)
+    ExactExpression::Rational(lump.share.clone()).evaluate(&|_| 0.0)
 }
 
-fn point(mass: f64, at: Vector3<f64>) -> Body {
-    Body {
+fn point_mass(mass: f64, at: Vector3<f64>) -> LinkInertia {
+    LinkInertia {
         mass,
         first: mass * at,
         inertia: mass * (at.norm_squared() * Matrix3::identity() - at * at.transpose()),
     }
 }
 
-fn of_part(
-    part: &Part,
-    value: &dyn Fn(&Exact) -> f64,
-    vector: &dyn Fn(&[Exact; 3]) -> Vector3<f64>,
-) -> Body {
-    let matrix = |six: &[Exact; 6]| {
+fn from_part(
+    part: &ModelPart,
+    value: &dyn Fn(&ExactExpression) -> f64,
+    vector: &dyn Fn(&[ExactExpression; 3]) -> Vector3<f64>,
+) -> LinkInertia {
+    let matrix = |six: &[ExactExpression; 6]| {
         let [xx, xy, xz, yy, yz, zz] = [0, 1, 2, 3, 4, 5].map(|k: usize| value(&six[k]));
         Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz)
     };
     match &part.inertial {
-        Inertial::Linear {
+        PartInertia::Linear {
             mass,
             first_moment,
             inertia,
-        } => Body {
+        } => LinkInertia {
             mass: value(mass),
             first: vector(first_moment),
             inertia: matrix(inertia),
         },
-        Inertial::AboutCentre {
+        PartInertia::AboutCentre {
             mass,
             centre,
             inertia,
         } => {
-            let mut body = point(value(mass), vector(centre));
+            let mut body = point_mass(value(mass), vector(centre));
             body.inertia += matrix(inertia);
             body
         }
@@ -160,28 +160,28 @@ fn of_part(
 
 /// Gives links that only slide, or turn about one direction, moments of inertia that a body can have: those that the model
 /// does not say are not felt.
-pub(super) fn complete(tree: &Tree, bodies: &mut [Body], remarks: &mut Vec<String>) {
+pub(super) fn complete_inertias(tree: &LinkTree, bodies: &mut [LinkInertia], remarks: &mut Vec<String>) {
     let mut completed = Vec::new();
     for (l, link) in tree.links.iter().enumerate().skip(1) {
         let body = &mut bodies[l];
-        if body.mass <= 0.0 || fault(body).is_none() {
+        if body.mass <= 0.0 || inertia_fault(body).is_none() {
             continue;
         }
-        let central = match turns(tree, l) {
-            Turns::Never => body.mass * UNFELT_RADIUS.powi(2) * Matrix3::identity(),
-            Turns::About(axis) => {
+        let central = match link_rotation(tree, l) {
+            LinkRotation::Never => body.mass * DEFAULT_RADIUS_OF_GYRATION.powi(2) * Matrix3::identity(),
+            LinkRotation::OneAxis(axis) => {
                 let n = link.placed.rotation.transpose() * axis;
-                let about = n.dot(&(body.central() * n));
-                let across = ACROSS * about;
+                let about = n.dot(&(body.central_inertia() * n));
+                let across = TRANSVERSE_RATIO * about;
                 across * Matrix3::identity() + (about - across) * n * n.transpose()
             }
-            Turns::Anyhow => continue,
+            LinkRotation::AnyAxis => continue,
         };
-        let other = Body {
-            inertia: body.inertia - body.central() + central,
+        let other = LinkInertia {
+            inertia: body.inertia - body.central_inertia() + central,
             ..*body
         };
-        if fault(&other).is_none() {
+        if inertia_fault(&other).is_none() {
             *body = other;
             completed.push(format!("`{}`", link.name));
         }
@@ -195,24 +195,24 @@ pub(super) fn complete(tree: &Tree, bodies: &mut [Body], remarks: &mut Vec<Strin
 }
 
 /// How a link turns against the base.
-enum Turns {
+enum LinkRotation {
     Never,
-    About(Vector3<f64>),
-    Anyhow,
+    OneAxis(Vector3<f64>),
+    AnyAxis,
 }
 
-fn turns(tree: &Tree, mut link: usize) -> Turns {
-    let mut turns = Turns::Never;
+fn link_rotation(tree: &LinkTree, mut link: usize) -> LinkRotation {
+    let mut turns = LinkRotation::Never;
     while link != 0 {
         let one = &tree.links[link];
         if one.joints.is_empty() {
-            return Turns::Anyhow;
+            return LinkRotation::AnyAxis;
         }
         for joint in one.joints.iter().filter(|joint| joint.is_rotation) {
             turns = match turns {
-                Turns::Never => Turns::About(joint.axis),
-                Turns::About(axis) if axis.cross(&joint.axis).norm() < 1e-9 => Turns::About(axis),
-                _ => return Turns::Anyhow,
+                LinkRotation::Never => LinkRotation::OneAxis(joint.axis),
+                LinkRotation::OneAxis(axis) if axis.cross(&joint.axis).norm() < 1e-9 => LinkRotation::OneAxis(axis),
+                _ => return LinkRotation::AnyAxis,
             };
         }
         link = one.parent;
@@ -221,8 +221,8 @@ fn turns(tree: &Tree, mut link: usize) -> Turns {
 }
 
 /// Why nothing can be such a body.
-fn fault(body: &Body) -> Option<&'static str> {
-    let moments = body.central().symmetric_eigenvalues();
+fn inertia_fault(body: &LinkInertia) -> Option<&'static str> {
+    let moments = body.central_inertia().symmetric_eigenvalues();
     let size = body.inertia.norm();
     let (least, largest) = (moments.min(), moments.max());
     if body.mass <= 0.0 {
@@ -237,9 +237,9 @@ fn fault(body: &Body) -> Option<&'static str> {
 }
 
 /// Tells of links that no body can be: simulators refuse them, or move them as nothing moves.
-pub(super) fn judge(tree: &Tree, bodies: &[Body], remarks: &mut Vec<String>) {
+pub(super) fn report_impossible(tree: &LinkTree, bodies: &[LinkInertia], remarks: &mut Vec<String>) {
     for (link, body) in tree.links.iter().zip(bodies).skip(1) {
-        let Some(fault) = fault(body).filter(|_| !body.is_none()) else {
+        let Some(fault) = inertia_fault(body).filter(|_| !body.is_zero()) else {
             continue;
         };
         remarks.push(format!(

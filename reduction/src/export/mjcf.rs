@@ -2,27 +2,27 @@
 
 use std::fmt::Write as _;
 
-use modelmill_spec::{CoordinateIdx, Drive, DriveKind, Mechanism, PointIdx};
+use modelmill_spec::{CoordinateIdx, ModelDrive, DriveKind, Mechanism, PointIdx};
 use nalgebra::UnitQuaternion;
 
-use super::friction::{Friction, Passive};
-use super::inertia::Body;
-use super::tree::{Joint, Tree};
+use super::friction::{PassiveEffects, PassiveProperties};
+use super::inertia::LinkInertia;
+use super::tree::{ExportedJoint, LinkTree};
 use super::urdf::{clean, orthonormal};
-use super::{list, number};
+use super::{number_list, number_text};
 
 /// MuJoCo moves no body without mass: what one gets that has none, kg.
-const NEXT_TO_NOTHING: f64 = 1e-9;
+const NEGLIGIBLE_MASS: f64 = 1e-9;
 
 pub(super) fn write(
     mechanism: &Mechanism,
-    tree: &Tree,
-    bodies: &[Body],
-    friction: &Friction,
+    tree: &LinkTree,
+    bodies: &[LinkInertia],
+    friction: &PassiveEffects,
     at: &[f64],
     remarks: &mut Vec<String>,
 ) -> String {
-    let mut writer = Writer {
+    let mut writer = MjcfWriter {
         mechanism,
         tree,
         bodies,
@@ -32,15 +32,15 @@ pub(super) fn write(
         text: String::new(),
         depth: 0,
     };
-    writer.all();
+    writer.write_all();
     writer.text
 }
 
-struct Writer<'a> {
+struct MjcfWriter<'a> {
     mechanism: &'a Mechanism,
-    tree: &'a Tree,
-    bodies: &'a [Body],
-    friction: &'a Friction,
+    tree: &'a LinkTree,
+    bodies: &'a [LinkInertia],
+    friction: &'a PassiveEffects,
     /// Coordinates at which the bodies are drawn.
     at: &'a [f64],
     remarks: &'a mut Vec<String>,
@@ -48,7 +48,7 @@ struct Writer<'a> {
     depth: usize,
 }
 
-impl Writer<'_> {
+impl MjcfWriter<'_> {
     fn line(&mut self, text: &str) {
         self.text += &"  ".repeat(self.depth);
         self.text += text;
@@ -56,7 +56,7 @@ impl Writer<'_> {
     }
 
     /// An element with others in it.
-    fn within(&mut self, tag: &str, attributes: &str, inside: impl FnOnce(&mut Self)) {
+    fn write_element(&mut self, tag: &str, attributes: &str, inside: impl FnOnce(&mut Self)) {
         self.line(&format!("<{tag}{attributes}>"));
         self.depth += 1;
         inside(self);
@@ -64,15 +64,15 @@ impl Writer<'_> {
         self.line(&format!("</{tag}>"));
     }
 
-    fn all(&mut self) {
+    fn write_all(&mut self) {
         let name = format!(" model=\"{}\"", self.mechanism.name);
-        self.within("mujoco", &name, |w| {
+        self.write_element("mujoco", &name, |w| {
             w.line("<compiler angle=\"radian\" autolimits=\"true\"/>");
             let gravity: Vec<f64> = (w.mechanism.gravity.iter())
                 .map(|g| g.evaluate(&|s| w.mechanism.symbol_nominal(s)))
                 .collect();
-            w.line(&format!("<option gravity=\"{}\"/>", list(&gravity)));
-            w.within("worldbody", "", |w| w.inside(0));
+            w.line(&format!("<option gravity=\"{}\"/>", number_list(&gravity)));
+            w.write_element("worldbody", "", |w| w.write_link(0));
             w.equalities();
             w.tendons();
             w.actuators();
@@ -80,14 +80,14 @@ impl Writer<'_> {
     }
 
     /// What is on a link, and the links behind it.
-    fn inside(&mut self, link: usize) {
+    fn write_link(&mut self, link: usize) {
         for p in 0..self.mechanism.points.len() {
             let (on, at) = self.tree.point(self.mechanism, PointIdx(p));
             if on == link && self.is_used(PointIdx(p)) {
                 let name = &self.mechanism.points[p].name;
                 self.line(&format!(
                     "<site name=\"{name}\" pos=\"{}\"/>",
-                    list(clean(at).as_slice())
+                    number_list(clean(at).as_slice())
                 ));
             }
         }
@@ -100,7 +100,7 @@ impl Writer<'_> {
 
     fn is_used(&self, point: PointIdx) -> bool {
         let m = self.mechanism;
-        let is_end = |drive: &Drive| match drive.kind {
+        let is_end = |drive: &ModelDrive| match drive.kind {
             DriveKind::Linear { from, to } => from == point || to == point,
             DriveKind::Joint(_) => false,
         };
@@ -111,15 +111,15 @@ impl Writer<'_> {
 
     fn body(&mut self, at: usize) {
         let link = &self.tree.links[at];
-        let placed = self.tree.links[link.parent].placed.sees(&link.placed);
+        let placed = self.tree.links[link.parent].placed.relative_placement(&link.placed);
         let turn = UnitQuaternion::from_rotation_matrix(&orthonormal(&placed.rotation));
         let head = format!(
             " name=\"{}\" pos=\"{}\" quat=\"{}\"",
             link.name,
-            list(clean(placed.origin).as_slice()),
-            list(&[turn.w, turn.i, turn.j, turn.k])
+            number_list(clean(placed.origin).as_slice()),
+            number_list(&[turn.w, turn.i, turn.j, turn.k])
         );
-        self.within("body", &head, |w| {
+        self.write_element("body", &head, |w| {
             let link = &w.tree.links[at];
             if link.joints.is_empty() {
                 w.line(&format!("<freejoint name=\"{}_free\"/>", link.name));
@@ -130,31 +130,31 @@ impl Writer<'_> {
             }
             let inertial = w.inertial(at);
             w.line(&inertial);
-            w.inside(at);
+            w.write_link(at);
         });
     }
 
-    fn joint(&self, joint: &Joint, link: usize) -> String {
+    fn joint(&self, joint: &ExportedJoint, link: usize) -> String {
         let placed = &self.tree.links[link].placed;
         let coordinate = &self.mechanism.coordinates[joint.coordinate];
         let mut text = format!(
             "<joint name=\"{}\" type=\"{}\" pos=\"{}\" axis=\"{}\"",
             joint.name,
             if joint.is_rotation { "hinge" } else { "slide" },
-            list(clean(placed.sees_point(&joint.origin)).as_slice()),
-            list(clean(placed.rotation.transpose() * joint.axis).as_slice()),
+            number_list(clean(placed.relative_point(&joint.origin)).as_slice()),
+            number_list(clean(placed.rotation.transpose() * joint.axis).as_slice()),
         );
         let reference = joint.ratio * self.at[joint.coordinate];
         if reference != 0.0 {
-            let _ = write!(text, " ref=\"{}\"", number(reference));
+            let _ = write!(text, " ref=\"{}\"", number_text(reference));
         }
         if joint.name == coordinate.name {
             let limits = self.mechanism.limits.coordinates.iter();
             let of = limits.clone().find(|(i, _)| i.0 == joint.coordinate);
             if let Some([low, high]) = of.and_then(|(_, one)| one.position) {
-                let _ = write!(text, " range=\"{} {}\"", number(low), number(high));
+                let _ = write!(text, " range=\"{} {}\"", number_text(low), number_text(high));
             }
-            text += &passive(&self.friction.joints[joint.coordinate], "springref");
+            text += &passive_attributes(&self.friction.joints[joint.coordinate], "springref");
         }
         text + "/>"
     }
@@ -163,15 +163,15 @@ impl Writer<'_> {
         let body = &self.bodies[at];
         if body.mass == 0.0 {
             self.remarks.push(format!(
-                "`{}` has no mass, and MuJoCo moves no body without: it gets {NEXT_TO_NOTHING:e} kg",
+                "`{}` has no mass, and MuJoCo moves no body without: it gets {NEGLIGIBLE_MASS:e} kg",
                 self.tree.links[at].name
             ));
-            let inertia = number(1e-3 * NEXT_TO_NOTHING);
+            let inertia = number_text(1e-3 * NEGLIGIBLE_MASS);
             return format!(
-                "<inertial pos=\"0 0 0\" mass=\"{NEXT_TO_NOTHING:e}\" diaginertia=\"{inertia} {inertia} {inertia}\"/>"
+                "<inertial pos=\"0 0 0\" mass=\"{NEGLIGIBLE_MASS:e}\" diaginertia=\"{inertia} {inertia} {inertia}\"/>"
             );
         }
-        let i = body.central();
+        let i = body.central_inertia();
         let six = [
             i[(0, 0)],
             i[(1, 1)],
@@ -182,9 +182,9 @@ impl Writer<'_> {
         ];
         format!(
             "<inertial pos=\"{}\" mass=\"{}\" fullinertia=\"{}\"/>",
-            list(body.centre().as_slice()),
-            number(body.mass),
-            list(&six)
+            number_list(body.centre_of_mass().as_slice()),
+            number_text(body.mass),
+            number_list(&six)
         )
     }
 
@@ -206,19 +206,19 @@ impl Writer<'_> {
                 lines.push(format!(
                     "<joint joint1=\"{}\" joint2=\"{owner}\" polycoef=\"0 {} 0 0 0\"/>",
                     joint.name,
-                    number(joint.ratio)
+                    number_text(joint.ratio)
                 ));
             }
         }
         for one in &self.tree.followed {
             // Seen from where the bodies are drawn.
-            let [own, other] = [one.coordinate, one.of].map(|i| self.at[i]);
+            let [own, other] = [one.coordinate, one.leader].map(|i| self.at[i]);
             lines.push(format!(
                 "<joint joint1=\"{}\" joint2=\"{}\" polycoef=\"{} {} 0 0 0\"/>",
                 m.coordinates[one.coordinate].name,
-                m.coordinates[one.of].name,
-                number(one.offset + one.factor * other - own),
-                number(one.factor)
+                m.coordinates[one.leader].name,
+                number_text(one.offset + one.factor * other - own),
+                number_text(one.factor)
             ));
         }
         if lines.is_empty() {
@@ -229,7 +229,7 @@ impl Writer<'_> {
              are held (`solref`, `solimp`)"
                 .to_owned(),
         );
-        self.within("equality", "", |w| {
+        self.write_element("equality", "", |w| {
             for line in lines {
                 w.line(&line);
             }
@@ -243,21 +243,21 @@ impl Writer<'_> {
         let drives = m.drives.iter().enumerate().map(|(d, one)| (Some(d), one));
         for (d, drive) in drives.chain(m.shared_drives.iter().map(|one| (None, one))) {
             if let DriveKind::Linear { from, to } = drive.kind {
-                let own = d.map_or(Passive::default(), |d| self.friction.drives[d]);
-                let rest = passive(&own, "springlength");
+                let own = d.map_or(PassiveProperties::default(), |d| self.friction.drives[d]);
+                let rest = passive_attributes(&own, "springlength");
                 lines.push((format!("name=\"{}_line\"{rest}", drive.name), [from, to]));
             }
         }
         for (k, (ends, own)) in self.friction.elements.iter().enumerate() {
-            let rest = passive(own, "springlength");
+            let rest = passive_attributes(own, "springlength");
             lines.push((format!("name=\"element_{}\"{rest}", k + 1), *ends));
         }
         if lines.is_empty() {
             return;
         }
-        self.within("tendon", "", |w| {
+        self.write_element("tendon", "", |w| {
             for (head, ends) in lines {
-                w.within("spatial", &format!(" {head}"), |w| {
+                w.write_element("spatial", &format!(" {head}"), |w| {
                     for point in ends {
                         let name = &w.mechanism.points[point.0].name;
                         w.line(&format!("<site site=\"{name}\"/>"));
@@ -285,14 +285,14 @@ impl Writer<'_> {
             let limits = m.limits.forces.iter();
             let range = limits.clone().find(|(i, _)| Some(i.0) == d);
             let range = range.map_or(String::new(), |(_, [low, high])| {
-                format!(" ctrlrange=\"{} {}\"", number(*low), number(*high))
+                format!(" ctrlrange=\"{} {}\"", number_text(*low), number_text(*high))
             });
             lines.push(format!("<motor name=\"{}\" {on}{range}/>", drive.name));
         }
         if lines.is_empty() {
             return;
         }
-        self.within("actuator", "", |w| {
+        self.write_element("actuator", "", |w| {
             for line in lines {
                 w.line(&line);
             }
@@ -306,7 +306,7 @@ impl Writer<'_> {
 }
 
 /// Attributes of what a joint or tendon has by itself.
-fn passive(one: &Passive, rest: &str) -> String {
+fn passive_attributes(one: &PassiveProperties, rest: &str) -> String {
     let mut text = String::new();
     for (name, value) in [
         ("damping", one.damping),
@@ -315,11 +315,11 @@ fn passive(one: &Passive, rest: &str) -> String {
         ("stiffness", one.stiffness),
     ] {
         if value != 0.0 {
-            let _ = write!(text, " {name}=\"{}\"", number(value));
+            let _ = write!(text, " {name}=\"{}\"", number_text(value));
         }
     }
     if one.stiffness != 0.0 {
-        let _ = write!(text, " {rest}=\"{}\"", number(one.rest));
+        let _ = write!(text, " {rest}=\"{}\"", number_text(one.rest));
     }
     text
 }

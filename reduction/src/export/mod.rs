@@ -12,18 +12,18 @@ mod urdf;
 
 use std::fmt;
 
-use modelmill_spec::{Exact, Mechanism};
+use modelmill_spec::{ExactExpression, Mechanism};
 
 /// A format of robot descriptions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Format {
+pub enum DescriptionFormat {
     /// Of ROS: trees without loops.
     Urdf,
     /// Of MuJoCo: loops, linear drives as tendons, inertia of drives, springs.
     Mjcf,
 }
 
-impl Format {
+impl DescriptionFormat {
     /// All of them.
     pub const ALL: [Self; 2] = [Self::Urdf, Self::Mjcf];
 
@@ -36,7 +36,7 @@ impl Format {
     }
 
     /// The format that an ending of a file's name (without the dot) stands for.
-    pub fn of_ending(ending: &str) -> Option<Self> {
+    pub fn from_extension(ending: &str) -> Option<Self> {
         match ending {
             "urdf" => Some(Self::Urdf),
             "xml" | "mjcf" => Some(Self::Mjcf),
@@ -47,7 +47,7 @@ impl Format {
 
 /// A robot description that was made of a model.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Exported {
+pub struct DescriptionExport {
     /// Its text.
     pub text: String,
     /// What the format does not say, or says otherwise.
@@ -70,20 +70,20 @@ impl std::error::Error for ExportError {}
 ///
 /// Fails where a joint moves in a way that the format does not know, or a mass sits at different places for the balances of
 /// forces and of moments.
-pub fn export(mechanism: &Mechanism, format: Format) -> Result<Exported, ExportError> {
+pub fn export(mechanism: &Mechanism, format: DescriptionFormat) -> Result<DescriptionExport, ExportError> {
     let mut remarks = Vec::new();
     // Closed loops are shown as they stand; the zeros of a tree are its own.
     let at: Vec<f64> = match format {
-        Format::Mjcf if !mechanism.loops.is_empty() => {
+        DescriptionFormat::Mjcf if !mechanism.loops.is_empty() => {
             mechanism.coordinates.iter().map(|c| c.nominal).collect()
         }
         _ => vec![0.0; mechanism.coordinates.len()],
     };
-    let mut tree = tree::tree(mechanism, &at)?;
-    tree.followed = followed(mechanism, &mut remarks);
+    let mut tree = tree::link_tree(mechanism, &at)?;
+    tree.followed = followed_coordinates(mechanism, &mut remarks);
     let mut bodies = inertia::bodies(mechanism, &tree)?;
-    inertia::complete(&tree, &mut bodies, &mut remarks);
-    inertia::judge(&tree, &bodies, &mut remarks);
+    inertia::complete_inertias(&tree, &mut bodies, &mut remarks);
+    inertia::report_impossible(&tree, &bodies, &mut remarks);
     if !mechanism.identified_base.is_empty() {
         remarks.push(
             "the values under `[identified]` are those of base parameters, which say nothing of single bodies: bodies have \
@@ -91,32 +91,32 @@ pub fn export(mechanism: &Mechanism, format: Format) -> Result<Exported, ExportE
                 .to_owned(),
         );
     }
-    let friction = friction::friction(mechanism, format, &mut remarks);
+    let friction = friction::passive_effects(mechanism, format, &mut remarks);
     let text = match format {
-        Format::Urdf => urdf::write(mechanism, &tree, &bodies, &friction, &mut remarks),
-        Format::Mjcf => mjcf::write(mechanism, &tree, &bodies, &friction, &at, &mut remarks),
+        DescriptionFormat::Urdf => urdf::write(mechanism, &tree, &bodies, &friction, &mut remarks),
+        DescriptionFormat::Mjcf => mjcf::write(mechanism, &tree, &bodies, &friction, &at, &mut remarks),
     };
-    Ok(Exported { text, remarks })
+    Ok(DescriptionExport { text, remarks })
 }
 
 /// A coordinate that follows a single other one.
 #[derive(Clone, Debug)]
-struct Followed {
+struct FollowedCoordinate {
     coordinate: usize,
-    of: usize,
+    leader: usize,
     factor: f64,
     offset: f64,
 }
 
 /// Couplings that formats have; those to several coordinates they have not, which is said.
-fn followed(mechanism: &Mechanism, remarks: &mut Vec<String>) -> Vec<Followed> {
-    let value = |exact: &Exact| exact.evaluate(&|symbol| mechanism.symbol_nominal(symbol));
+fn followed_coordinates(mechanism: &Mechanism, remarks: &mut Vec<String>) -> Vec<FollowedCoordinate> {
+    let value = |exact: &ExactExpression| exact.evaluate(&|symbol| mechanism.symbol_nominal(symbol));
     let mut found = Vec::new();
     for coupling in &mechanism.couplings {
         if let [(of, factor)] = &coupling.terms[..] {
-            found.push(Followed {
+            found.push(FollowedCoordinate {
                 coordinate: coupling.coordinate.0,
-                of: of.0,
+                leader: of.0,
                 factor: value(factor),
                 offset: value(&coupling.offset),
             });
@@ -131,13 +131,13 @@ fn followed(mechanism: &Mechanism, remarks: &mut Vec<String>) -> Vec<Followed> {
 }
 
 /// Numbers with spaces between them, each with as many digits as it needs.
-fn list(values: &[f64]) -> String {
-    let words: Vec<String> = values.iter().map(|x| number(*x)).collect();
+fn number_list(values: &[f64]) -> String {
+    let words: Vec<String> = values.iter().map(|x| number_text(*x)).collect();
     words.join(" ")
 }
 
 /// A number with as many digits as it needs; rounding below 1e-15 is zero.
-fn number(value: f64) -> String {
+fn number_text(value: f64) -> String {
     if value.abs() < 1e-15 {
         return "0".to_owned();
     }

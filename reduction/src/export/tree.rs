@@ -1,21 +1,21 @@
 //! Links and joints: frames that move as one are one link, and each motion of a coordinate between two of them is a joint.
 
-use modelmill_spec::{Kinematics, Mechanism, PointIdx, Step};
+use modelmill_spec::{Kinematics, Mechanism, PointIdx, FrameStep};
 use nalgebra::{Matrix3, Vector3};
 
-use super::{ExportError, Followed};
+use super::{ExportError, FollowedCoordinate};
 
 /// A position with axes, in those of the base.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Placed {
+pub(super) struct LinkPlacement {
     pub(super) rotation: Matrix3<f64>,
     /// m
     pub(super) origin: Vector3<f64>,
 }
 
-impl Placed {
+impl LinkPlacement {
     /// Where something stands, seen from here.
-    pub(super) fn sees(&self, other: &Self) -> Self {
+    pub(super) fn relative_placement(&self, other: &Self) -> Self {
         let back = self.rotation.transpose();
         Self {
             rotation: back * other.rotation,
@@ -24,14 +24,14 @@ impl Placed {
     }
 
     /// A point of the base, seen from here.
-    pub(super) fn sees_point(&self, point: &Vector3<f64>) -> Vector3<f64> {
+    pub(super) fn relative_point(&self, point: &Vector3<f64>) -> Vector3<f64> {
         self.rotation.transpose() * (point - self.origin)
     }
 }
 
 /// How a link moves against its parent.
 #[derive(Clone, Debug)]
-pub(super) struct Joint {
+pub(super) struct ExportedJoint {
     pub(super) name: String,
     /// Position of its coordinate.
     pub(super) coordinate: usize,
@@ -46,28 +46,28 @@ pub(super) struct Joint {
 
 /// Frames that move as one.
 #[derive(Clone, Debug)]
-pub(super) struct Link {
+pub(super) struct ExportedLink {
     pub(super) name: String,
     /// The base is its own.
     pub(super) parent: usize,
     /// From the parent outwards; none if it hangs on nothing.
-    pub(super) joints: Vec<Joint>,
-    pub(super) placed: Placed,
+    pub(super) joints: Vec<ExportedJoint>,
+    pub(super) placed: LinkPlacement,
 }
 
 /// A mechanism as links, the base first and parents before their children.
 #[derive(Clone, Debug)]
-pub(super) struct Tree {
-    pub(super) links: Vec<Link>,
+pub(super) struct LinkTree {
+    pub(super) links: Vec<ExportedLink>,
     /// Of each frame.
     pub(super) link_of: Vec<usize>,
     /// Of each frame.
-    pub(super) frames: Vec<Placed>,
+    pub(super) frames: Vec<LinkPlacement>,
     /// Couplings that formats have.
-    pub(super) followed: Vec<Followed>,
+    pub(super) followed: Vec<FollowedCoordinate>,
 }
 
-impl Tree {
+impl LinkTree {
     /// The link of a point, and where it is on it, m.
     pub(super) fn point(&self, mechanism: &Mechanism, point: PointIdx) -> (usize, Vector3<f64>) {
         let point = &mechanism.points[point.0];
@@ -75,30 +75,30 @@ impl Tree {
         let frame = &self.frames[point.frame.0];
         let link = self.link_of[point.frame.0];
         let in_base = frame.origin + frame.rotation * at;
-        (link, self.links[link].placed.sees_point(&in_base))
+        (link, self.links[link].placed.relative_point(&in_base))
     }
 }
 
 /// Links and joints, drawn at given coordinates.
-pub(super) fn tree(mechanism: &Mechanism, at: &[f64]) -> Result<Tree, ExportError> {
+pub(super) fn link_tree(mechanism: &Mechanism, at: &[f64]) -> Result<LinkTree, ExportError> {
     let mut at = at.to_vec();
     for (value, coordinate) in at.iter_mut().zip(&mechanism.coordinates) {
         // A body that hangs on nothing stands upright at its zero.
-        if coordinate.motion == modelmill_spec::Motion::QuaternionScalar {
+        if coordinate.motion == modelmill_spec::CoordinateMotion::QuaternionScalar {
             *value = 1.0;
         } else if coordinate.motion.is_quaternion() {
             *value = 0.0;
         }
     }
     let poses = Kinematics::new(mechanism).poses(&at);
-    let frames: Vec<Placed> = (poses.frames().iter())
-        .map(|pose| Placed {
+    let frames: Vec<LinkPlacement> = (poses.frames().iter())
+        .map(|pose| LinkPlacement {
             rotation: Matrix3::from_fn(|i, j| pose.rotation[i][j]),
             origin: Vector3::from(pose.origin),
         })
         .collect();
-    let owners = owners(mechanism, &poses)?;
-    let mut links = vec![Link {
+    let owners = coordinate_owners(mechanism, &poses)?;
+    let mut links = vec![ExportedLink {
         name: mechanism.frames[0].name.clone(),
         parent: 0,
         joints: Vec::new(),
@@ -108,17 +108,17 @@ pub(super) fn tree(mechanism: &Mechanism, at: &[f64]) -> Result<Tree, ExportErro
     for (f, pose) in poses.frames().iter().enumerate().skip(1) {
         let frame = &mechanism.frames[f];
         let parent = link_of[frame.parent.0];
-        let is_free = frame.steps.iter().any(|step| matches!(step, Step::Free(_)));
-        if pose.moved.is_empty() && !is_free {
+        let is_free = frame.steps.iter().any(|step| matches!(step, FrameStep::Free(_)));
+        if pose.joint_axes.is_empty() && !is_free {
             link_of.push(parent);
             continue;
         }
-        let joint = |(k, moved): (usize, &modelmill_spec::Moved)| {
+        let joint = |(k, moved): (usize, &modelmill_spec::CoordinateAxis)| {
             let is_owner = owners[moved.coordinate] == Some((f, k));
             let coordinate = &mechanism.coordinates[moved.coordinate].name;
             // The owner turns about an axis that makes its value the coordinate's.
             let sign = if is_owner { moved.factor.signum() } else { 1.0 };
-            Joint {
+            ExportedJoint {
                 name: if is_owner {
                     coordinate.clone()
                 } else {
@@ -131,20 +131,20 @@ pub(super) fn tree(mechanism: &Mechanism, at: &[f64]) -> Result<Tree, ExportErro
                 origin: Vector3::from(moved.origin),
             }
         };
-        let joints: Vec<Joint> = pose.moved.iter().enumerate().map(joint).collect();
+        let joints: Vec<ExportedJoint> = pose.joint_axes.iter().enumerate().map(joint).collect();
         let origin = joints.last().map_or(frames[f].origin, |last| last.origin);
         link_of.push(links.len());
-        links.push(Link {
+        links.push(ExportedLink {
             name: frame.name.clone(),
             parent,
             joints,
-            placed: Placed {
+            placed: LinkPlacement {
                 rotation: frames[f].rotation,
                 origin,
             },
         });
     }
-    Ok(Tree {
+    Ok(LinkTree {
         links,
         link_of,
         frames,
@@ -154,14 +154,14 @@ pub(super) fn tree(mechanism: &Mechanism, at: &[f64]) -> Result<Tree, ExportErro
 
 /// Which joint has each coordinate's name: the first that moves by just as much, by frame and place among its joints; none for
 /// those of bodies that hang on nothing.
-fn owners(
+fn coordinate_owners(
     mechanism: &Mechanism,
-    poses: &modelmill_spec::Poses,
+    poses: &modelmill_spec::MechanismPoses,
 ) -> Result<Vec<Option<(usize, usize)>>, ExportError> {
     let mut owners = vec![None; mechanism.coordinates.len()];
     let mut moves = vec![false; mechanism.coordinates.len()];
     for (f, pose) in poses.frames().iter().enumerate() {
-        for (k, moved) in pose.moved.iter().enumerate() {
+        for (k, moved) in pose.joint_axes.iter().enumerate() {
             moves[moved.coordinate] = true;
             if (moved.factor.abs() - 1.0).abs() < f64::EPSILON {
                 owners[moved.coordinate].get_or_insert((f, k));

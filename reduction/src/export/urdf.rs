@@ -5,36 +5,36 @@ use std::fmt::Write as _;
 use modelmill_spec::{DriveKind, Mechanism};
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
-use super::friction::{Friction, Passive};
-use super::inertia::Body;
-use super::tree::{Joint, Link, Placed, Tree};
-use super::{Followed, list, number};
+use super::friction::{PassiveEffects, PassiveProperties};
+use super::inertia::LinkInertia;
+use super::tree::{ExportedJoint, ExportedLink, LinkPlacement, LinkTree};
+use super::{FollowedCoordinate, number_list, number_text};
 
 /// How far a joint may go that has no limits, m.
-const FAR: f64 = 1000.0;
+const UNLIMITED_RANGE: f64 = 1000.0;
 
 pub(super) fn write(
     mechanism: &Mechanism,
-    tree: &Tree,
-    bodies: &[Body],
-    friction: &Friction,
+    tree: &LinkTree,
+    bodies: &[LinkInertia],
+    friction: &PassiveEffects,
     remarks: &mut Vec<String>,
 ) -> String {
-    tell(mechanism, remarks);
+    report_unsupported(mechanism, remarks);
     let mut text = format!(
         "<?xml version=\"1.0\"?>\n<robot name=\"{}\">\n",
         mechanism.name
     );
-    text += &link(&tree.links[0].name, None);
+    text += &link_element(&tree.links[0].name, None);
     for (one, body) in tree.links.iter().zip(bodies).skip(1) {
-        text += &branch(mechanism, tree, one, body, friction);
+        text += &link_with_joints(mechanism, tree, one, body, friction);
     }
     text += "</robot>\n";
     text
 }
 
 /// What URDF has no words for.
-fn tell(mechanism: &Mechanism, remarks: &mut Vec<String>) {
+fn report_unsupported(mechanism: &Mechanism, remarks: &mut Vec<String>) {
     if !mechanism.loops.is_empty() {
         let names: Vec<&str> = mechanism
             .loops
@@ -62,18 +62,18 @@ fn tell(mechanism: &Mechanism, remarks: &mut Vec<String>) {
         std::array::from_fn(|k| mechanism.gravity[k].evaluate(&|s| mechanism.symbol_nominal(s)));
     remarks.push(format!(
         "URDF does not say gravity: it is {} m/s^2 along x, y and z of `{}`",
-        list(&gravity),
+        number_list(&gravity),
         mechanism.frames[0].name
     ));
 }
 
 /// A link with the joints that lead to it; between several of them stand links without mass.
-fn branch(
+fn link_with_joints(
     mechanism: &Mechanism,
-    tree: &Tree,
-    one: &Link,
-    body: &Body,
-    friction: &Friction,
+    tree: &LinkTree,
+    one: &ExportedLink,
+    body: &LinkInertia,
+    friction: &PassiveEffects,
 ) -> String {
     let mut text = String::new();
     let mut parent = (
@@ -81,7 +81,7 @@ fn branch(
         tree.links[one.parent].placed,
     );
     if one.joints.is_empty() {
-        let origin = origin(&parent.1.sees(&one.placed));
+        let origin = origin_element(&parent.1.relative_placement(&one.placed));
         let _ = writeln!(
             text,
             "  <joint name=\"{0}_floating\" type=\"floating\">\n    {origin}\n    <parent link=\"{1}\"/>\n    <child link=\"{0}\"/>\n  \
@@ -94,15 +94,15 @@ fn branch(
         let (name, placed) = if is_last {
             (one.name.clone(), one.placed)
         } else {
-            let placed = Placed {
+            let placed = LinkPlacement {
                 rotation: one.placed.rotation,
                 origin: moving.origin,
             };
             let name = format!("{}_{}", one.name, k + 1);
-            text += &link(&name, None);
+            text += &link_element(&name, None);
             (name, placed)
         };
-        text += &joint(
+        text += &joint_element(
             mechanism,
             moving,
             &parent,
@@ -111,15 +111,15 @@ fn branch(
         );
         parent = (name, placed);
     }
-    text + &link(&one.name, Some(body))
+    text + &link_element(&one.name, Some(body))
 }
 
-fn joint(
+fn joint_element(
     mechanism: &Mechanism,
-    moving: &Joint,
-    (parent, from): &(String, Placed),
-    (child, to): &(String, Placed),
-    (friction, followed): (&Friction, &[Followed]),
+    moving: &ExportedJoint,
+    (parent, from): &(String, LinkPlacement),
+    (child, to): &(String, LinkPlacement),
+    (friction, followed): (&PassiveEffects, &[FollowedCoordinate]),
 ) -> String {
     let coordinate = &mechanism.coordinates[moving.coordinate].name;
     let limits = mechanism.limits.coordinates.iter();
@@ -141,26 +141,26 @@ fn joint(
         "  <joint name=\"{}\" type=\"{kind}\">\n    {}\n    <parent link=\"{parent}\"/>\n    <child link=\"{child}\"/>\n    <axis \
          xyz=\"{}\"/>\n",
         moving.name,
-        origin(&from.sees(to)),
-        list(clean(axis).as_slice()),
+        origin_element(&from.relative_placement(to)),
+        number_list(clean(axis).as_slice()),
     );
     let scaled = |range: [f64; 2]| {
         let [a, b] = range.map(|x| x * moving.ratio);
         [a.min(b), a.max(b)]
     };
     if kind != "continuous" || rate.is_some() || effort.is_some() {
-        let [low, high] = scaled(range.unwrap_or([-FAR, FAR]));
+        let [low, high] = scaled(range.unwrap_or([-UNLIMITED_RANGE, UNLIMITED_RANGE]));
         let bounds = if kind == "continuous" {
             String::new()
         } else {
-            format!("lower=\"{}\" upper=\"{}\" ", number(low), number(high))
+            format!("lower=\"{}\" upper=\"{}\" ", number_text(low), number_text(high))
         };
-        let most = |range: Option<[f64; 2]>| range.map_or(FAR, |r| r[0].abs().max(r[1].abs()));
+        let most = |range: Option<[f64; 2]>| range.map_or(UNLIMITED_RANGE, |r| r[0].abs().max(r[1].abs()));
         let _ = writeln!(
             text,
             "    <limit {bounds}effort=\"{}\" velocity=\"{}\"/>",
-            number(effort.unwrap_or(FAR)),
-            number(most(rate.map(scaled)))
+            number_text(effort.unwrap_or(UNLIMITED_RANGE)),
+            number_text(most(rate.map(scaled)))
         );
     }
     let own = friction.joints[moving.coordinate];
@@ -168,54 +168,54 @@ fn joint(
         let _ = writeln!(
             text,
             "    <mimic joint=\"{coordinate}\" multiplier=\"{}\" offset=\"0\"/>",
-            number(moving.ratio)
+            number_text(moving.ratio)
         );
     } else if let Some(one) = followed.iter().find(|f| f.coordinate == moving.coordinate) {
         let _ = writeln!(
             text,
             "    <mimic joint=\"{}\" multiplier=\"{}\" offset=\"{}\"/>",
-            mechanism.coordinates[one.of].name,
-            number(one.factor),
-            number(one.offset)
+            mechanism.coordinates[one.leader].name,
+            number_text(one.factor),
+            number_text(one.offset)
         );
     }
-    if moving.name == *coordinate && own != Passive::default() {
+    if moving.name == *coordinate && own != PassiveProperties::default() {
         let _ = writeln!(
             text,
             "    <dynamics damping=\"{}\" friction=\"{}\"/>",
-            number(own.damping),
-            number(own.friction)
+            number_text(own.damping),
+            number_text(own.friction)
         );
     }
     text + "  </joint>\n"
 }
 
-fn link(name: &str, body: Option<&Body>) -> String {
-    let Some(body) = body.filter(|body| !body.is_none()) else {
+fn link_element(name: &str, body: Option<&LinkInertia>) -> String {
+    let Some(body) = body.filter(|body| !body.is_zero()) else {
         return format!("  <link name=\"{name}\"/>\n");
     };
-    let i = body.central();
+    let i = body.central_inertia();
     format!(
         "  <link name=\"{name}\">\n    <inertial>\n      <origin xyz=\"{}\" rpy=\"0 0 0\"/>\n      <mass value=\"{}\"/>\n      \
          <inertia ixx=\"{}\" ixy=\"{}\" ixz=\"{}\" iyy=\"{}\" iyz=\"{}\" izz=\"{}\"/>\n    </inertial>\n  </link>\n",
-        list(body.centre().as_slice()),
-        number(body.mass),
-        number(i[(0, 0)]),
-        number(i[(0, 1)]),
-        number(i[(0, 2)]),
-        number(i[(1, 1)]),
-        number(i[(1, 2)]),
-        number(i[(2, 2)]),
+        number_list(body.centre_of_mass().as_slice()),
+        number_text(body.mass),
+        number_text(i[(0, 0)]),
+        number_text(i[(0, 1)]),
+        number_text(i[(0, 2)]),
+        number_text(i[(1, 1)]),
+        number_text(i[(1, 2)]),
+        number_text(i[(2, 2)]),
     )
 }
 
 /// Fixed axes x, y, z: roll, pitch and yaw.
-fn origin(placed: &Placed) -> String {
+fn origin_element(placed: &LinkPlacement) -> String {
     let (roll, pitch, yaw) = Rotation3::from_matrix_unchecked(placed.rotation).euler_angles();
     format!(
         "<origin xyz=\"{}\" rpy=\"{}\"/>",
-        list(clean(placed.origin).as_slice()),
-        list(&[roll, pitch, yaw])
+        number_list(clean(placed.origin).as_slice()),
+        number_list(&[roll, pitch, yaw])
     )
 }
 

@@ -2,11 +2,11 @@
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
-use super::placed::{Placed, about};
+use super::placed::{DescriptionPose, rotation_about};
 
 /// One elementary motion of a frame: `ratio*variable + offset` about or along an axis of the frame.
 #[derive(Clone, Copy)]
-pub(crate) struct Move {
+pub(crate) struct ChainMotion {
     pub(crate) is_turn: bool,
     /// Of unit length, in the axes reached so far.
     pub(crate) axis: Vector3<f64>,
@@ -16,72 +16,72 @@ pub(crate) struct Move {
 }
 
 /// A frame: a place in its parent, then its motions.
-pub(crate) struct Node {
+pub(crate) struct ChainFrame {
     /// None is the base.
     pub(crate) on: Option<usize>,
-    pub(crate) at: Placed,
-    pub(crate) moves: Vec<Move>,
+    pub(crate) at: DescriptionPose,
+    pub(crate) moves: Vec<ChainMotion>,
 }
 
 /// Two points that coincide, each of a frame.
 #[derive(Clone, Copy)]
-pub(crate) struct Pair {
+pub(crate) struct CoincidentPair {
     pub(crate) ends: [(Option<usize>, Vector3<f64>); 2],
     /// Index of the closure.
     pub(crate) closure: usize,
 }
 
 /// A frame at a pose: where it is, and its motions' axes and origins in the base.
-struct Posed {
-    at: Placed,
+struct PosedFrame {
+    at: DescriptionPose,
     moves: Vec<(Vector3<f64>, Vector3<f64>)>,
 }
 
-pub(crate) struct Chain {
+pub(crate) struct FrameChain {
     /// Parents stand before their children.
-    pub(crate) nodes: Vec<Node>,
+    pub(crate) nodes: Vec<ChainFrame>,
     pub(crate) n_variables: usize,
 }
 
-impl Chain {
-    fn pose(&self, values: &[f64]) -> Vec<Posed> {
-        let mut out: Vec<Posed> = Vec::with_capacity(self.nodes.len());
+impl FrameChain {
+    fn pose(&self, values: &[f64]) -> Vec<PosedFrame> {
+        let mut out: Vec<PosedFrame> = Vec::with_capacity(self.nodes.len());
         for node in &self.nodes {
             let mut at = node
                 .on
-                .map_or(Placed::identity(), |on| out[on].at)
-                .then(&node.at);
+                .map_or(DescriptionPose::identity(), |on| out[on].at)
+                .compose(&node.at);
             let mut moves = Vec::new();
             for motion in &node.moves {
                 let value =
                     motion.variable.map_or(0.0, |v| motion.ratio * values[v]) + motion.offset;
                 moves.push((at.r * motion.axis, at.p));
-                at = at.then(&if motion.is_turn {
-                    Placed {
+                at = at.compose(&if motion.is_turn {
+                    DescriptionPose {
                         p: Vector3::zeros(),
-                        r: about(&motion.axis, value),
+                        r: rotation_about(&motion.axis, value),
                     }
                 } else {
-                    Placed {
+                    DescriptionPose {
                         p: motion.axis * value,
                         r: Matrix3::identity(),
                     }
                 });
             }
-            out.push(Posed { at, moves });
+            out.push(PosedFrame { at, moves });
         }
         out
     }
 
     /// Gaps of all pairs, their derivatives by the variables, and the size of the mechanism.
-    pub(crate) fn gaps(&self, pairs: &[Pair], values: &[f64]) -> (DVector<f64>, DMatrix<f64>, f64) {
+    pub(crate) fn gaps(&self, pairs: &[CoincidentPair], values: &[f64]) -> (DVector<f64>, DMatrix<f64>, f64) {
         let posed = self.pose(values);
         let mut gaps = DVector::zeros(3 * pairs.len());
         let mut rows = DMatrix::zeros(3 * pairs.len(), self.n_variables);
         let mut size = 1e-3_f64;
         for (k, pair) in pairs.iter().enumerate() {
             for ((frame, local), sign) in pair.ends.iter().zip([1.0, -1.0]) {
-                let place = frame.map_or(Placed::identity(), |frame| posed[frame].at);
+                let place = frame.map_or(DescriptionPose::identity(), |frame| posed[frame].at);
                 let point = place.p + place.r * local;
                 size = size.max(point.amax());
                 let mut block = gaps.fixed_rows_mut::<3>(3 * k);
@@ -109,19 +109,19 @@ impl Chain {
     }
 
     /// Moves the second point of each pair to where the first one is.
-    pub(crate) fn meet(&self, pairs: &mut [Pair], values: &[f64]) {
+    pub(crate) fn align_pairs(&self, pairs: &mut [CoincidentPair], values: &[f64]) {
         let posed = self.pose(values);
         for pair in pairs {
             let [place, other] = pair
                 .ends
-                .map(|(frame, _)| frame.map_or(Placed::identity(), |frame| posed[frame].at));
+                .map(|(frame, _)| frame.map_or(DescriptionPose::identity(), |frame| posed[frame].at));
             let first = place.p + place.r * pair.ends[0].1;
             pair.ends[1].1 = other.r.transpose() * (first - other.p);
         }
     }
 
     /// Moves the variables until the pairs coincide as well as they can; the largest gap that is left, of the size.
-    pub(crate) fn close(&self, pairs: &[Pair], values: &mut [f64]) -> f64 {
+    pub(crate) fn close_pairs(&self, pairs: &[CoincidentPair], values: &mut [f64]) -> f64 {
         /// Steps are no longer than this, rad or m.
         const LONGEST_STEP: f64 = 0.2;
         let mut left = f64::INFINITY;

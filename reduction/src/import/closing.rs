@@ -2,32 +2,32 @@
 
 use nalgebra::DMatrix;
 
-use super::chain::{Chain, Pair, rank};
+use super::chain::{FrameChain, CoincidentPair, rank};
 
 /// Gaps, relative to the size, up to which loops close.
 const CLOSED: f64 = 1e-11;
 /// Gaps up to which they close by the digits of the description.
-const NEARLY: f64 = 1e-6;
+const NEARLY_CLOSED: f64 = 1e-6;
 /// Singular values below this share of the largest say nothing.
-const NOTHING: f64 = 1e-7;
+const ZERO_SHARE: f64 = 1e-7;
 /// Where loops stay open, equations that follow from others have singular values up to so many times the gap, relative to
 /// the size.
-const OF_GAPS: f64 = 100.0;
+const GAP_FACTOR: f64 = 100.0;
 /// A pose whose passive variables are settled worse than this is no pose to start from.
-const WELL_SETTLED: f64 = 1e-3;
+const WELL_CONDITIONED: f64 = 1e-3;
 
 /// Variables that are settled no better than this are worth another choice of independent ones.
-const POORLY_SETTLED: f64 = 1e-2;
+const POORLY_CONDITIONED: f64 = 1e-2;
 
 /// A value this little beyond its range is on its edge, rad or m.
-pub(crate) const INSIDE: f64 = 1e-9;
+pub(crate) const RANGE_TOLERANCE: f64 = 1e-9;
 /// Poses that are tried.
 const ATTEMPTS: usize = 200;
 
 /// How loops close.
-pub(crate) struct Closed {
+pub(crate) struct LoopSolution {
     /// The pairs that say something.
-    pub(crate) pairs: Vec<Pair>,
+    pub(crate) pairs: Vec<CoincidentPair>,
     /// Which variables follow from the loops.
     pub(crate) passive: Vec<bool>,
     /// Values at a pose at which the loops close.
@@ -42,14 +42,14 @@ pub(crate) struct Closed {
 
 /// Closes loops from `start`. Variables of which `reluctance` is low should stay independent.
 /// A pose within `ranges` is preferred.
-pub(crate) fn close(
-    chain: &Chain,
-    pairs: &[Pair],
+pub(crate) fn close_loops(
+    chain: &FrameChain,
+    pairs: &[CoincidentPair],
     start: &[f64],
     ranges: &[Option<[f64; 2]>],
     reluctance: &[u8],
-) -> Result<Closed, String> {
-    let mut noise = Noise(1);
+) -> Result<LoopSolution, String> {
+    let mut noise = PoseNoise(1);
     let (mut poses, mut outside): (Vec<Vec<f64>>, Vec<Vec<f64>>) = (Vec::new(), Vec::new());
     let mut least = f64::INFINITY;
     // The pose of the description first, then poses around it and farther away.
@@ -74,11 +74,11 @@ pub(crate) fn close(
                 }
             })
             .collect();
-        let gap = chain.close(pairs, &mut values);
+        let gap = chain.close_pairs(pairs, &mut values);
         least = least.min(gap);
-        if gap < NEARLY {
+        if gap < NEARLY_CLOSED {
             let is_inside = values.iter().zip(ranges).all(|(x, range)| {
-                range.is_none_or(|[low, high]| (low - INSIDE..=high + INSIDE).contains(x))
+                range.is_none_or(|[low, high]| (low - RANGE_TOLERANCE..=high + RANGE_TOLERANCE).contains(x))
             });
             if is_inside {
                 poses.push(values);
@@ -102,26 +102,26 @@ pub(crate) fn close(
     // The rank at poses in general.
     let ranks: Vec<usize> = poses
         .iter()
-        .map(|values| independent(chain, pairs, values).0)
+        .map(|values| independent_conditions(chain, pairs, values).0)
         .collect();
     let wanted = ranks.iter().copied().max().unwrap_or(0);
     let general = (0..poses.len())
         .filter(|k| ranks[*k] == wanted)
         .max_by(|a, b| {
-            let share = |k: usize| independent(chain, pairs, &poses[k]).1;
+            let share = |k: usize| independent_conditions(chain, pairs, &poses[k]).1;
             share(*a).total_cmp(&share(*b))
         })
         .unwrap_or(0);
-    let pairs = telling(chain, pairs, &poses[general]);
+    let pairs = independent_pairs(chain, pairs, &poses[general]);
     let (_, rows, _) = chain.gaps(&pairs, &poses[general]);
-    let by_itself = (0..pairs.len()).map(|k| rank(&rows.rows(3 * k, 3).into_owned(), NOTHING).0);
-    let passive = follow(&rows, reluctance, wanted);
+    let by_itself = (0..pairs.len()).map(|k| rank(&rows.rows(3 * k, 3).into_owned(), ZERO_SHARE).0);
+    let passive = choose_passive(&rows, reluctance, wanted);
     let settled = |values: &[f64]| {
         let (_, rows, _) = chain.gaps(&pairs, values);
-        share(&rows, &passive)
+        passive_conditioning(&rows, &passive)
     };
     let mut best = 0;
-    if wanted > 0 && settled(&poses[0]) < WELL_SETTLED {
+    if wanted > 0 && settled(&poses[0]) < WELL_CONDITIONED {
         for k in 1..poses.len() {
             if settled(&poses[k]) > 3.0 * settled(&poses[best]) {
                 best = k;
@@ -129,12 +129,12 @@ pub(crate) fn close(
         }
     }
     let mut values = poses.swap_remove(best);
-    let gap = chain.close(&pairs, &mut values);
+    let gap = chain.close_pairs(&pairs, &mut values);
     let mut pairs = pairs;
     if gap > CLOSED {
-        chain.meet(&mut pairs, &values);
+        chain.align_pairs(&mut pairs, &values);
     }
-    Ok(Closed {
+    Ok(LoopSolution {
         pairs,
         passive,
         values,
@@ -145,18 +145,18 @@ pub(crate) fn close(
 }
 
 /// How many conditions of the pairs are independent, and the least of their singular values as a share of the largest.
-fn independent(chain: &Chain, pairs: &[Pair], values: &[f64]) -> (usize, f64) {
+fn independent_conditions(chain: &FrameChain, pairs: &[CoincidentPair], values: &[f64]) -> (usize, f64) {
     let (gaps, rows, size) = chain.gaps(pairs, values);
-    rank(&rows, NOTHING.max(OF_GAPS * gaps.amax() / size))
+    rank(&rows, ZERO_SHARE.max(GAP_FACTOR * gaps.amax() / size))
 }
 
 /// The pairs that say something that those before do not.
-fn telling(chain: &Chain, pairs: &[Pair], values: &[f64]) -> Vec<Pair> {
-    let mut kept: Vec<Pair> = Vec::new();
+fn independent_pairs(chain: &FrameChain, pairs: &[CoincidentPair], values: &[f64]) -> Vec<CoincidentPair> {
+    let mut kept: Vec<CoincidentPair> = Vec::new();
     let mut n = 0;
     for pair in pairs {
         kept.push(*pair);
-        let (now, _) = independent(chain, &kept, values);
+        let (now, _) = independent_conditions(chain, &kept, values);
         if now == n {
             kept.pop();
         }
@@ -166,33 +166,33 @@ fn telling(chain: &Chain, pairs: &[Pair], values: &[f64]) -> Vec<Pair> {
 }
 
 /// Which variables follow: as many as the rank, those first that need not stay independent, from the end of the description.
-fn follow(rows: &DMatrix<f64>, reluctance: &[u8], wanted: usize) -> Vec<bool> {
+fn choose_passive(rows: &DMatrix<f64>, reluctance: &[u8], wanted: usize) -> Vec<bool> {
     let mut order: Vec<usize> = (0..rows.ncols()).rev().collect();
     order.sort_by_key(|k| std::cmp::Reverse(reluctance[*k]));
     let mut passive = Vec::new();
     for least in [1e-2, 1e-4, 1e-6] {
         let n;
-        (passive, n) = chosen(rows, &order, wanted, least);
+        (passive, n) = select_columns(rows, &order, wanted, least);
         if n == wanted {
             break;
         }
     }
-    exchanged(rows, reluctance, passive)
+    exchange_passive(rows, reluctance, passive)
 }
 
 /// Exchanges variables that may be exchanged as long as the passive ones are settled badly and that settles them much better.
-fn exchanged(rows: &DMatrix<f64>, reluctance: &[u8], mut passive: Vec<bool>) -> Vec<bool> {
+fn exchange_passive(rows: &DMatrix<f64>, reluctance: &[u8], mut passive: Vec<bool>) -> Vec<bool> {
     /// An exchange that gains less is not worth another order than that of the description.
     const MUCH: f64 = 3.0;
     let n = passive.len();
-    let mut now = share(rows, &passive);
-    while now < POORLY_SETTLED {
+    let mut now = passive_conditioning(rows, &passive);
+    while now < POORLY_CONDITIONED {
         let mut best = (MUCH * now, None);
         for out in (0..n).filter(|k| passive[*k]) {
             for into in (0..n).filter(|k| !passive[*k] && reluctance[*k] == reluctance[out]) {
                 let mut tried = passive.clone();
                 (tried[out], tried[into]) = (false, true);
-                let then = share(rows, &tried);
+                let then = passive_conditioning(rows, &tried);
                 if then > best.0 {
                     best = (then, Some(tried));
                 }
@@ -205,19 +205,19 @@ fn exchanged(rows: &DMatrix<f64>, reluctance: &[u8], mut passive: Vec<bool>) -> 
 }
 
 /// The least singular value of the rows by the passive variables, as a share of the largest; zero where these do not follow.
-fn share(rows: &DMatrix<f64>, passive: &[bool]) -> f64 {
+fn passive_conditioning(rows: &DMatrix<f64>, passive: &[bool]) -> f64 {
     let columns: Vec<_> = (0..passive.len())
         .filter(|k| passive[*k])
         .map(|k| rows.column(k).into_owned())
         .collect();
-    match rank(&DMatrix::from_columns(&columns), NOTHING) {
+    match rank(&DMatrix::from_columns(&columns), ZERO_SHARE) {
         (n, share) if n == columns.len() => share,
         _ => 0.0,
     }
 }
 
 /// Columns in their order of which, beside those taken before, no less than a share is left; and how many.
-fn chosen(rows: &DMatrix<f64>, order: &[usize], wanted: usize, least: f64) -> (Vec<bool>, usize) {
+fn select_columns(rows: &DMatrix<f64>, order: &[usize], wanted: usize, least: f64) -> (Vec<bool>, usize) {
     let mut passive = vec![false; rows.ncols()];
     // Each made orthogonal to those chosen.
     let scale = rows.amax().max(f64::MIN_POSITIVE);
@@ -241,9 +241,9 @@ fn chosen(rows: &DMatrix<f64>, order: &[usize], wanted: usize, least: f64) -> (V
 }
 
 /// Numbers between -1 and 1 in an order without meaning, the same on every machine.
-struct Noise(u64);
+struct PoseNoise(u64);
 
-impl Noise {
+impl PoseNoise {
     fn next(&mut self) -> f64 {
         self.0 = self
             .0

@@ -5,19 +5,19 @@
 
 /// What the file says.
 #[derive(Debug, Default)]
-pub(crate) struct Closures {
-    pub(crate) pairs: Vec<Pair>,
+pub(crate) struct ClosureFile {
+    pub(crate) pairs: Vec<CoincidentFrames>,
     /// Joints that are driven; all where there are none.
     pub(crate) drives: Vec<String>,
     /// Joints with what they are, whatever the URDF has in their place: it knows neither balls nor crosses.
-    pub(crate) joints: Vec<(String, Becomes)>,
+    pub(crate) joints: Vec<(String, JointReplacement)>,
     /// What is not read; one sentence each.
     pub(crate) remarks: Vec<String>,
 }
 
 /// What a joint of the URDF is in truth.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Becomes {
+pub(crate) enum JointReplacement {
     Ball,
     Fixed,
     /// Two hinges, about axes of its frame one after the other.
@@ -26,7 +26,7 @@ pub(crate) enum Becomes {
 
 /// Two frames that coincide.
 #[derive(Debug)]
-pub(crate) struct Pair {
+pub(crate) struct CoincidentFrames {
     pub(crate) ends: [String; 2],
     /// In orientation too.
     pub(crate) is_full: bool,
@@ -34,7 +34,7 @@ pub(crate) struct Pair {
 }
 
 /// Keys that are read.
-const READ: [&str; 5] = [
+const KNOWN_KEYS: [&str; 5] = [
     "closed_loop",
     "type",
     "name_mot",
@@ -43,7 +43,7 @@ const READ: [&str; 5] = [
 ];
 
 /// Reads the file, or says what is wrong.
-pub(crate) fn read(text: &str) -> Result<Closures, String> {
+pub(crate) fn read(text: &str) -> Result<ClosureFile, String> {
     let mut entries: Vec<(u32, &str, String)> = Vec::new();
     for (line, text) in (1..).zip(text.lines()) {
         let text = text.split(" #").next().unwrap_or_default();
@@ -64,7 +64,7 @@ pub(crate) fn read(text: &str) -> Result<Closures, String> {
     }
     let list = |key: &str| -> (u32, Vec<String>) {
         let entry = entries.iter().find(|(_, name, _)| *name == key);
-        entry.map_or((0, Vec::new()), |(line, _, value)| (*line, words(value)))
+        entry.map_or((0, Vec::new()), |(line, _, value)| (*line, list_words(value)))
     };
     let (line, ends) = list("closed_loop");
     let (_, kinds) = list("type");
@@ -74,9 +74,9 @@ pub(crate) fn read(text: &str) -> Result<Closures, String> {
             "line {line} of the file of closures: expected pairs in `closed_loop`, each with its `type`"
         ));
     }
-    let mut out = Closures {
+    let mut out = ClosureFile {
         drives: list("name_mot").1,
-        ..Closures::default()
+        ..ClosureFile::default()
     };
     let (_, names) = list("joint_name");
     let (line_of_types, types) = list("joint_type");
@@ -87,11 +87,11 @@ pub(crate) fn read(text: &str) -> Result<Closures, String> {
     }
     for (name, kind) in names.into_iter().zip(types) {
         let becomes = match kind.to_uppercase().as_str() {
-            "SPHERICAL" => Becomes::Ball,
-            "FIXED" => Becomes::Fixed,
-            "UJOINT_XY" => Becomes::Cross(['x', 'y']),
-            "UJOINT_YZ" => Becomes::Cross(['y', 'z']),
-            "UJOINT_ZX" => Becomes::Cross(['z', 'x']),
+            "SPHERICAL" => JointReplacement::Ball,
+            "FIXED" => JointReplacement::Fixed,
+            "UJOINT_XY" => JointReplacement::Cross(['x', 'y']),
+            "UJOINT_YZ" => JointReplacement::Cross(['y', 'z']),
+            "UJOINT_ZX" => JointReplacement::Cross(['z', 'x']),
             _ => {
                 return Err(format!(
                     "line {line_of_types} of the file of closures: expected SPHERICAL, FIXED, UJOINT_XY, UJOINT_YZ or UJOINT_ZX \
@@ -102,7 +102,7 @@ pub(crate) fn read(text: &str) -> Result<Closures, String> {
         out.joints.push((name, becomes));
     }
     for (line, key, _) in &entries {
-        if !READ.contains(key) {
+        if !KNOWN_KEYS.contains(key) {
             out.remarks.push(format!(
                 "line {line} of the file of closures: `{key}` is not read"
             ));
@@ -118,7 +118,7 @@ pub(crate) fn read(text: &str) -> Result<Closures, String> {
                 ));
             }
         };
-        out.pairs.push(Pair {
+        out.pairs.push(CoincidentFrames {
             ends: ends.clone(),
             is_full,
             line,
@@ -128,7 +128,7 @@ pub(crate) fn read(text: &str) -> Result<Closures, String> {
 }
 
 /// All words of a list, nested or not.
-fn words(text: &str) -> Vec<String> {
+fn list_words(text: &str) -> Vec<String> {
     text.split([',', '[', ']', '\n'])
         .map(|word| {
             let word = word

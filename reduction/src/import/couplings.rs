@@ -2,8 +2,8 @@
 //!
 //! A joint whose angle is a whole multiple of another's shares its coordinate; any other one has a coordinate that follows.
 
-use super::description::{Description, Joint, Kind};
-use crate::write::float;
+use super::description::{RobotDescription, DescriptionJoint, DescriptionJointKind};
+use crate::write::toml_float;
 
 /// Integer multiples of a coordinate beyond this make expressions that nobody wants.
 const LARGEST_MULTIPLE: i64 = 60;
@@ -12,7 +12,7 @@ const SAME_RATIO: f64 = 1e-9;
 
 /// What becomes a coordinate.
 #[derive(Clone)]
-pub(crate) struct Variable {
+pub(crate) struct JointVariable {
     /// The joint that it is.
     pub(crate) joint: String,
     pub(crate) is_driven: bool,
@@ -20,7 +20,7 @@ pub(crate) struct Variable {
 
 /// A joint as its variable moves it.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Follows {
+pub(crate) struct JointFollower {
     /// None where it is held.
     pub(crate) variable: Option<usize>,
     pub(crate) ratio: f64,
@@ -32,13 +32,13 @@ pub(crate) struct Follows {
 }
 
 /// Joints that turn or slide, and what they follow, in the order of the description.
-pub(crate) struct Couplings {
-    pub(crate) variables: Vec<Variable>,
-    pub(crate) follows: Vec<(String, Follows)>,
+pub(crate) struct ImportCouplings {
+    pub(crate) variables: Vec<JointVariable>,
+    pub(crate) follows: Vec<(String, JointFollower)>,
 }
 
-impl Couplings {
-    pub(crate) fn of(&self, joint: &str) -> Option<Follows> {
+impl ImportCouplings {
+    pub(crate) fn find_follower(&self, joint: &str) -> Option<JointFollower> {
         let found = self.follows.iter().find(|(name, _)| name == joint);
         found.map(|(_, follows)| *follows)
     }
@@ -46,24 +46,24 @@ impl Couplings {
 
 /// `q = ratio*q[of] + offset`; none is held.
 #[derive(Clone, Copy)]
-struct Rule {
-    of: Option<usize>,
+struct CouplingRule {
+    leader: Option<usize>,
     ratio: f64,
     offset: f64,
     line: u32,
 }
 
 /// Resolves all couplings of a description.
-pub(crate) fn resolve(description: &mut Description) -> Result<Couplings, String> {
-    let joints: Vec<Joint> = description
+pub(crate) fn resolve(description: &mut RobotDescription) -> Result<ImportCouplings, String> {
+    let joints: Vec<DescriptionJoint> = description
         .links
         .iter()
         .flat_map(|link| &link.joints)
-        .filter(|joint| matches!(joint.kind, Kind::Turn | Kind::Slide))
+        .filter(|joint| matches!(joint.kind, DescriptionJointKind::Revolute | DescriptionJointKind::Prismatic))
         .cloned()
         .collect();
-    let mut rules = rules(description, &joints)?;
-    lead_by_driven(&joints, &mut rules);
+    let mut rules = coupling_rules(description, &joints)?;
+    prefer_driven_leaders(&joints, &mut rules);
     let mut variables = Vec::new();
     let mut variable_of: Vec<Option<usize>> = vec![None; joints.len()];
     for (leader, joint) in joints.iter().enumerate() {
@@ -72,10 +72,10 @@ pub(crate) fn resolve(description: &mut Description) -> Result<Couplings, String
         }
         let mut followers = joints.iter().zip(&rules);
         let leads_driven = followers.any(|(other, rule)| {
-            other.is_driven && rule.is_some_and(|rule| rule.of == Some(leader))
+            other.is_driven && rule.is_some_and(|rule| rule.leader == Some(leader))
         });
         variable_of[leader] = Some(variables.len());
-        variables.push(Variable {
+        variables.push(JointVariable {
             joint: joint.name.clone(),
             is_driven: joint.is_driven || leads_driven,
         });
@@ -83,7 +83,7 @@ pub(crate) fn resolve(description: &mut Description) -> Result<Couplings, String
     let mut follows = Vec::new();
     for (k, joint) in joints.iter().enumerate() {
         let found = match rules[k] {
-            None => Follows {
+            None => JointFollower {
                 variable: variable_of[k],
                 ratio: 1.0,
                 offset: 0.0,
@@ -91,21 +91,21 @@ pub(crate) fn resolve(description: &mut Description) -> Result<Couplings, String
                 changes_kind: false,
             },
             Some(rule) => {
-                let leader = rule.of.filter(|_| rule.ratio != 0.0);
+                let leader = rule.leader.filter(|_| rule.ratio != 0.0);
                 let ratio = fraction(rule.ratio).map_or(rule.ratio, |(p, q)| p as f64 / q as f64);
                 if leader.is_some() && (ratio - rule.ratio).abs() > 1e-14 {
                     description.remarks.push(format!(
                         "line {}: the ratio {} is taken for {}",
                         rule.line,
                         rule.ratio,
-                        shown(ratio)
+                        ratio_text(ratio)
                     ));
                 }
                 let shares = |of: usize| match (joint.kind, joints[of].kind) {
-                    (Kind::Turn, Kind::Turn) => fraction(ratio).is_some_and(|(_, q)| q == 1),
+                    (DescriptionJointKind::Revolute, DescriptionJointKind::Revolute) => fraction(ratio).is_some_and(|(_, q)| q == 1),
                     (one, other) => one == other,
                 };
-                Follows {
+                JointFollower {
                     variable: leader.and_then(|of| variable_of[of]),
                     ratio: leader.map_or(0.0, |_| ratio),
                     offset: rule.offset,
@@ -116,11 +116,11 @@ pub(crate) fn resolve(description: &mut Description) -> Result<Couplings, String
         };
         follows.push((joint.name.clone(), found));
     }
-    Ok(Couplings { variables, follows })
+    Ok(ImportCouplings { variables, follows })
 }
 
 /// Every joint by the joint that leads in the end.
-fn rules(description: &Description, joints: &[Joint]) -> Result<Vec<Option<Rule>>, String> {
+fn coupling_rules(description: &RobotDescription, joints: &[DescriptionJoint]) -> Result<Vec<Option<CouplingRule>>, String> {
     let index = |name: &str, line: u32| {
         joints
             .iter()
@@ -129,20 +129,20 @@ fn rules(description: &Description, joints: &[Joint]) -> Result<Vec<Option<Rule>
                 format!("line {line}: the coupling names `{name}`, which is no joint that turns or slides")
             })
     };
-    let mut rules: Vec<Option<Rule>> = vec![None; joints.len()];
+    let mut rules: Vec<Option<CouplingRule>> = vec![None; joints.len()];
     for coupling in &description.couplings {
         let line = coupling.line;
         let one = index(&coupling.joint, line)?;
         let of = coupling
-            .of
+            .leader
             .as_deref()
             .map(|of| index(of, line))
             .transpose()?;
         if of == Some(one) {
             return Err(format!("line {line}: `{}` follows itself", coupling.joint));
         }
-        let rule = Rule {
-            of,
+        let rule = CouplingRule {
+            leader: of,
             ratio: coupling.ratio,
             offset: coupling.offset,
             line,
@@ -150,8 +150,8 @@ fn rules(description: &Description, joints: &[Joint]) -> Result<Vec<Option<Rule>
         if rules[one].is_none() {
             rules[one] = Some(rule);
         } else if let Some(other) = of.filter(|of| rules[*of].is_none() && rule.ratio != 0.0) {
-            rules[other] = Some(Rule {
-                of: Some(one),
+            rules[other] = Some(CouplingRule {
+                leader: Some(one),
                 ratio: 1.0 / rule.ratio,
                 offset: -rule.offset / rule.ratio,
                 line,
@@ -166,7 +166,7 @@ fn rules(description: &Description, joints: &[Joint]) -> Result<Vec<Option<Rule>
     for k in 0..joints.len() {
         let mut steps = 0;
         while let Some(rule) = rules[k]
-            && let Some(of) = rule.of
+            && let Some(of) = rule.leader
             && let Some(next) = rules[of]
         {
             steps += 1;
@@ -176,8 +176,8 @@ fn rules(description: &Description, joints: &[Joint]) -> Result<Vec<Option<Rule>
                     rule.line, joints[k].name
                 ));
             }
-            rules[k] = Some(Rule {
-                of: next.of,
+            rules[k] = Some(CouplingRule {
+                leader: next.leader,
                 ratio: rule.ratio * next.ratio,
                 offset: rule.ratio * next.offset + rule.offset,
                 line: rule.line,
@@ -188,28 +188,28 @@ fn rules(description: &Description, joints: &[Joint]) -> Result<Vec<Option<Rule>
 }
 
 /// Lets a driven joint lead where the one that leads is not.
-fn lead_by_driven(joints: &[Joint], rules: &mut [Option<Rule>]) {
+fn prefer_driven_leaders(joints: &[DescriptionJoint], rules: &mut [Option<CouplingRule>]) {
     for old in 0..joints.len() {
         if rules[old].is_some() || joints[old].is_driven {
             continue;
         }
         let found = (0..joints.len()).find_map(|k| {
-            let rule = rules[k].filter(|rule| rule.of == Some(old) && rule.ratio != 0.0)?;
+            let rule = rules[k].filter(|rule| rule.leader == Some(old) && rule.ratio != 0.0)?;
             joints[k].is_driven.then_some((k, rule))
         });
         let Some((new, lead)) = found else { continue };
         for (k, slot) in rules.iter_mut().enumerate() {
             if let Some(rule) = slot
                 .as_mut()
-                .filter(|rule| rule.of == Some(old) && k != new)
+                .filter(|rule| rule.leader == Some(old) && k != new)
             {
                 rule.ratio /= lead.ratio;
                 rule.offset -= rule.ratio * lead.offset;
-                rule.of = Some(new);
+                rule.leader = Some(new);
             }
         }
-        rules[old] = Some(Rule {
-            of: Some(new),
+        rules[old] = Some(CouplingRule {
+            leader: Some(new),
             ratio: 1.0 / lead.ratio,
             offset: -lead.offset / lead.ratio,
             line: lead.line,
@@ -229,10 +229,10 @@ fn fraction(ratio: f64) -> Option<(i64, i64)> {
 }
 
 /// A ratio as a model file has it.
-pub(crate) fn shown(ratio: f64) -> String {
+pub(crate) fn ratio_text(ratio: f64) -> String {
     match fraction(ratio) {
         Some((p, 1)) => p.to_string(),
         Some((p, q)) => format!("{p}/{q}"),
-        None => float(ratio),
+        None => toml_float(ratio),
     }
 }

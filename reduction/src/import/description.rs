@@ -2,21 +2,21 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::placed::Placed;
+use super::placed::DescriptionPose;
 
 /// A robot description.
 #[derive(Default)]
-pub(crate) struct Description {
+pub(crate) struct RobotDescription {
     pub(crate) name: String,
     /// The format, for people.
     pub(crate) format: &'static str,
     /// Acceleration of gravity in world axes, m/s^2; none where the format does not say it.
     pub(crate) gravity: Option<Vector3<f64>>,
     /// Parents stand before their children.
-    pub(crate) links: Vec<Link>,
-    pub(crate) closures: Vec<Closure>,
-    pub(crate) couplings: Vec<Coupling>,
-    pub(crate) lines: Vec<StraightDrive>,
+    pub(crate) links: Vec<DescriptionLink>,
+    pub(crate) closures: Vec<DescriptionClosure>,
+    pub(crate) couplings: Vec<DescriptionCoupling>,
+    pub(crate) straight_drives: Vec<StraightDrive>,
     /// Values of joints from which loops are closed, by name of the joint.
     pub(crate) pose: Vec<(String, f64)>,
     /// What was left out or made up.
@@ -24,32 +24,32 @@ pub(crate) struct Description {
 }
 
 /// A link and how it moves on its parent.
-pub(crate) struct Link {
+pub(crate) struct DescriptionLink {
     pub(crate) name: String,
     /// None is the world.
     pub(crate) parent: Option<usize>,
     /// In the frame of the parent where every joint has its `zero`.
-    pub(crate) at: Placed,
+    pub(crate) at: DescriptionPose,
     /// One after the other; none where the link is fixed to its parent.
-    pub(crate) joints: Vec<Joint>,
-    pub(crate) inertial: Inertial,
+    pub(crate) joints: Vec<DescriptionJoint>,
+    pub(crate) inertial: DescriptionInertia,
 }
 
 /// What a link weighs; all zero where the description gives nothing.
 #[derive(Clone, Copy)]
-pub(crate) struct Inertial {
+pub(crate) struct DescriptionInertia {
     pub(crate) mass: f64,
     /// The centre of mass and the axes of `inertia` in the frame of the link.
-    pub(crate) at: Placed,
+    pub(crate) at: DescriptionPose,
     /// About the centre of mass, kg m^2.
     pub(crate) inertia: Matrix3<f64>,
 }
 
-impl Default for Inertial {
+impl Default for DescriptionInertia {
     fn default() -> Self {
         Self {
             mass: 0.0,
-            at: Placed::identity(),
+            at: DescriptionPose::identity(),
             inertia: Matrix3::zeros(),
         }
     }
@@ -57,20 +57,20 @@ impl Default for Inertial {
 
 /// How a joint moves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Kind {
-    Turn,
-    Slide,
+pub(crate) enum DescriptionJointKind {
+    Revolute,
+    Prismatic,
     Ball,
     Free,
 }
 
 /// A joint of a link.
 #[derive(Clone)]
-pub(crate) struct Joint {
+pub(crate) struct DescriptionJoint {
     pub(crate) name: String,
     /// Line in the description.
     pub(crate) line: u32,
-    pub(crate) kind: Kind,
+    pub(crate) kind: DescriptionJointKind,
     /// A point of the axis in the frame of the link.
     pub(crate) anchor: Vector3<f64>,
     /// Direction in the axes of the link; its length does not matter.
@@ -90,8 +90,8 @@ pub(crate) struct Joint {
     pub(crate) is_driven: bool,
 }
 
-impl Joint {
-    pub(crate) fn new(name: String, kind: Kind, line: u32) -> Self {
+impl DescriptionJoint {
+    pub(crate) fn new(name: String, kind: DescriptionJointKind, line: u32) -> Self {
         Self {
             name,
             line,
@@ -107,14 +107,14 @@ impl Joint {
             armature: 0.0,
             stiffness: 0.0,
             rest: 0.0,
-            is_driven: kind != Kind::Free,
+            is_driven: kind != DescriptionJointKind::Free,
         }
     }
 }
 
 /// What a closure holds together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Holds {
+pub(crate) enum ClosureConstraint {
     /// The origins of two frames.
     Origins,
     /// The origins and the x axes: a hinge about x.
@@ -124,20 +124,20 @@ pub(crate) enum Holds {
 }
 
 /// Two places of links that coincide.
-pub(crate) struct Closure {
+pub(crate) struct DescriptionClosure {
     pub(crate) name: String,
     pub(crate) line: u32,
     /// Link (none is the world) and a frame in it.
-    pub(crate) ends: [(Option<usize>, Placed); 2],
-    pub(crate) holds: Holds,
+    pub(crate) ends: [(Option<usize>, DescriptionPose); 2],
+    pub(crate) constraint: ClosureConstraint,
 }
 
 /// One joint follows another: `q = ratio*(q of the other) + offset`.
-pub(crate) struct Coupling {
+pub(crate) struct DescriptionCoupling {
     pub(crate) line: u32,
     pub(crate) joint: String,
     /// None holds the joint at `offset`.
-    pub(crate) of: Option<String>,
+    pub(crate) leader: Option<String>,
     pub(crate) ratio: f64,
     pub(crate) offset: f64,
 }

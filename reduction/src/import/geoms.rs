@@ -4,16 +4,16 @@ use std::f64::consts::PI;
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::description::Inertial;
-use super::placed::Placed;
+use super::description::DescriptionInertia;
+use super::placed::DescriptionPose;
 
 /// A shape: volume, and the moments of inertia for a mass of one.
-pub(crate) struct Shape {
+pub(crate) struct GeomShape {
     volume: f64,
     moments: [f64; 3],
 }
 
-impl Shape {
+impl GeomShape {
     /// A shape as MuJoCo names and sizes it; `half` is half the length where both ends are given. None has no mass (a plane).
     pub(crate) fn new(kind: &str, size: &[f64], half: Option<f64>) -> Result<Option<Self>, String> {
         let at = |k: usize| {
@@ -80,10 +80,10 @@ impl Shape {
     }
 
     /// The shape with a mass, or else a density.
-    pub(crate) fn inertial(&self, mass: Option<f64>, density: f64, at: Placed) -> Inertial {
+    pub(crate) fn inertial(&self, mass: Option<f64>, density: f64, at: DescriptionPose) -> DescriptionInertia {
         let mass = mass.unwrap_or(density * self.volume);
         let moments = Vector3::from(self.moments) * mass;
-        Inertial {
+        DescriptionInertia {
             mass,
             at,
             inertia: Matrix3::from_diagonal(&moments),
@@ -92,10 +92,10 @@ impl Shape {
 }
 
 /// Several bodies as one.
-pub(crate) fn together(parts: &[Inertial]) -> Inertial {
+pub(crate) fn combined_inertia(parts: &[DescriptionInertia]) -> DescriptionInertia {
     let mass: f64 = parts.iter().map(|part| part.mass).sum();
     if mass <= 0.0 {
-        return Inertial::default();
+        return DescriptionInertia::default();
     }
     let moment: Vector3<f64> = parts.iter().map(|part| part.mass * part.at.p).sum();
     let centre = moment / mass;
@@ -105,9 +105,9 @@ pub(crate) fn together(parts: &[Inertial]) -> Inertial {
         inertia += part.at.r * part.inertia * part.at.r.transpose()
             + part.mass * (Matrix3::identity() * c.norm_squared() - c * c.transpose());
     }
-    Inertial {
+    DescriptionInertia {
         mass,
-        at: Placed {
+        at: DescriptionPose {
             p: centre,
             r: Matrix3::identity(),
         },

@@ -7,11 +7,11 @@ use std::f64::consts::PI;
 use nalgebra::{Matrix3, Vector3};
 use roxmltree::{Document, Node};
 
-use super::description::{Description, Inertial, Joint, Kind, Link};
+use super::description::{RobotDescription, DescriptionInertia, DescriptionJoint, DescriptionJointKind, DescriptionLink};
 use super::geoms;
-use super::mjcf_defaults::Defaults;
-use super::placed::{Placed, about, of_quaternion};
-use super::xml::{at, children, exactly, line, numbers, symmetric, vector, word};
+use super::mjcf_defaults::MjcfDefaults;
+use super::placed::{DescriptionPose, rotation_about, rotation_from_quaternion};
+use super::xml::{located_message, children, exact_numbers, line, numbers, symmetric, vector, required_attribute};
 
 /// Sections that say nothing of how a robot moves.
 const NO_DYNAMICS: [&str; 12] = [
@@ -30,7 +30,7 @@ const NO_DYNAMICS: [&str; 12] = [
 ];
 
 /// What the file says of itself.
-struct Compiler {
+struct MjcfCompiler {
     /// Angles are in degrees.
     is_degree: bool,
     /// Sequence of turns of Euler angles; capitals turn about fixed axes.
@@ -49,84 +49,84 @@ struct Compiler {
     total_mass: Option<f64>,
 }
 
-pub(super) struct Reader<'a, 'i> {
-    compiler: Compiler,
-    defaults: Defaults<'a, 'i>,
-    pub(super) out: Description,
+pub(super) struct MjcfReader<'a, 'i> {
+    compiler: MjcfCompiler,
+    defaults: MjcfDefaults<'a, 'i>,
+    pub(super) out: RobotDescription,
     /// Places of the bodies at the pose of the file, in the world.
-    pub(super) world: Vec<Placed>,
-    pub(super) sites: Vec<(String, Option<usize>, Placed)>,
+    pub(super) world: Vec<DescriptionPose>,
+    pub(super) sites: Vec<(String, Option<usize>, DescriptionPose)>,
 }
 
 /// Where elements of a body stand.
 #[derive(Clone, Copy)]
-struct Inside<'a> {
+struct MjcfContext<'a> {
     link: Option<usize>,
     class: Option<&'a str>,
 }
 
 /// Reads a description, or says in one line what is wrong and where.
-pub(crate) fn read(document: &Document) -> Result<Description, String> {
+pub(crate) fn read(document: &Document) -> Result<RobotDescription, String> {
     let root = document.root_element();
-    let mut reader = Reader {
+    let mut reader = MjcfReader {
         compiler: compiler(&root)?,
-        defaults: Defaults::read(&root)?,
-        out: Description {
+        defaults: MjcfDefaults::read(&root)?,
+        out: RobotDescription {
             name: root.attribute("model").unwrap_or("robot").to_owned(),
             format: "MJCF",
             gravity: Some(Vector3::new(0.0, 0.0, -9.81)),
-            ..Description::default()
+            ..RobotDescription::default()
         },
         world: Vec::new(),
         sites: Vec::new(),
     };
     for option in children(&root, "option") {
         if let Some(text) = option.attribute("gravity") {
-            reader.out.gravity = Some(vector(exactly(&option, "gravity", text)?));
+            reader.out.gravity = Some(vector(exact_numbers(&option, "gravity", text)?));
         }
         let is_off = |flag: Node| flag.attribute("gravity") == Some("disable");
         if children(&option, "flag").any(is_off) {
             let says = "its flag switches gravity off; bodies have their weight here";
-            reader.out.remarks.push(at(&option, says));
+            reader.out.remarks.push(located_message(&option, says));
         }
         for key in ["density", "viscosity"] {
             let text = option.attribute(key);
             if text.is_some_and(|text| text.trim().parse() != Ok(0.0)) {
                 let says = format!("`{key}`: forces of a fluid are left out");
-                reader.out.remarks.push(at(&option, &says));
+                reader.out.remarks.push(located_message(&option, &says));
             }
         }
     }
     for node in root.descendants() {
         let tag = node.tag_name().name();
         if tag == "include" {
-            return Err(at(
+            return Err(located_message(
                 &node,
                 "included files are read where the description is read from a file",
             ));
         }
         if ["attach", "replicate", "composite", "flexcomp"].contains(&tag) {
-            return Err(at(
+            return Err(located_message(
                 &node,
                 "this is not expanded here; MuJoCo writes one whole file of it (mj_saveLastXML)",
             ));
         }
     }
     for body in children(&root, "worldbody") {
-        let inside = Inside {
+        let inside = MjcfContext {
             link: None,
             class: None,
         };
-        reader.inside(&body, inside, Placed::identity())?;
+        reader.read_children(&body, inside, DescriptionPose::identity())?;
     }
     reader.scale_to_total();
     for equalities in children(&root, "equality") {
         for node in equalities.children().filter(Node::is_element) {
-            reader.equality(&node)?;
+            reader.read_equality(&node)?;
         }
     }
-    reader.actuators(&root)?;
-    reader.keyframe(&root)?;
+    reader.read_actuators(&root)?;
+    reader.read_keyframe(&root)?;
     for node in root.children().filter(Node::is_element) {
         let tag = node.tag_name().name();
         if !NO_DYNAMICS.contains(&tag)
@@ -135,14 +135,14 @@ pub(crate) fn read(document: &Document) -> Result<Description, String> {
             reader
                 .out
                 .remarks
-                .push(at(&node, "this section is not read"));
+                .push(located_message(&node, "this section is not read"));
         }
     }
     Ok(reader.out)
 }
 
-fn compiler(root: &Node) -> Result<Compiler, String> {
-    let mut out = Compiler {
+fn compiler(root: &Node) -> Result<MjcfCompiler, String> {
+    let mut out = MjcfCompiler {
         is_degree: true,
         euler: "xyz".to_owned(),
         has_auto_limits: true,
@@ -162,7 +162,7 @@ fn compiler(root: &Node) -> Result<Compiler, String> {
                 && sequence.chars().all(|c| "xyzXYZ".contains(c))
                 && (sequence == sequence.to_lowercase() || sequence == sequence.to_uppercase());
             if !is_fine {
-                return Err(at(&node, "expected three of x, y and z in `eulerseq`"));
+                return Err(located_message(&node, "expected three of x, y and z in `eulerseq`"));
             }
             sequence.clone_into(&mut out.euler);
         }
@@ -179,11 +179,11 @@ fn compiler(root: &Node) -> Result<Compiler, String> {
             ("boundinertia", &mut out.least_inertia),
         ] {
             if let Some(text) = node.attribute(key) {
-                [*value] = exactly(&node, key, text)?;
+                [*value] = exact_numbers(&node, key, text)?;
             }
         }
         if node.attribute("coordinate") == Some("global") {
-            return Err(at(
+            return Err(located_message(
                 &node,
                 "global coordinates left MuJoCo with version 2.3.3; write the file anew with an older one",
             ));
@@ -192,17 +192,17 @@ fn compiler(root: &Node) -> Result<Compiler, String> {
             out.balances_inertia = balance == "true";
         }
         if let Some(text) = node.attribute("inertiagrouprange") {
-            out.groups = exactly(&node, "inertiagrouprange", text)?;
+            out.groups = exact_numbers(&node, "inertiagrouprange", text)?;
         }
         if let Some(text) = node.attribute("settotalmass") {
-            let [total] = exactly(&node, "settotalmass", text)?;
+            let [total] = exact_numbers(&node, "settotalmass", text)?;
             out.total_mass = (total > 0.0).then_some(total);
         }
     }
     Ok(out)
 }
 
-impl<'a, 'i> Reader<'a, 'i> {
+impl<'a, 'i> MjcfReader<'a, 'i> {
     /// An angle of the file in rad.
     fn angle(&self, value: f64) -> f64 {
         if self.compiler.is_degree {
@@ -228,7 +228,7 @@ impl<'a, 'i> Reader<'a, 'i> {
         key: &str,
     ) -> Result<Option<[f64; N]>, String> {
         let text = self.text(node, class, key)?;
-        text.map(|text| exactly(node, key, text)).transpose()
+        text.map(|text| exact_numbers(node, key, text)).transpose()
     }
 
     /// The first number of an attribute; further ones are said.
@@ -243,7 +243,7 @@ impl<'a, 'i> Reader<'a, 'i> {
         };
         let all = numbers(node, key, text)?;
         if all.iter().skip(1).any(|x| *x != 0.0) {
-            self.out.remarks.push(at(
+            self.out.remarks.push(located_message(
                 node,
                 &format!("of `{key}` the first number counts; further ones are not read"),
             ));
@@ -252,20 +252,20 @@ impl<'a, 'i> Reader<'a, 'i> {
     }
 
     /// Position and orientation of an element.
-    fn placed(&self, node: &Node<'a, 'i>, class: Option<&str>) -> Result<Placed, String> {
-        let mut out = Placed::identity();
+    fn read_placement(&self, node: &Node<'a, 'i>, class: Option<&str>) -> Result<DescriptionPose, String> {
+        let mut out = DescriptionPose::identity();
         if let Some(pos) = self.numbers(node, class, "pos")? {
             out.p = vector(pos);
         }
-        let fault = |key: &str| at(node, &format!("`{key}` has no direction"));
+        let fault = |key: &str| located_message(node, &format!("`{key}` has no direction"));
         if let Some(quat) = self.numbers(node, class, "quat")? {
-            out.r = of_quaternion(quat).ok_or_else(|| fault("quat"))?;
+            out.r = rotation_from_quaternion(quat).ok_or_else(|| fault("quat"))?;
         }
         if let Some([x, y, z, angle]) = self.numbers(node, class, "axisangle")? {
             let axis = Vector3::new(x, y, z)
                 .try_normalize(1e-12)
                 .ok_or_else(|| fault("axisangle"))?;
-            out.r = about(&axis, self.angle(angle));
+            out.r = rotation_about(&axis, self.angle(angle));
         }
         if let Some([a, b, c, d, e, f]) = self.numbers(node, class, "xyaxes")? {
             let x = Vector3::new(a, b, c)
@@ -284,7 +284,7 @@ impl<'a, 'i> Reader<'a, 'i> {
             let axis = Vector3::z().cross(&z);
             let angle = axis.norm().atan2(z.z);
             let axis = axis.try_normalize(1e-12).unwrap_or_else(Vector3::x);
-            out.r = about(&axis, angle);
+            out.r = rotation_about(&axis, angle);
         }
         if let Some(angles) = self.numbers::<3>(node, class, "euler")? {
             out.r = Matrix3::identity();
@@ -294,7 +294,7 @@ impl<'a, 'i> Reader<'a, 'i> {
                     'y' => Vector3::y(),
                     _ => Vector3::z(),
                 };
-                let turn = about(&axis, self.angle(angle));
+                let turn = rotation_about(&axis, self.angle(angle));
                 out.r = if letter.is_ascii_lowercase() {
                     out.r * turn
                 } else {
@@ -306,58 +306,58 @@ impl<'a, 'i> Reader<'a, 'i> {
     }
 
     /// Reads what stands in a body, in a frame of it at `at`.
-    fn inside(
+    fn read_children(
         &mut self,
         node: &Node<'a, 'i>,
-        inside: Inside<'a>,
-        place: Placed,
+        inside: MjcfContext<'a>,
+        place: DescriptionPose,
     ) -> Result<(), String> {
         for child in node.children().filter(Node::is_element) {
             let class = child.attribute("childclass").or(inside.class);
             match child.tag_name().name() {
-                "body" => self.body(&child, Inside { class, ..inside }, place)?,
+                "body" => self.read_body(&child, MjcfContext { class, ..inside }, place)?,
                 "frame" => {
-                    let place = place.then(&self.placed(&child, class)?);
-                    self.inside(&child, Inside { class, ..inside }, place)?;
+                    let place = place.compose(&self.read_placement(&child, class)?);
+                    self.read_children(&child, MjcfContext { class, ..inside }, place)?;
                 }
                 "site" => {
                     if let Some(name) = child.attribute("name") {
-                        let at = place.then(&self.placed(&child, class)?);
+                        let at = place.compose(&self.read_placement(&child, class)?);
                         self.sites.push((name.to_owned(), inside.link, at));
                     }
                 }
                 "joint" | "freejoint" if inside.link.is_none() => {
-                    return Err(at(&child, "the world has no joint"));
+                    return Err(located_message(&child, "the world has no joint"));
                 }
-                "joint" => self.joint(&child, inside, place)?,
-                "freejoint" => self.free(&child, inside)?,
+                "joint" => self.read_joint(&child, inside, place)?,
+                "freejoint" => self.read_free_joint(&child, inside)?,
                 _ => {}
             }
         }
         Ok(())
     }
 
-    fn body(
+    fn read_body(
         &mut self,
         node: &Node<'a, 'i>,
-        around: Inside<'a>,
-        place: Placed,
+        around: MjcfContext<'a>,
+        place: DescriptionPose,
     ) -> Result<(), String> {
-        let placed = place.then(&self.placed(node, None)?);
+        let placed = place.compose(&self.read_placement(node, None)?);
         let own = self.out.links.len();
         let name = node
             .attribute("name")
             .map_or_else(|| format!("body{}", own + 1), str::to_owned);
         if self.out.links.iter().any(|link| link.name == name) {
-            return Err(at(node, &format!("two bodies are called `{name}`")));
+            return Err(located_message(node, &format!("two bodies are called `{name}`")));
         }
         let parent = around
             .link
-            .map_or(Placed::identity(), |link| self.world[link]);
-        self.world.push(parent.then(&placed));
+            .map_or(DescriptionPose::identity(), |link| self.world[link]);
+        self.world.push(parent.compose(&placed));
         let inertial = self.inertial(node, around.class)?;
         if node.attribute("mocap") == Some("true") {
-            self.out.remarks.push(at(
+            self.out.remarks.push(located_message(
                 node,
                 "a body that is moved from outside; here it stands still",
             ));
@@ -366,67 +366,67 @@ impl<'a, 'i> Reader<'a, 'i> {
             .attribute("gravcomp")
             .is_some_and(|text| text.trim() != "0")
         {
-            self.out.remarks.push(at(
+            self.out.remarks.push(located_message(
                 node,
                 "`gravcomp` is no mechanics of the body and is left out: weight counts in full",
             ));
         }
-        self.out.links.push(Link {
+        self.out.links.push(DescriptionLink {
             name,
             parent: around.link,
             at: placed,
             joints: Vec::new(),
             inertial,
         });
-        let inside = Inside {
+        let inside = MjcfContext {
             link: Some(own),
             class: around.class,
         };
-        self.inside(node, inside, Placed::identity())
+        self.read_children(node, inside, DescriptionPose::identity())
     }
 
     fn inertial(
         &mut self,
         node: &Node<'a, 'i>,
         class: Option<&'a str>,
-    ) -> Result<Inertial, String> {
+    ) -> Result<DescriptionInertia, String> {
         let given = node
             .children()
             .find(|child| child.tag_name().name() == "inertial");
         let mut found = match (given, self.compiler.from_geoms) {
             (Some(given), None | Some(false)) => {
-                let mut placed = self.placed(&given, None)?;
-                let [mass] = exactly(&given, "mass", &word(&given, "mass")?)?;
+                let mut placed = self.read_placement(&given, None)?;
+                let [mass] = exact_numbers(&given, "mass", &required_attribute(&given, "mass")?)?;
                 let inertia = if let Some(full) = given.attribute("fullinertia") {
                     if given.attribute("diaginertia").is_some() {
-                        return Err(at(
+                        return Err(located_message(
                             &given,
                             "expected `fullinertia` or `diaginertia`, not both",
                         ));
                     }
                     placed.r = Matrix3::identity();
-                    symmetric(exactly(&given, "fullinertia", full)?)
+                    symmetric(exact_numbers(&given, "fullinertia", full)?)
                 } else if let Some(text) = given.attribute("diaginertia") {
-                    Matrix3::from_diagonal(&vector(exactly(&given, "diaginertia", text)?))
+                    Matrix3::from_diagonal(&vector(exact_numbers(&given, "diaginertia", text)?))
                 } else {
-                    return Err(at(&given, "it needs `diaginertia` or `fullinertia`"));
+                    return Err(located_message(&given, "it needs `diaginertia` or `fullinertia`"));
                 };
-                Inertial {
+                DescriptionInertia {
                     mass,
                     at: placed,
                     inertia,
                 }
             }
-            (_, Some(false)) => Inertial::default(),
-            _ => self.of_geoms(node, class)?,
+            (_, Some(false)) => DescriptionInertia::default(),
+            _ => self.inertia_from_geoms(node, class)?,
         };
         found.mass = found.mass.max(self.compiler.least_mass);
-        found.inertia = self.possible(found.inertia);
+        found.inertia = self.bounded_inertia(found.inertia);
         Ok(found)
     }
 
     /// An inertia with the bounds that the file asks for, on principal moments, as MuJoCo takes them.
-    fn possible(&self, inertia: Matrix3<f64>) -> Matrix3<f64> {
+    fn bounded_inertia(&self, inertia: Matrix3<f64>) -> Matrix3<f64> {
         let mut moments = inertia.symmetric_eigen();
         let given = moments.eigenvalues;
         let least = self.compiler.least_inertia;
@@ -458,34 +458,34 @@ impl<'a, 'i> Reader<'a, 'i> {
     }
 
     /// Mass and inertia of the shapes of a body, also of those in its frames.
-    fn of_geoms(
+    fn inertia_from_geoms(
         &mut self,
         node: &Node<'a, 'i>,
         class: Option<&'a str>,
-    ) -> Result<Inertial, String> {
+    ) -> Result<DescriptionInertia, String> {
         let mut shapes = Vec::new();
-        let mut waiting = vec![(*node, class, Placed::identity())];
+        let mut waiting = vec![(*node, class, DescriptionPose::identity())];
         while let Some((node, class, place)) = waiting.pop() {
             for child in node.children().filter(Node::is_element) {
                 let class = child.attribute("childclass").or(class);
                 match child.tag_name().name() {
                     "frame" => {
-                        waiting.push((child, class, place.then(&self.placed(&child, class)?)));
+                        waiting.push((child, class, place.compose(&self.read_placement(&child, class)?)));
                     }
-                    "geom" => shapes.extend(self.geom(&child, class, place)?),
+                    "geom" => shapes.extend(self.geom_inertia(&child, class, place)?),
                     _ => {}
                 }
             }
         }
-        Ok(geoms::together(&shapes))
+        Ok(geoms::combined_inertia(&shapes))
     }
 
-    fn geom(
+    fn geom_inertia(
         &mut self,
         node: &Node<'a, 'i>,
         class: Option<&'a str>,
-        place: Placed,
-    ) -> Result<Option<Inertial>, String> {
+        place: DescriptionPose,
+    ) -> Result<Option<DescriptionInertia>, String> {
         let mass = self.numbers::<1>(node, class, "mass")?.map(|[mass]| mass);
         let [density] = self.numbers(node, class, "density")?.unwrap_or([1000.0]);
         if mass == Some(0.0) || (mass.is_none() && density == 0.0) {
@@ -497,7 +497,7 @@ impl<'a, 'i> Reader<'a, 'i> {
             return Ok(None);
         }
         if self.text(node, class, "shellinertia")? == Some("true") {
-            return Err(at(
+            return Err(located_message(
                 node,
                 "mass and inertia of a hollow shape are not worked out here: give the body an <inertial>, as MuJoCo writes it \
                  (mj_saveLastXML)",
@@ -508,7 +508,7 @@ impl<'a, 'i> Reader<'a, 'i> {
             None => "sphere",
         };
         let kind = self.text(node, class, "type")?.unwrap_or(usual);
-        let mut placed = self.placed(node, class)?;
+        let mut placed = self.read_placement(node, class)?;
         let size = match self.text(node, class, "size")? {
             Some(text) => numbers(node, "size", text)?,
             None => Vec::new(),
@@ -519,45 +519,45 @@ impl<'a, 'i> Reader<'a, 'i> {
             placed.p = 0.5 * (from + to);
             let z = (to - from)
                 .try_normalize(1e-12)
-                .ok_or_else(|| at(node, "`fromto` has no length"))?;
+                .ok_or_else(|| located_message(node, "`fromto` has no length"))?;
             half = Some(0.5 * (to - from).norm());
             let axis = Vector3::z().cross(&z);
             let angle = axis.norm().atan2(z.z);
-            placed.r = about(&axis.try_normalize(1e-12).unwrap_or_else(Vector3::x), angle);
+            placed.r = rotation_about(&axis.try_normalize(1e-12).unwrap_or_else(Vector3::x), angle);
         }
-        let shape = geoms::Shape::new(kind, &size, half).map_err(|fault| at(node, &fault))?;
-        Ok(shape.map(|shape| shape.inertial(mass, density, place.then(&placed))))
+        let shape = geoms::GeomShape::new(kind, &size, half).map_err(|fault| located_message(node, &fault))?;
+        Ok(shape.map(|shape| shape.inertial(mass, density, place.compose(&placed))))
     }
 
-    fn free(&mut self, node: &Node<'a, 'i>, inside: Inside<'a>) -> Result<(), String> {
+    fn read_free_joint(&mut self, node: &Node<'a, 'i>, inside: MjcfContext<'a>) -> Result<(), String> {
         let name = node.attribute("name").unwrap_or("root").to_owned();
         let Some(link) = inside.link else {
             return Ok(());
         };
         if self.out.links[link].parent.is_some() {
-            return Err(at(node, "a free joint belongs to a body of the world"));
+            return Err(located_message(node, "a free joint belongs to a body of the world"));
         }
         self.out.links[link]
             .joints
-            .push(Joint::new(name, Kind::Free, line(node)));
+            .push(DescriptionJoint::new(name, DescriptionJointKind::Free, line(node)));
         Ok(())
     }
 
-    fn joint(
+    fn read_joint(
         &mut self,
         node: &Node<'a, 'i>,
-        inside: Inside<'a>,
-        place: Placed,
+        inside: MjcfContext<'a>,
+        place: DescriptionPose,
     ) -> Result<(), String> {
         let (Some(link), class) = (inside.link, inside.class) else {
             return Ok(());
         };
         let kind = match self.text(node, class, "type")?.unwrap_or("hinge") {
-            "hinge" => Kind::Turn,
-            "slide" => Kind::Slide,
-            "ball" => Kind::Ball,
-            "free" => return self.free(node, inside),
-            other => return Err(at(node, &format!("no joint is of the type `{other}`"))),
+            "hinge" => DescriptionJointKind::Revolute,
+            "slide" => DescriptionJointKind::Prismatic,
+            "ball" => DescriptionJointKind::Ball,
+            "free" => return self.read_free_joint(node, inside),
+            other => return Err(located_message(node, &format!("no joint is of the type `{other}`"))),
         };
         let n = self.out.links[link].joints.len();
         let name = node.attribute("name").map_or_else(
@@ -571,7 +571,7 @@ impl<'a, 'i> Reader<'a, 'i> {
             },
             str::to_owned,
         );
-        let mut joint = Joint::new(name, kind, line(node));
+        let mut joint = DescriptionJoint::new(name, kind, line(node));
         joint.is_driven = false;
         if let Some(pos) = self.numbers(node, class, "pos")? {
             joint.anchor = vector(pos);
@@ -582,24 +582,24 @@ impl<'a, 'i> Reader<'a, 'i> {
         }
         joint.axis = place.r * joint.axis;
         if joint.axis.norm() == 0.0 {
-            return Err(at(node, "the axis has no direction"));
+            return Err(located_message(node, "the axis has no direction"));
         }
         let in_unit = |reader: &Self, value: f64| {
-            if kind == Kind::Slide {
+            if kind == DescriptionJointKind::Prismatic {
                 value
             } else {
                 reader.angle(value)
             }
         };
-        if matches!(kind, Kind::Turn | Kind::Slide) {
+        if matches!(kind, DescriptionJointKind::Revolute | DescriptionJointKind::Prismatic) {
             let zero = self.first(node, class, "ref")?;
             joint.zero = in_unit(self, zero);
         }
         let limited = self.text(node, class, "limited")?.unwrap_or("auto");
         if let Some(range) = self.numbers::<2>(node, class, "range")? {
             let counts = limited == "true" || (limited == "auto" && self.compiler.has_auto_limits);
-            if counts && kind == Kind::Ball {
-                self.out.remarks.push(at(
+            if counts && kind == DescriptionJointKind::Ball {
+                self.out.remarks.push(located_message(
                     node,
                     "the range of a ball joint is a cone, which models do not have",
                 ));

@@ -4,13 +4,13 @@
 use nalgebra::Vector3;
 use roxmltree::Node;
 
-use super::description::{Kind, StraightDrive};
-use super::mjcf::Reader;
-use super::xml::{at, children, numbers, word};
+use super::description::{DescriptionJointKind, StraightDrive};
+use super::mjcf::MjcfReader;
+use super::xml::{located_message, children, numbers, required_attribute};
 
-impl<'a, 'i> Reader<'a, 'i> {
+impl<'a, 'i> MjcfReader<'a, 'i> {
     /// Which joints are driven, and by how much.
-    pub(super) fn actuators(&mut self, root: &Node<'a, 'i>) -> Result<(), String> {
+    pub(super) fn read_actuators(&mut self, root: &Node<'a, 'i>) -> Result<(), String> {
         let mut n = 0;
         for node in children(root, "actuator").flat_map(|section| {
             section
@@ -27,27 +27,27 @@ impl<'a, 'i> Reader<'a, 'i> {
                 None => 1.0,
             };
             if let Some(name) = node.attribute("joint").or(node.attribute("jointinparent")) {
-                self.drive(&node, name, gear)?;
+                self.add_joint_drive(&node, name, gear)?;
             } else if let Some(name) = node.attribute("tendon") {
                 let tendon = children(root, "tendon")
                     .flat_map(|section| section.children().collect::<Vec<_>>())
                     .find(|tendon| tendon.attribute("name") == Some(name))
-                    .ok_or_else(|| at(&node, &format!("no tendon is called `{name}`")))?;
+                    .ok_or_else(|| located_message(&node, &format!("no tendon is called `{name}`")))?;
                 if tendon.tag_name().name() != "fixed" {
-                    self.pull(&node, &tendon, gear)?;
+                    self.add_tendon_drive(&node, &tendon, gear)?;
                     continue;
                 }
-                self.out.remarks.push(at(
+                self.out.remarks.push(located_message(
                     &node,
                     &format!("it drives the joints of the tendon `{name}` together; here each has a force of its own"),
                 ));
                 for joint in children(&tendon, "joint") {
-                    let gear = gear * super::xml::number(&joint, "coef")?;
-                    let name = word(&joint, "joint")?;
-                    self.drive(&joint, &name, gear)?;
+                    let gear = gear * super::xml::number_attribute(&joint, "coef")?;
+                    let name = required_attribute(&joint, "joint")?;
+                    self.add_joint_drive(&joint, &name, gear)?;
                 }
             } else {
-                self.out.remarks.push(at(
+                self.out.remarks.push(located_message(
                     &node,
                     "it acts on no joint and no tendon and is left out",
                 ));
@@ -60,7 +60,7 @@ impl<'a, 'i> Reader<'a, 'i> {
                 .collect::<Vec<_>>()
         }) {
             let mut bends = Vec::new();
-            let is_drive = (self.out.lines.iter())
+            let is_drive = (self.out.straight_drives.iter())
                 .any(|line| tendon.attribute("name") == Some(line.tendon.as_str()));
             let kept = if is_drive { 1 } else { 4 };
             for key in ["stiffness", "damping", "frictionloss", "armature"]
@@ -75,13 +75,13 @@ impl<'a, 'i> Reader<'a, 'i> {
                 }
             }
             if !bends.is_empty() {
-                self.out.remarks.push(at(
+                self.out.remarks.push(located_message(
                     &tendon,
                     &format!("{} of this tendon: left out", bends.join(", ")),
                 ));
             }
             if tendon.attribute("range").is_some() {
-                self.out.remarks.push(at(
+                self.out.remarks.push(located_message(
                     &tendon,
                     "a range of a tendon is no equality and is left out",
                 ));
@@ -89,7 +89,7 @@ impl<'a, 'i> Reader<'a, 'i> {
         }
         if n == 0 {
             let joints = self.out.links.iter_mut().flat_map(|link| &mut link.joints);
-            for joint in joints.filter(|joint| joint.kind != Kind::Free) {
+            for joint in joints.filter(|joint| joint.kind != DescriptionJointKind::Free) {
                 joint.is_driven = true;
             }
             self.out
@@ -100,7 +100,7 @@ impl<'a, 'i> Reader<'a, 'i> {
     }
 
     /// Makes a drive of an actuator that pulls a spatial tendon, if that is a straight line between two sites.
-    fn pull(
+    fn add_tendon_drive(
         &mut self,
         node: &Node<'a, 'i>,
         tendon: &Node<'a, 'i>,
@@ -111,7 +111,7 @@ impl<'a, 'i> Reader<'a, 'i> {
             parts.as_slice(),
             parts.iter().all(|part| part.tag_name().name() == "site"),
         ) else {
-            self.out.remarks.push(at(
+            self.out.remarks.push(located_message(
                 node,
                 "it pulls a tendon that is no straight line between two sites, which models do not have: joints that it moves \
                  need drives by hand",
@@ -120,12 +120,12 @@ impl<'a, 'i> Reader<'a, 'i> {
         };
         let mut ends = [(None, Vector3::zeros()); 2];
         for (end, part) in ends.iter_mut().zip([one, other]) {
-            let (link, place) = self.site(&part, &word(&part, "site")?)?;
+            let (link, place) = self.site(&part, &required_attribute(&part, "site")?)?;
             *end = (link, place.p);
         }
         let line = tendon.attribute("name").unwrap_or_default().to_owned();
-        if self.out.lines.iter().any(|known| known.tendon == line) {
-            self.out.remarks.push(at(
+        if self.out.straight_drives.iter().any(|known| known.tendon == line) {
+            self.out.remarks.push(located_message(
                 node,
                 &format!("another actuator pulls the tendon `{line}` too: both are one drive here"),
             ));
@@ -139,18 +139,18 @@ impl<'a, 'i> Reader<'a, 'i> {
         let on_drive = self
             .numbers::<1>(node, None, "armature")?
             .map_or(0.0, |[x]| x);
-        self.out.lines.push(StraightDrive {
+        self.out.straight_drives.push(StraightDrive {
             name: node.attribute("name").unwrap_or(&line).to_owned(),
             line: super::xml::line(node),
             ends,
-            force: self.force_range(node)?.map(|range| scaled(range, gear)),
+            force: self.force_range(node)?.map(|range| scale_range(range, gear)),
             damping,
             friction,
             armature: on_tendon + on_drive * gear * gear,
             tendon: line,
         });
         if (gear - 1.0).abs() > 0.0 {
-            self.out.remarks.push(at(
+            self.out.remarks.push(located_message(
                 node,
                 &format!(
                     "its gear is {gear}: the force of the drive here is that along the tendon"
@@ -178,7 +178,7 @@ impl<'a, 'i> Reader<'a, 'i> {
     }
 
     /// Gives a joint its drive.
-    fn drive(&mut self, node: &Node<'a, 'i>, name: &str, gear: f64) -> Result<(), String> {
+    fn add_joint_drive(&mut self, node: &Node<'a, 'i>, name: &str, gear: f64) -> Result<(), String> {
         let range = self.force_range(node)?;
         let armature = self
             .numbers::<1>(node, None, "armature")?
@@ -189,14 +189,14 @@ impl<'a, 'i> Reader<'a, 'i> {
             .iter_mut()
             .flat_map(|link| &mut link.joints)
             .find(|joint| joint.name == name)
-            .ok_or_else(|| at(node, &format!("no joint is called `{name}`")))?;
-        joint.is_driven = joint.kind != Kind::Free;
+            .ok_or_else(|| located_message(node, &format!("no joint is called `{name}`")))?;
+        joint.is_driven = joint.kind != DescriptionJointKind::Free;
         joint.armature += armature * gear * gear;
         if joint.force.is_none() {
-            joint.force = range.map(|range| scaled(range, gear));
+            joint.force = range.map(|range| scale_range(range, gear));
         }
         if (gear - 1.0).abs() > 0.0 && node.tag_name().name() != "joint" {
-            self.out.remarks.push(at(
+            self.out.remarks.push(located_message(
                 node,
                 &format!(
                     "its gear is {gear}: the force of the drive here is that at the joint `{name}`"
@@ -207,7 +207,7 @@ impl<'a, 'i> Reader<'a, 'i> {
     }
 
     /// The first pose of the file that its author kept, to close loops from.
-    pub(super) fn keyframe(&mut self, root: &Node<'a, 'i>) -> Result<(), String> {
+    pub(super) fn read_keyframe(&mut self, root: &Node<'a, 'i>) -> Result<(), String> {
         let mut keys =
             children(root, "keyframe").flat_map(|section| section.children().collect::<Vec<_>>());
         let Some((key, text)) = keys.find_map(|key| key.attribute("qpos").map(|text| (key, text)))
@@ -217,9 +217,9 @@ impl<'a, 'i> Reader<'a, 'i> {
         let mut values = numbers(&key, "qpos", text)?.into_iter();
         for joint in self.out.links.iter().flat_map(|link| &link.joints) {
             let n = match joint.kind {
-                Kind::Turn | Kind::Slide => 1,
-                Kind::Ball => 4,
-                Kind::Free => 7,
+                DescriptionJointKind::Revolute | DescriptionJointKind::Prismatic => 1,
+                DescriptionJointKind::Ball => 4,
+                DescriptionJointKind::Free => 7,
             };
             let own: Vec<f64> = values.by_ref().take(n).collect();
             if let [value] = own[..] {
@@ -231,7 +231,7 @@ impl<'a, 'i> Reader<'a, 'i> {
 }
 
 /// A range times a factor of either sign.
-fn scaled([low, high]: [f64; 2], factor: f64) -> [f64; 2] {
+fn scale_range([low, high]: [f64; 2], factor: f64) -> [f64; 2] {
     let ends = [low * factor, high * factor];
     [ends[0].min(ends[1]), ends[0].max(ends[1])]
 }

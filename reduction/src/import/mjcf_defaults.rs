@@ -3,46 +3,46 @@
 
 use roxmltree::Node;
 
-use super::xml::{at, children};
+use super::xml::{located_message, children};
 
 /// The classes of a file.
 #[derive(Default)]
-pub(crate) struct Defaults<'a, 'i> {
-    classes: Vec<Class<'a, 'i>>,
+pub(crate) struct MjcfDefaults<'a, 'i> {
+    classes: Vec<MjcfDefaultClass<'a, 'i>>,
 }
 
-struct Class<'a, 'i> {
+struct MjcfDefaultClass<'a, 'i> {
     name: String,
     parent: Option<usize>,
     node: Node<'a, 'i>,
 }
 
-impl<'a, 'i> Defaults<'a, 'i> {
+impl<'a, 'i> MjcfDefaults<'a, 'i> {
     /// Collects the classes of a `<mujoco>` element.
     pub(crate) fn read(root: &Node<'a, 'i>) -> Result<Self, String> {
         let mut out = Self::default();
         for node in children(root, "default") {
-            out.class(node, None)?;
+            out.add_class(node, None)?;
         }
         Ok(out)
     }
 
-    fn class(&mut self, node: Node<'a, 'i>, parent: Option<usize>) -> Result<(), String> {
+    fn add_class(&mut self, node: Node<'a, 'i>, parent: Option<usize>) -> Result<(), String> {
         let name = match (node.attribute("class"), parent) {
             (Some(name), _) => name,
             (None, None) => "main",
             (None, Some(_)) => {
-                return Err(at(&node, "a default class needs the attribute `class`"));
+                return Err(located_message(&node, "a default class needs the attribute `class`"));
             }
         };
-        self.classes.push(Class {
+        self.classes.push(MjcfDefaultClass {
             name: name.to_owned(),
             parent,
             node,
         });
         let own = self.classes.len() - 1;
         for inner in children(&node, "default") {
-            self.class(inner, Some(own))?;
+            self.add_class(inner, Some(own))?;
         }
         Ok(())
     }
@@ -66,14 +66,14 @@ impl<'a, 'i> Defaults<'a, 'i> {
                 self.classes
                     .iter()
                     .position(|class| class.name == name)
-                    .ok_or_else(|| at(node, &format!("no default class is called `{name}`")))?,
+                    .ok_or_else(|| located_message(node, &format!("no default class is called `{name}`")))?,
             ),
         };
         let tag = node.tag_name().name();
         while let Some(index) = class {
-            let Class { parent, node, .. } = &self.classes[index];
+            let MjcfDefaultClass { parent, node, .. } = &self.classes[index];
             // Several files joined by <include> may each have a main class.
-            let found = children(node, tag_of(tag)).find_map(|node| node.attribute(key));
+            let found = children(node, default_tag(tag)).find_map(|node| node.attribute(key));
             if found.is_some() {
                 return Ok(found);
             }
@@ -84,7 +84,7 @@ impl<'a, 'i> Defaults<'a, 'i> {
 }
 
 /// Elements whose defaults are read.
-fn tag_of(tag: &str) -> &'static str {
+fn default_tag(tag: &str) -> &'static str {
     const TAGS: [&str; 14] = [
         "joint",
         "geom",

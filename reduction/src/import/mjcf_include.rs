@@ -5,7 +5,7 @@
 
 use roxmltree::Document;
 
-use super::xml::{at, word};
+use super::xml::{located_message, required_attribute};
 
 /// Files that include each other are followed this far.
 const DEEPEST: usize = 20;
@@ -14,11 +14,11 @@ const DEEPEST: usize = 20;
 /// itself. `read` gives the text of a file by its name.
 ///
 /// Text that is no XML, or no MJCF, stays as it is: reading it says what is wrong.
-pub fn expand(text: &str, read: &dyn Fn(&str) -> Result<String, String>) -> Result<String, String> {
-    expanded(text, read, &mut Vec::new(), 0)
+pub fn expand_includes(text: &str, read: &dyn Fn(&str) -> Result<String, String>) -> Result<String, String> {
+    expand_file(text, read, &mut Vec::new(), 0)
 }
 
-fn expanded(
+fn expand_file(
     text: &str,
     read: &dyn Fn(&str) -> Result<String, String>,
     seen: &mut Vec<String>,
@@ -37,19 +37,19 @@ fn expanded(
         if node.tag_name().name() != "include" {
             continue;
         }
-        let name = word(&node, "file")?;
+        let name = required_attribute(&node, "file")?;
         if depth == DEEPEST || seen.contains(&name) {
-            return Err(at(
+            return Err(located_message(
                 &node,
                 &format!("`{name}` is included twice; MuJoCo takes a file once"),
             ));
         }
         seen.push(name.clone());
-        let other = read(&name).map_err(|fault| at(&node, &fault))?;
-        let whole = expanded(&other, read, seen, depth + 1)
-            .map_err(|fault| at(&node, &format!("in `{name}`: {fault}")))?;
+        let other = read(&name).map_err(|fault| located_message(&node, &fault))?;
+        let whole = expand_file(&other, read, seen, depth + 1)
+            .map_err(|fault| located_message(&node, &format!("in `{name}`: {fault}")))?;
         let inner = Document::parse(&whole).map_err(|fault| {
-            at(
+            located_message(
                 &node,
                 &format!("`{name}` is no XML that can be read ({fault})"),
             )

@@ -23,16 +23,16 @@ mod urdf;
 mod welds;
 mod xml;
 
-pub use mjcf_include::expand as expand_includes;
+pub use mjcf_include::expand_includes as expand_includes;
 
 use std::fmt;
 
-use modelmill_boundary::files::Memory;
+use modelmill_boundary::files::MemoryFiles;
 use roxmltree::Document;
 
 /// A model file made from a robot description.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Imported {
+pub struct DescriptionImport {
     /// The text of the model file.
     pub model: String,
     /// What was left out, rounded or made up; one sentence each.
@@ -88,7 +88,7 @@ pub const LARGEST_DESCRIPTION: usize = 16 << 20;
 /// Makes a model file of a robot description; its root element says the format.
 ///
 /// Fails when the text is none of URDF, MJCF and SDF, or holds what models cannot say; the message names element and line.
-pub fn import(text: &str, options: &Options) -> Result<Imported, ImportError> {
+pub fn import(text: &str, options: &Options) -> Result<DescriptionImport, ImportError> {
     if text.len() > LARGEST_DESCRIPTION {
         return Err(ImportError(
             "this file is too large for a robot description".to_owned(),
@@ -108,7 +108,7 @@ pub fn import(text: &str, options: &Options) -> Result<Imported, ImportError> {
         "robot" => urdf::read(&document, options.closures, options.floating),
         "mujoco" => mjcf::read(&document),
         "sdf" => sdf::read(&document),
-        other => Err(xml::at(
+        other => Err(xml::located_message(
             &document.root_element(),
             &format!("expected <robot> (URDF), <mujoco> (MJCF) or <sdf>, found <{other}>"),
         )),
@@ -132,11 +132,11 @@ pub fn import(text: &str, options: &Options) -> Result<Imported, ImportError> {
             description.format
         )));
     }
-    let imported = model_text::model(description, options).map_err(ImportError)?;
+    let imported = model_text::model_text(description, options).map_err(ImportError)?;
     match modelmill_spec::load(
         "the model made from it",
         &imported.model,
-        &Memory::default(),
+        &MemoryFiles::default(),
     ) {
         Ok(_) => Ok(imported),
         Err(failure) => Err(ImportError(format!(

@@ -9,14 +9,14 @@ use std::fmt::Write as _;
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::chain::{Chain, Move, Node, Pair};
-use super::closing::{self, Closed, INSIDE};
-use super::couplings::{self, Couplings, Follows};
-use super::description::{Closure, Description, Holds, Joint, Kind, Link};
-use super::placed::{Placed, axis, roll_pitch_yaw, twelfths};
-use super::{Imported, ImportedJoint, Options};
-use crate::write::{digits, float, quoted};
-use lines::{Pulled, between};
+use super::chain::{FrameChain, ChainMotion, ChainFrame, CoincidentPair};
+use super::closing::{self, LoopSolution, RANGE_TOLERANCE};
+use super::couplings::{self, ImportCouplings, JointFollower};
+use super::description::{DescriptionClosure, RobotDescription, ClosureConstraint, DescriptionJoint, DescriptionJointKind, DescriptionLink};
+use super::placed::{DescriptionPose, named_axis, roll_pitch_yaw, twelfths_of_pi};
+use super::{DescriptionImport, ImportedJoint, Options};
+use crate::write::{significant_digits, toml_float, toml_string};
+use lines::{NamedDriveLine, relative_variables};
 
 /// Angles this near to a multiple of a twelfth of pi are taken for it where the option asks for it, rad.
 const SAME_ANGLE: f64 = 1e-4;
@@ -24,10 +24,10 @@ const SAME_ANGLE: f64 = 1e-4;
 /// differ by that share of theirs are the same. Kept, such deviations would make base parameters of nothing but rounding.
 const ROUNDING: f64 = 2e-11;
 /// Points by which closures hold orientations stand this far from their origins, m.
-const ARM: f64 = 0.1;
+const ORIENTATION_ARM: f64 = 0.1;
 
 /// A body of the model.
-struct Body {
+struct ImportBody {
     frame: usize,
     mass: f64,
     moment: Vector3<f64>,
@@ -36,7 +36,7 @@ struct Body {
 }
 
 /// A coordinate of the model.
-struct Coordinate {
+struct ImportCoordinate {
     name: String,
     /// None for those of a free body.
     variable: Option<usize>,
@@ -50,7 +50,7 @@ struct Coordinate {
 
 /// What acts at a variable, added up over the joints that it moves.
 #[derive(Default, Clone)]
-struct Acts {
+struct VariableForces {
     damping: f64,
     friction: f64,
     armature: f64,
@@ -62,9 +62,9 @@ struct Acts {
     force: Option<[f64; 2]>,
 }
 
-struct Build<'a> {
+struct ModelTextBuilder<'a> {
     options: &'a Options<'a>,
-    couplings: Couplings,
+    couplings: ImportCouplings,
     /// Names that are taken.
     names: Vec<String>,
     remarks: Vec<String>,
@@ -75,27 +75,27 @@ struct Build<'a> {
     followers: String,
     frames: String,
     frame_names: Vec<String>,
-    chain: Chain,
+    chain: FrameChain,
     /// Frame that carries each link, and where the link is in it.
-    links: Vec<(Option<usize>, Placed)>,
-    coordinates: Vec<Coordinate>,
+    links: Vec<(Option<usize>, DescriptionPose)>,
+    coordinates: Vec<ImportCoordinate>,
     /// Index into `coordinates` of each variable.
     of_variable: Vec<Option<usize>>,
-    acts: Vec<Acts>,
+    acts: Vec<VariableForces>,
     /// Rank of each variable when independent ones are chosen; low ones stay independent.
     reluctance: Vec<u8>,
     start: Vec<f64>,
-    bodies: Vec<Body>,
+    bodies: Vec<ImportBody>,
     joints: Vec<ImportedJoint>,
     /// Whether there are more drives than freedoms: such have no effects of their own.
     has_surplus: bool,
 }
 
 /// Makes the model file of a description.
-pub(crate) fn model(mut description: Description, options: &Options) -> Result<Imported, String> {
+pub(crate) fn model_text(mut description: RobotDescription, options: &Options) -> Result<DescriptionImport, String> {
     let couplings = couplings::resolve(&mut description)?;
     let n = couplings.variables.len();
-    let mut build = Build {
+    let mut build = ModelTextBuilder {
         options,
         names: vec!["base".to_owned(), "g".to_owned()],
         remarks: std::mem::take(&mut description.remarks),
@@ -104,14 +104,14 @@ pub(crate) fn model(mut description: Description, options: &Options) -> Result<I
         followers: String::new(),
         frames: String::new(),
         frame_names: Vec::new(),
-        chain: Chain {
+        chain: FrameChain {
             nodes: Vec::new(),
             n_variables: n,
         },
         links: Vec::new(),
         coordinates: Vec::new(),
         of_variable: vec![None; n],
-        acts: vec![Acts::default(); n],
+        acts: vec![VariableForces::default(); n],
         reluctance: vec![0; n],
         start: vec![0.0; n],
         bodies: Vec::new(),
@@ -129,24 +129,24 @@ pub(crate) fn model(mut description: Description, options: &Options) -> Result<I
         return Err("this robot has no joint that moves".to_owned());
     }
     // What a line pulls had better be independent.
-    for line in &description.lines {
-        for variable in between(&build.chain, build.frames_of(line)) {
+    for line in &description.straight_drives {
+        for variable in relative_variables(&build.chain, build.frames_of(line)) {
             build.reluctance[variable] = build.reluctance[variable].min(1);
         }
     }
     let closed = build.close(&description)?;
-    let lines = build.pull(&description.lines, closed.as_ref());
+    let lines = build.assign_coordinates(&description.straight_drives, closed.as_ref());
     Ok(build.finish(&description, closed.as_ref(), &lines))
 }
 
-impl Build<'_> {
+impl ModelTextBuilder<'_> {
     /// Adds the frames of a link's joints and what it weighs.
-    fn link(&mut self, description: &Description, index: usize) -> Result<(), String> {
+    fn link(&mut self, description: &RobotDescription, index: usize) -> Result<(), String> {
         let link = &description.links[index];
         let (mut frame, carried) = link
             .parent
-            .map_or((None, Placed::identity()), |parent| self.links[parent]);
-        let mut here = carried.then(&link.at);
+            .map_or((None, DescriptionPose::identity()), |parent| self.links[parent]);
+        let mut here = carried.compose(&link.at);
         let n = link.joints.len();
         for (k, joint) in link.joints.iter().enumerate() {
             let name = if k + 1 == n {
@@ -154,63 +154,63 @@ impl Build<'_> {
             } else {
                 format!("{}_{}", link.name, joint.name)
             };
-            let tip = tip(description, index).map(|tip| tip - joint.anchor);
+            let tip = closure_point(description, index).map(|tip| tip - joint.anchor);
             (frame, here) = match joint.kind {
-                Kind::Free => self.free(joint, &here, &name),
-                Kind::Ball => self.ball(joint, frame, &here, &name, tip),
-                Kind::Turn | Kind::Slide => self.scalar(description, joint, frame, &here, &name)?,
+                DescriptionJointKind::Free => self.add_free_joint(joint, &here, &name),
+                DescriptionJointKind::Ball => self.add_ball_joint(joint, frame, &here, &name, tip),
+                DescriptionJointKind::Revolute | DescriptionJointKind::Prismatic => self.add_scalar_joint(description, joint, frame, &here, &name)?,
             };
         }
         self.links.push((frame, here));
-        self.matter(link, frame, &here)
+        self.add_inertia(link, frame, &here)
     }
 
     /// The frame of a joint that turns or slides; also where the link is in it.
     #[allow(clippy::too_many_lines, reason = "one frame, piece by piece")]
-    fn scalar(
+    fn add_scalar_joint(
         &mut self,
-        description: &Description,
-        joint: &Joint,
+        description: &RobotDescription,
+        joint: &DescriptionJoint,
         on: Option<usize>,
-        link: &Placed,
+        link: &DescriptionPose,
         name: &str,
-    ) -> Result<(Option<usize>, Placed), String> {
-        let (axis, turned) = axis(&joint.axis).ok_or_else(|| {
+    ) -> Result<(Option<usize>, DescriptionPose), String> {
+        let (axis, turned) = named_axis(&joint.axis).ok_or_else(|| {
             format!(
                 "line {}: the axis of `{}` has no direction",
                 joint.line, joint.name
             )
         })?;
-        let at = Placed {
+        let at = DescriptionPose {
             p: link.p + link.r * joint.anchor,
             r: link.r * turned,
         };
-        let follows = self.couplings.of(&joint.name).ok_or_else(|| {
+        let follows = self.couplings.find_follower(&joint.name).ok_or_else(|| {
             format!(
                 "line {}: two joints are called `{}`",
                 joint.line, joint.name
             )
         })?;
-        let is_turn = joint.kind == Kind::Turn;
+        let is_turn = joint.kind == DescriptionJointKind::Revolute;
         // Ratio, number of the variable and its name.
         let moved = follows.variable.map(|variable| {
             let coordinate = self.variable(variable);
-            self.acts(description, joint, variable, follows.ratio, follows.offset);
+            self.add_joint_forces(description, joint, variable, follows.ratio, follows.offset);
             (follows.ratio, coordinate)
         });
         let constant = follows.offset - joint.zero;
-        let shown = self.place(&joint.name, &at);
+        let shown = self.transform_text(&joint.name, &at);
         let follower = moved
             .as_ref()
             .filter(|_| follows.has_own)
             .map(|(_, leader)| self.follower(joint, leader, &follows));
-        let own = self.name(name);
+        let own = self.unique_name(name);
         let text = match (&follower, &moved) {
             (Some(follower), _) => follower.clone(),
             (None, None) => String::new(),
             (None, Some((1.0, name))) => name.clone(),
             (None, Some((-1.0, name))) => format!("-{name}"),
-            (None, Some((ratio, name))) => format!("{}*{name}", plain(*ratio)),
+            (None, Some((ratio, name))) => format!("{}*{name}", plain_number(*ratio)),
         };
         // What follows has its offset in its own coordinate.
         let left = if follower.is_some() {
@@ -236,33 +236,33 @@ impl Build<'_> {
             String::new()
         };
         let direction = turned.transpose() * joint.axis.normalize();
-        let motion = Move {
+        let motion = ChainMotion {
             is_turn,
             axis: direction,
             variable: follows.variable,
             ratio: follows.ratio,
             offset: constant,
         };
-        let back = Placed {
+        let back = DescriptionPose {
             p: -(turned.transpose() * joint.anchor),
             r: turned.transpose(),
         };
         if moved.is_none() {
             // A joint that is held is a fixed place.
-            let held = Placed {
+            let held = DescriptionPose {
                 p: if is_turn {
                     Vector3::zeros()
                 } else {
                     direction * constant
                 },
                 r: if is_turn {
-                    super::placed::about(&direction, constant)
+                    super::placed::rotation_about(&direction, constant)
                 } else {
                     Matrix3::identity()
                 },
             };
-            let at = at.then(&held);
-            let shown = self.place(&format!("{}_held", joint.name), &at);
+            let at = at.compose(&held);
+            let shown = self.transform_text(&format!("{}_held", joint.name), &at);
             let frame = self.frame(own, on, at, &shown, "", Vec::new());
             return Ok((Some(frame), back));
         }
@@ -284,8 +284,8 @@ impl Build<'_> {
     }
 
     /// A fixed part of a joint's angle or length.
-    fn offset(&mut self, name: &str, value: f64, joint: &Joint) -> String {
-        let text = if joint.kind == Kind::Turn {
+    fn offset(&mut self, name: &str, value: f64, joint: &DescriptionJoint) -> String {
+        let text = if joint.kind == DescriptionJointKind::Revolute {
             self.angle(name, value, &joint.name)
         } else {
             self.length(name, value)
@@ -294,20 +294,20 @@ impl Build<'_> {
     }
 
     /// The coordinate of a joint that follows another coordinate.
-    fn follower(&mut self, joint: &Joint, leader: &str, follows: &Follows) -> String {
-        let own = self.name(&joint.name);
+    fn follower(&mut self, joint: &DescriptionJoint, leader: &str, follows: &JointFollower) -> String {
+        let own = self.unique_name(&joint.name);
         let offset = self.offset(&format!("{}_offset", joint.name), follows.offset, joint);
         let ratio = if follows.changes_kind {
-            let unit = if joint.kind == Kind::Turn { "1/m" } else { "m" };
-            let per = self.name(&format!("{}_per_{leader}", joint.name));
+            let unit = if joint.kind == DescriptionJointKind::Revolute { "1/m" } else { "m" };
+            let per = self.unique_name(&format!("{}_per_{leader}", joint.name));
             let _ = writeln!(
                 self.constants,
                 "{per} = {{ value = {}, unit = \"{unit}\" }}",
-                float(follows.ratio)
+                toml_float(follows.ratio)
             );
             per
         } else {
-            couplings::shown(follows.ratio)
+            couplings::ratio_text(follows.ratio)
         };
         let followed = format!("{ratio}*{leader}");
         let followed = with_offset(followed, &offset);
@@ -321,9 +321,9 @@ impl Build<'_> {
             return self.coordinates[k].name.clone();
         }
         let meant = self.couplings.variables[variable].clone();
-        let name = self.name(&meant.joint);
+        let name = self.unique_name(&meant.joint);
         self.of_variable[variable] = Some(self.coordinates.len());
-        self.coordinates.push(Coordinate {
+        self.coordinates.push(ImportCoordinate {
             name: name.clone(),
             variable: Some(variable),
             nominal: 0.0,
@@ -335,10 +335,10 @@ impl Build<'_> {
     }
 
     /// Adds up what acts at a joint.
-    fn acts(
+    fn add_joint_forces(
         &mut self,
-        description: &Description,
-        joint: &Joint,
+        description: &RobotDescription,
+        joint: &DescriptionJoint,
         variable: usize,
         ratio: f64,
         offset: f64,
@@ -381,33 +381,33 @@ impl Build<'_> {
     }
 
     /// A ball joint as three angles, the last about the axis along which the link is longest.
-    fn ball(
+    fn add_ball_joint(
         &mut self,
-        joint: &Joint,
+        joint: &DescriptionJoint,
         on: Option<usize>,
-        link: &Placed,
+        link: &DescriptionPose,
         name: &str,
         tip: Option<Vector3<f64>>,
-    ) -> (Option<usize>, Placed) {
+    ) -> (Option<usize>, DescriptionPose) {
         let along = tip.map_or(0, |tip| tip.iamax());
         let axes = ["zyx", "zxy", "yxz"][along];
-        let at = Placed {
+        let at = DescriptionPose {
             p: link.p + link.r * joint.anchor,
             r: link.r,
         };
-        let shown = self.place(&joint.name, &at);
-        let own = self.name(name);
+        let shown = self.transform_text(&joint.name, &at);
+        let own = self.unique_name(name);
         let mut names = Vec::new();
         let mut moves = Vec::new();
         for (k, letter) in axes.chars().enumerate() {
             let variable = self.chain.n_variables;
             self.chain.n_variables += 1;
-            let coordinate = self.name(&format!("{}_{letter}", joint.name));
+            let coordinate = self.unique_name(&format!("{}_{letter}", joint.name));
             self.of_variable.push(Some(self.coordinates.len()));
-            self.acts.push(Acts::default());
+            self.acts.push(VariableForces::default());
             self.reluctance.push(if k == 2 { 3 } else { 4 });
             self.start.push(0.0);
-            self.coordinates.push(Coordinate {
+            self.coordinates.push(ImportCoordinate {
                 name: coordinate.clone(),
                 variable: Some(variable),
                 nominal: 0.0,
@@ -418,7 +418,7 @@ impl Build<'_> {
             names.push(coordinate);
             let mut axis = Vector3::zeros();
             axis[usize::from(letter as u8 - b'x')] = 1.0;
-            moves.push(Move {
+            moves.push(ChainMotion {
                 is_turn: true,
                 axis,
                 variable: Some(variable),
@@ -451,7 +451,7 @@ impl Build<'_> {
         let list: Vec<String> = names.iter().map(|name| format!("\"{name}\"")).collect();
         let text = format!("spherical = [{}], axes = \"{axes}\"", list.join(", "));
         let frame = self.frame(own, on, at, &shown, &text, moves);
-        let back = Placed {
+        let back = DescriptionPose {
             p: -joint.anchor,
             r: Matrix3::identity(),
         };
@@ -459,18 +459,18 @@ impl Build<'_> {
     }
 
     /// A body that hangs on nothing.
-    fn free(&mut self, joint: &Joint, link: &Placed, name: &str) -> (Option<usize>, Placed) {
-        let own = self.name(name);
+    fn add_free_joint(&mut self, joint: &DescriptionJoint, link: &DescriptionPose, name: &str) -> (Option<usize>, DescriptionPose) {
+        let own = self.unique_name(name);
         let quaternion = nalgebra::UnitQuaternion::from_matrix(&link.r);
         let [x, y, z, w] = quaternion.coords.into();
         let values = [link.p.x, link.p.y, link.p.z, w, x, y, z];
         let mut names = Vec::new();
         for (suffix, nominal) in ["x", "y", "z", "qw", "qx", "qy", "qz"].iter().zip(values) {
-            let name = self.name(&format!("{}_{suffix}", joint.name));
-            self.coordinates.push(Coordinate {
+            let name = self.unique_name(&format!("{}_{suffix}", joint.name));
+            self.coordinates.push(ImportCoordinate {
                 name: name.clone(),
                 variable: None,
-                nominal: rounded(nominal),
+                nominal: round_to_15_digits(nominal),
                 is_driven: false,
                 is_free: true,
                 is_pulled: false,
@@ -496,11 +496,11 @@ impl Build<'_> {
             ));
         }
         let frame = self.frame(own, None, *link, "", &text, Vec::new());
-        (Some(frame), Placed::identity())
+        (Some(frame), DescriptionPose::identity())
     }
 
     /// `transform` of a frame; empty where it is where its parent is.
-    fn place(&mut self, joint: &str, at: &Placed) -> String {
+    fn transform_text(&mut self, joint: &str, at: &DescriptionPose) -> String {
         let mut parts = Vec::new();
         let xyz: Vec<String> = ["x", "y", "z"]
             .iter()
@@ -524,10 +524,10 @@ impl Build<'_> {
         &mut self,
         name: String,
         on: Option<usize>,
-        at: Placed,
+        at: DescriptionPose,
         place: &str,
         joint: &str,
-        moves: Vec<Move>,
+        moves: Vec<ChainMotion>,
     ) -> usize {
         let parent = on.map_or("base", |on| self.frame_names[on].as_str());
         let _ = write!(
@@ -541,14 +541,14 @@ impl Build<'_> {
             let _ = writeln!(self.frames, "joint = {{ {joint} }}");
         }
         self.frame_names.push(name);
-        self.chain.nodes.push(Node { on, at, moves });
+        self.chain.nodes.push(ChainFrame { on, at, moves });
         self.chain.nodes.len() - 1
     }
 
     /// Puts a link into the body that carries it.
-    fn matter(&mut self, link: &Link, frame: Option<usize>, at: &Placed) -> Result<(), String> {
+    fn add_inertia(&mut self, link: &DescriptionLink, frame: Option<usize>, at: &DescriptionPose) -> Result<(), String> {
         let (name, mass, matrix) = (&link.name, link.inertial.mass, link.inertial.inertia);
-        let placed = at.then(&link.inertial.at);
+        let placed = at.compose(&link.inertial.at);
         if mass < 0.0 {
             return Err(format!(
                 "the mass of the link `{name}` is no number that a body can have"
@@ -563,15 +563,15 @@ impl Build<'_> {
         {
             self.remarks.push(format!(
                 "no body has the inertia of `{name}`: its principal moments are {}, {} and {} kg m^2",
-                digits(moments[0], 4),
-                digits(moments[1], 4),
-                digits(moments[2], 4)
+                significant_digits(moments[0], 4),
+                significant_digits(moments[1], 4),
+                significant_digits(moments[2], 4)
             ));
         }
         let Some(frame) = frame else {
             self.remarks.push(format!(
                 "`{name}` stands still; its {} kg have no effect and are left out",
-                digits(mass, 4)
+                significant_digits(mass, 4)
             ));
             return Ok(());
         };
@@ -579,7 +579,7 @@ impl Build<'_> {
         let inertia = placed.r * matrix * placed.r.transpose()
             + mass * (Matrix3::identity() * c.norm_squared() - c * c.transpose());
         if self.bodies.iter().all(|body| body.frame != frame) {
-            self.bodies.push(Body {
+            self.bodies.push(ImportBody {
                 frame,
                 mass: 0.0,
                 moment: Vector3::zeros(),
@@ -595,7 +595,7 @@ impl Build<'_> {
     }
 
     /// Closes the loops; none where there are none.
-    fn close(&mut self, description: &Description) -> Result<Option<Closed>, String> {
+    fn close(&mut self, description: &RobotDescription) -> Result<Option<LoopSolution>, String> {
         for coordinate in &mut self.coordinates {
             let Some(variable) = coordinate.variable else {
                 continue;
@@ -610,10 +610,10 @@ impl Build<'_> {
         }
         let mut pairs = Vec::new();
         for (k, closure) in description.closures.iter().enumerate() {
-            let offsets: &[[f64; 3]] = match closure.holds {
-                Holds::Origins => &[[0.0; 3]],
-                Holds::Axes => &[[0.0; 3], [ARM, 0.0, 0.0]],
-                Holds::Frames => &[[0.0; 3], [ARM, 0.0, 0.0], [0.0, ARM, 0.0]],
+            let offsets: &[[f64; 3]] = match closure.constraint {
+                ClosureConstraint::Origins => &[[0.0; 3]],
+                ClosureConstraint::Axes => &[[0.0; 3], [ORIENTATION_ARM, 0.0, 0.0]],
+                ClosureConstraint::Frames => &[[0.0; 3], [ORIENTATION_ARM, 0.0, 0.0], [0.0, ORIENTATION_ARM, 0.0]],
             };
             for offset in offsets {
                 let ends = closure.ends.map(|(link, placed)| {
@@ -626,8 +626,8 @@ impl Build<'_> {
                         }
                     }
                 });
-                self.free_ends(closure, ends.map(|(frame, _)| frame))?;
-                pairs.push(Pair { ends, closure: k });
+                self.check_free_ends(closure, ends.map(|(frame, _)| frame))?;
+                pairs.push(CoincidentPair { ends, closure: k });
             }
         }
         if pairs.is_empty() {
@@ -638,7 +638,7 @@ impl Build<'_> {
             .iter()
             .map(|acts| acts.range.filter(|[low, high]| low < high))
             .collect();
-        let closed = closing::close(&self.chain, &pairs, &self.start, &ranges, &self.reluctance)?;
+        let closed = closing::close_loops(&self.chain, &pairs, &self.start, &ranges, &self.reluctance)?;
         for coordinate in &mut self.coordinates {
             let Some(variable) = coordinate.variable else {
                 continue;
@@ -647,7 +647,7 @@ impl Build<'_> {
             let Some([low, high]) = ranges[variable] else {
                 continue;
             };
-            if (low - INSIDE..=high + INSIDE).contains(&coordinate.nominal) {
+            if (low - RANGE_TOLERANCE..=high + RANGE_TOLERANCE).contains(&coordinate.nominal) {
                 coordinate.nominal = coordinate.nominal.clamp(low, high);
             } else {
                 self.acts[variable].range = None;
@@ -675,14 +675,14 @@ impl Build<'_> {
             self.remarks.push(format!(
                 "the digits of the description close its loops to {} of their size only; points were moved by that to meet at the \
                  nominal pose",
-                digits(gap, 2)
+                significant_digits(gap, 2)
             ));
         }
         Ok(Some(closed))
     }
 
     /// Fails where a loop would act between a free body and something else.
-    fn free_ends(&self, closure: &Closure, ends: [Option<usize>; 2]) -> Result<(), String> {
+    fn check_free_ends(&self, closure: &DescriptionClosure, ends: [Option<usize>; 2]) -> Result<(), String> {
         let roots = ends.map(|mut frame| {
             let mut root = None;
             while let Some(k) = frame {
@@ -707,7 +707,7 @@ impl Build<'_> {
     }
 
     /// A name that the format takes and nothing else has.
-    fn name(&mut self, wanted: &str) -> String {
+    fn unique_name(&mut self, wanted: &str) -> String {
         let mut name: String = wanted
             .chars()
             .take(40)
@@ -731,11 +731,11 @@ impl Build<'_> {
         if value.abs() < 1e-12 {
             return "0".to_owned();
         }
-        let name = self.name(name);
+        let name = self.unique_name(name);
         let _ = writeln!(
             self.constants,
             "{name} = {{ value = {}, unit = \"m\" }}",
-            float(rounded((value * 1e13).round() / 1e13))
+            toml_float(round_to_15_digits((value * 1e13).round() / 1e13))
         );
         format!("\"{name}\"")
     }
@@ -751,22 +751,22 @@ impl Build<'_> {
             ROUNDING
         };
         if deviation < SAME_ANGLE && deviation > ROUNDING && n.abs() <= 48.0 {
-            let short = digits(deviation, 2);
+            let short = significant_digits(deviation, 2);
             self.remarks.push(if self.options.round_angles {
                 format!(
                     "an angle of `{joint}`, {value} rad, is taken for {}; it differs by {short} rad",
-                    twelfths(n)
+                    twelfths_of_pi(n)
                 )
             } else {
                 format!(
                     "an angle of `{joint}`, {value} rad, stays as it is; {}, from which it differs by {short} rad, makes shorter \
                      equations: option `round_angles` takes it for that",
-                    twelfths(n)
+                    twelfths_of_pi(n)
                 )
             });
         }
         if deviation < same && n.abs() <= 48.0 {
-            let text = twelfths(n);
+            let text = twelfths_of_pi(n);
             return if text == "0" {
                 text
             } else {
@@ -779,7 +779,7 @@ impl Build<'_> {
                 let rest = value - sign * of;
                 let n = (rest / twelfth).round();
                 if (rest - n * twelfth).abs() < ROUNDING && n.abs() <= 48.0 {
-                    let more = twelfths(n);
+                    let more = twelfths_of_pi(n);
                     return match more.strip_prefix('-') {
                         _ if more == "0" => format!("\"{minus}{known}\""),
                         Some(less) => format!("\"{minus}{known} - {less}\""),
@@ -788,22 +788,22 @@ impl Build<'_> {
                 }
             }
         }
-        let name = self.name(name);
+        let name = self.unique_name(name);
         let _ = writeln!(
             self.constants,
             "{name} = {{ value = {}, unit = \"rad\" }}",
-            float(rounded(value))
+            toml_float(round_to_15_digits(value))
         );
-        self.angles.push((name.clone(), rounded(value)));
+        self.angles.push((name.clone(), round_to_15_digits(value)));
         format!("\"{name}\"")
     }
 
     fn finish(
         mut self,
-        description: &Description,
-        closed: Option<&Closed>,
-        lines: &[Pulled<'_>],
-    ) -> Imported {
+        description: &RobotDescription,
+        closed: Option<&LoopSolution>,
+        lines: &[NamedDriveLine<'_>],
+    ) -> DescriptionImport {
         let robot = &description.name;
         let gravity = description.gravity.unwrap_or(Vector3::new(0.0, 0.0, -9.81));
         let mut text = format!(
@@ -814,7 +814,7 @@ impl Build<'_> {
                 other => format!("an {other} file"),
             },
             module_name(robot),
-            quoted(&format!("{robot}, imported"))
+            toml_string(&format!("{robot}, imported"))
         );
         let note = if description.gravity.is_some() {
             "acceleration of gravity"
@@ -830,20 +830,20 @@ impl Build<'_> {
             let _ = write!(
                 text,
                 "gravity = [0, 0, \"-g\"]\n\n[constants]\ng = {{ value = {}, unit = \"m/s^2\", note = \"{note}\" }}\n",
-                float(-gravity.z)
+                toml_float(-gravity.z)
             );
         } else {
             let _ = write!(
                 text,
                 "gravity = [{}, {}, {}]\n\n[constants]\n",
-                float(gravity.x),
-                float(gravity.y),
-                float(gravity.z)
+                toml_float(gravity.x),
+                toml_float(gravity.y),
+                toml_float(gravity.z)
             );
         }
         text.push_str(&self.constants);
         text.push_str("\n[coordinates]\n");
-        let is_passive = |coordinate: &Coordinate| matches!((closed, coordinate.variable), (Some(closed), Some(v)) if closed.passive[v]);
+        let is_passive = |coordinate: &ImportCoordinate| matches!((closed, coordinate.variable), (Some(closed), Some(v)) if closed.passive[v]);
         for coordinate in &self.coordinates {
             let more = if is_passive(coordinate) {
                 ", passive = true"
@@ -856,7 +856,7 @@ impl Build<'_> {
                 text,
                 "{} = {{ nominal = {}{more} }}",
                 coordinate.name,
-                float(rounded(coordinate.nominal))
+                toml_float(round_to_15_digits(coordinate.nominal))
             );
         }
         text.push_str(&self.followers);
@@ -865,24 +865,24 @@ impl Build<'_> {
         self.parts(&mut text);
         self.line_points(lines, &mut text);
         self.forces(&is_passive, lines, &mut text);
-        Imported {
+        DescriptionImport {
             model: text,
             remarks: self.remarks,
             joints: self.joints,
         }
     }
 
-    fn loops(&mut self, description: &Description, closed: Option<&Closed>, text: &mut String) {
+    fn loops(&mut self, description: &RobotDescription, closed: Option<&LoopSolution>, text: &mut String) {
         let Some(closed) = closed else { return };
         let mut loops = String::new();
         for pair in &closed.pairs {
-            let name = self.name(&format!(
+            let name = self.unique_name(&format!(
                 "{}_closed",
                 description.closures[pair.closure].name
             ));
             let mut points = Vec::new();
             for ((frame, at), letter) in pair.ends.iter().zip(["a", "b"]) {
-                let point = self.name(&format!("{name}_{letter}"));
+                let point = self.unique_name(&format!("{name}_{letter}"));
                 let on = frame.map_or("base", |frame| self.frame_names[frame].as_str());
                 let at: Vec<String> = at
                     .iter()
@@ -890,7 +890,7 @@ impl Build<'_> {
                         if x.abs() < 1e-12 {
                             "0".to_owned()
                         } else {
-                            float(rounded(*x))
+                            toml_float(round_to_15_digits(*x))
                         }
                     })
                     .collect();
@@ -934,7 +934,7 @@ impl Build<'_> {
             let nominal: Vec<String> = values
                 .iter()
                 .filter(|(_, v)| *v != 0.0)
-                .map(|(key, v)| format!("{key} = {}", float(rounded(*v))))
+                .map(|(key, v)| format!("{key} = {}", toml_float(round_to_15_digits(*v))))
                 .collect();
             let _ = write!(
                 text,
@@ -947,8 +947,8 @@ impl Build<'_> {
     /// Drives, what acts at coordinates, and limits.
     fn forces(
         &mut self,
-        is_passive: &dyn Fn(&Coordinate) -> bool,
-        lines: &[Pulled<'_>],
+        is_passive: &dyn Fn(&ImportCoordinate) -> bool,
+        lines: &[NamedDriveLine<'_>],
         text: &mut String,
     ) {
         let coordinates = std::mem::take(&mut self.coordinates);
@@ -962,7 +962,7 @@ impl Build<'_> {
             let has_drive = coordinate.is_driven && !is_passive(coordinate);
             let mut place = coordinate.name.clone();
             if has_drive {
-                place = self.name(&format!("{place}_drive"));
+                place = self.unique_name(&format!("{place}_drive"));
                 let _ = write!(
                     drives,
                     "\n[[drive]]\nname = \"{place}\"\njoint = \"{}\"\n",
@@ -991,13 +991,13 @@ impl Build<'_> {
                 let _ = write!(
                     effects,
                     "\n[[effect]]\nkind = \"{kind}\"\nat = [\"{effects_at}\"]\nparameters = {{ {symbol} = {{ nominal = {} }} }}\n",
-                    float(value)
+                    toml_float(value)
                 );
                 if kind == "spring" {
                     let _ = writeln!(
                         effects,
                         "constants = {{ rest = {} }}",
-                        float(acts.pull / value)
+                        toml_float(acts.pull / value)
                     );
                 }
             }
@@ -1005,12 +1005,12 @@ impl Build<'_> {
             if let Some([low, high]) = acts.range.filter(|[low, high]| low < high) {
                 limits.push(format!(
                     "position = [{}, {}]",
-                    float(rounded(low)),
-                    float(rounded(high))
+                    toml_float(round_to_15_digits(low)),
+                    toml_float(round_to_15_digits(high))
                 ));
             }
             if let Some(rate) = acts.rate.filter(|_| !is_passive(coordinate)) {
-                limits.push(format!("rate = {}", float(rate)));
+                limits.push(format!("rate = {}", toml_float(rate)));
             }
             if !limits.is_empty() {
                 let _ = writeln!(ranges, "{} = {{ {} }}", coordinate.name, limits.join(", "));
@@ -1019,8 +1019,8 @@ impl Build<'_> {
                 let _ = writeln!(
                     forces,
                     "{place} = {{ force = [{}, {}] }}",
-                    float(low),
-                    float(high)
+                    toml_float(low),
+                    toml_float(high)
                 );
             }
         }
@@ -1036,13 +1036,13 @@ impl Build<'_> {
 }
 
 /// Where a link, or one that is fixed to it, is closed to others, in the frame of the link.
-fn tip(description: &Description, index: usize) -> Option<Vector3<f64>> {
+fn closure_point(description: &RobotDescription, index: usize) -> Option<Vector3<f64>> {
     let closures = description.closures.iter();
     let mut ends = closures.flat_map(|closure| &closure.ends);
     ends.find_map(|(end, placed)| {
         let (mut link, mut at) = ((*end)?, *placed);
         while link != index {
-            let Link {
+            let DescriptionLink {
                 parent,
                 at: own,
                 joints,
@@ -1051,7 +1051,7 @@ fn tip(description: &Description, index: usize) -> Option<Vector3<f64>> {
             if !joints.is_empty() {
                 return None;
             }
-            at = own.then(&at);
+            at = own.compose(&at);
             link = (*parent)?;
         }
         Some(at.p)
@@ -1059,7 +1059,7 @@ fn tip(description: &Description, index: usize) -> Option<Vector3<f64>> {
 }
 
 /// Fifteen significant digits: what follows is rounding of sums.
-fn rounded(value: f64) -> f64 {
+fn round_to_15_digits(value: f64) -> f64 {
     format!("{value:.14e}").parse().unwrap_or(value)
 }
 
@@ -1074,11 +1074,11 @@ fn with_offset(text: String, offset: &str) -> String {
 }
 
 /// A ratio without a point where it is whole.
-fn plain(ratio: f64) -> String {
+fn plain_number(ratio: f64) -> String {
     if ratio.fract() == 0.0 {
         format!("{ratio}")
     } else {
-        float(ratio)
+        toml_float(ratio)
     }
 }
 

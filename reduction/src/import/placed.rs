@@ -4,12 +4,12 @@ use nalgebra::{Matrix3, Quaternion, Rotation3, Unit, UnitQuaternion, Vector3};
 
 /// Where something is in a frame.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Placed {
+pub(crate) struct DescriptionPose {
     pub(crate) p: Vector3<f64>,
     pub(crate) r: Matrix3<f64>,
 }
 
-impl Placed {
+impl DescriptionPose {
     pub(crate) fn identity() -> Self {
         Self {
             p: Vector3::zeros(),
@@ -18,14 +18,14 @@ impl Placed {
     }
 
     /// From a position and roll, pitch and yaw.
-    pub(crate) fn of(xyz: [f64; 3], rpy: [f64; 3]) -> Self {
+    pub(crate) fn from_xyz_rpy(xyz: [f64; 3], rpy: [f64; 3]) -> Self {
         Self {
             p: Vector3::from(xyz),
             r: rotation(rpy),
         }
     }
 
-    pub(crate) fn then(&self, next: &Self) -> Self {
+    pub(crate) fn compose(&self, next: &Self) -> Self {
         Self {
             p: self.p + self.r * next.p,
             r: self.r * next.r,
@@ -42,17 +42,17 @@ impl Placed {
 }
 
 /// A turn about an axis of unit length.
-pub(crate) fn about(axis: &Vector3<f64>, angle: f64) -> Matrix3<f64> {
+pub(crate) fn rotation_about(axis: &Vector3<f64>, angle: f64) -> Matrix3<f64> {
     Rotation3::from_axis_angle(&Unit::new_unchecked(*axis), angle).into_inner()
 }
 
 /// `Rz(yaw) Ry(pitch) Rx(roll)`.
 pub(crate) fn rotation([roll, pitch, yaw]: [f64; 3]) -> Matrix3<f64> {
-    about(&Vector3::z(), yaw) * about(&Vector3::y(), pitch) * about(&Vector3::x(), roll)
+    rotation_about(&Vector3::z(), yaw) * rotation_about(&Vector3::y(), pitch) * rotation_about(&Vector3::x(), roll)
 }
 
 /// The rotation of a quaternion w, x, y, z of any length; none where it is zero.
-pub(crate) fn of_quaternion([w, x, y, z]: [f64; 4]) -> Option<Matrix3<f64>> {
+pub(crate) fn rotation_from_quaternion([w, x, y, z]: [f64; 4]) -> Option<Matrix3<f64>> {
     let quaternion = Quaternion::new(w, x, y, z);
     let length = quaternion.norm();
     (length > 1e-12 && length.is_finite()).then(|| {
@@ -77,7 +77,7 @@ pub(crate) fn roll_pitch_yaw(r: &Matrix3<f64>) -> [f64; 3] {
 }
 
 /// A multiple of a twelfth of pi as an expression.
-pub(crate) fn twelfths(n: f64) -> String {
+pub(crate) fn twelfths_of_pi(n: f64) -> String {
     #[allow(clippy::cast_possible_truncation, reason = "at most 48")]
     let n = n as i64;
     let common = (1..=12)
@@ -96,7 +96,7 @@ pub(crate) fn twelfths(n: f64) -> String {
 }
 
 /// The name of an axis, or z and the rotation that turns z into it.
-pub(crate) fn axis(direction: &Vector3<f64>) -> Option<(&'static str, Matrix3<f64>)> {
+pub(crate) fn named_axis(direction: &Vector3<f64>) -> Option<(&'static str, Matrix3<f64>)> {
     let length = direction.norm();
     if !(length > 0.0 && length.is_finite()) {
         return None;

@@ -5,9 +5,9 @@
 use nalgebra::{Matrix3, Vector3};
 use roxmltree::{Document, Node};
 
-use super::description::{Closure, Coupling, Description, Holds, Inertial, Joint, Kind, Link};
-use super::placed::{Placed, of_quaternion, rotation};
-use super::xml::{at, child, children, exactly, line, required, symmetric, vector, word};
+use super::description::{DescriptionClosure, DescriptionCoupling, RobotDescription, ClosureConstraint, DescriptionInertia, DescriptionJoint, DescriptionJointKind, DescriptionLink};
+use super::placed::{DescriptionPose, rotation_from_quaternion, rotation};
+use super::xml::{located_message, child, children, exact_numbers, line, required_child, symmetric, vector, required_attribute};
 
 /// Values beyond this stand for "no limit".
 const NO_LIMIT: f64 = 1e15;
@@ -15,7 +15,7 @@ const NO_LIMIT: f64 = 1e15;
 const LONGEST_CHAIN: usize = 1000;
 
 /// A frame that poses may refer to.
-struct Frame<'a, 'i> {
+struct SdfFrame<'a, 'i> {
     name: String,
     node: Node<'a, 'i>,
     /// What the pose is relative to unless the file says otherwise.
@@ -23,19 +23,19 @@ struct Frame<'a, 'i> {
 }
 
 /// A joint between two links.
-struct Between {
+struct SdfJoint {
     parent: Option<usize>,
     child: Option<usize>,
-    joints: Vec<Joint>,
+    joints: Vec<DescriptionJoint>,
     /// Of the joint, in the model.
-    place: Placed,
+    place: DescriptionPose,
     name: String,
     line: u32,
     kind: String,
 }
 
 /// Reads a description, or says in one line what is wrong and where.
-pub(crate) fn read(document: &Document) -> Result<Description, String> {
+pub(crate) fn read(document: &Document) -> Result<RobotDescription, String> {
     let root = document.root_element();
     let version: f64 = root
         .attribute("version")
@@ -46,20 +46,20 @@ pub(crate) fn read(document: &Document) -> Result<Description, String> {
         children(&root, "model").chain(world.iter().flat_map(|world| children(world, "model")));
     let model = models
         .next()
-        .ok_or_else(|| at(&root, "it needs a <model>"))?;
+        .ok_or_else(|| located_message(&root, "it needs a <model>"))?;
     if let Some(other) = models.next() {
-        return Err(at(
+        return Err(located_message(
             &other,
             "a second model in one file; keep the one that is wanted",
         ));
     }
-    let mut out = Description {
+    let mut out = RobotDescription {
         name: model.attribute("name").unwrap_or("robot").to_owned(),
         format: "SDF",
-        ..Description::default()
+        ..RobotDescription::default()
     };
     if let Some(node) = world.and_then(|world| child(&world, "gravity")) {
-        out.gravity = Some(vector(exactly(
+        out.gravity = Some(vector(exact_numbers(
             &node,
             "gravity",
             node.text().unwrap_or(""),
@@ -69,19 +69,19 @@ pub(crate) fn read(document: &Document) -> Result<Description, String> {
         .children()
         .find(|node| ["model", "include"].contains(&node.tag_name().name()))
     {
-        return Err(at(
+        return Err(located_message(
             &inner,
             "models inside of models are not expanded here; `gz sdf -p` prints one flat model",
         ));
     }
     if text_of(&model, "static").is_some_and(|text| ["true", "1"].contains(&text)) {
-        return Err(at(&model, "it is static: nothing moves"));
+        return Err(located_message(&model, "it is static: nothing moves"));
     }
-    let frames = frames(&model)?;
+    let frames = model_frames(&model)?;
     let links: Vec<Node> = children(&model, "link").collect();
     let mut places = Vec::new();
     for node in &links {
-        places.push(in_model(&frames, &word(node, "name")?, node, 0)?);
+        places.push(pose_in_model(&frames, &required_attribute(node, "name")?, node, 0)?);
     }
     let mut joints = Vec::new();
     for node in children(&model, "joint") {
@@ -89,7 +89,7 @@ pub(crate) fn read(document: &Document) -> Result<Description, String> {
     }
     let own = match child(&model, "pose") {
         Some(pose) => pose_of(&pose)?,
-        None => Placed::identity(),
+        None => DescriptionPose::identity(),
     };
     let base = model
         .attribute("canonical_link")
@@ -111,12 +111,12 @@ fn number_of(node: &Node, tag: &str) -> Result<Option<f64>, String> {
     let Some(inner) = child(node, tag) else {
         return Ok(None);
     };
-    exactly(&inner, tag, inner.text().unwrap_or("")).map(|[x]| Some(x))
+    exact_numbers(&inner, tag, inner.text().unwrap_or("")).map(|[x]| Some(x))
 }
 
 /// All frames of a model by name.
-fn frames<'a, 'i>(model: &Node<'a, 'i>) -> Result<Vec<Frame<'a, 'i>>, String> {
-    let mut out: Vec<Frame> = Vec::new();
+fn model_frames<'a, 'i>(model: &Node<'a, 'i>) -> Result<Vec<SdfFrame<'a, 'i>>, String> {
+    let mut out: Vec<SdfFrame> = Vec::new();
     for node in model.children().filter(Node::is_element) {
         let usually = match node.tag_name().name() {
             "link" => "__model__".to_owned(),
@@ -127,14 +127,14 @@ fn frames<'a, 'i>(model: &Node<'a, 'i>) -> Result<Vec<Frame<'a, 'i>>, String> {
                 .to_owned(),
             _ => continue,
         };
-        let name = word(&node, "name")?;
+        let name = required_attribute(&node, "name")?;
         if out
             .iter()
             .any(|frame| frame.name == name && frame.node.tag_name() == node.tag_name())
         {
-            return Err(at(&node, "this name is there twice"));
+            return Err(located_message(&node, "this name is there twice"));
         }
-        out.push(Frame {
+        out.push(SdfFrame {
             name,
             node,
             usually,
@@ -144,52 +144,52 @@ fn frames<'a, 'i>(model: &Node<'a, 'i>) -> Result<Vec<Frame<'a, 'i>>, String> {
 }
 
 /// Where a frame is in the model.
-fn in_model(frames: &[Frame], name: &str, from: &Node, depth: usize) -> Result<Placed, String> {
+fn pose_in_model(frames: &[SdfFrame], name: &str, from: &Node, depth: usize) -> Result<DescriptionPose, String> {
     if name == "__model__" || name.is_empty() || name == "world" {
-        return Ok(Placed::identity());
+        return Ok(DescriptionPose::identity());
     }
     if depth > LONGEST_CHAIN {
-        return Err(at(from, "its pose refers to itself by way of others"));
+        return Err(located_message(from, "its pose refers to itself by way of others"));
     }
     let frame = frames
         .iter()
         .find(|frame| frame.name == name)
-        .ok_or_else(|| at(from, &format!("no frame is called `{name}`")))?;
+        .ok_or_else(|| located_message(from, &format!("no frame is called `{name}`")))?;
     let pose = child(&frame.node, "pose");
     let relative = pose
         .and_then(|pose| pose.attribute("relative_to").or(pose.attribute("frame")))
         .filter(|name| !name.is_empty())
         .unwrap_or(&frame.usually);
-    let placed = pose.map_or(Ok(Placed::identity()), |pose| pose_of(&pose))?;
-    Ok(in_model(frames, relative, &frame.node, depth + 1)?.then(&placed))
+    let placed = pose.map_or(Ok(DescriptionPose::identity()), |pose| pose_of(&pose))?;
+    Ok(pose_in_model(frames, relative, &frame.node, depth + 1)?.compose(&placed))
 }
 
 /// The numbers of a `<pose>`.
-fn pose_of(node: &Node) -> Result<Placed, String> {
+fn pose_of(node: &Node) -> Result<DescriptionPose, String> {
     let text = node.text().unwrap_or("").trim();
     if text.is_empty() {
-        return Ok(Placed::identity());
+        return Ok(DescriptionPose::identity());
     }
     if node.attribute("rotation_format") == Some("quat_xyzw") {
-        let [px, py, pz, x, y, z, w] = exactly(node, "pose", text)?;
-        return Ok(Placed {
+        let [px, py, pz, x, y, z, w] = exact_numbers(node, "pose", text)?;
+        return Ok(DescriptionPose {
             p: Vector3::new(px, py, pz),
-            r: of_quaternion([w, x, y, z]).ok_or_else(|| at(node, "the quaternion is zero"))?,
+            r: rotation_from_quaternion([w, x, y, z]).ok_or_else(|| located_message(node, "the quaternion is zero"))?,
         });
     }
-    let [px, py, pz, angles @ ..] = exactly::<6>(node, "pose", text)?;
+    let [px, py, pz, angles @ ..] = exact_numbers::<6>(node, "pose", text)?;
     let is_degree = node.attribute("degrees") == Some("true");
-    Ok(Placed {
+    Ok(DescriptionPose {
         p: Vector3::new(px, py, pz),
         r: rotation(angles.map(|angle: f64| if is_degree { angle.to_radians() } else { angle })),
     })
 }
 
-fn inertial(node: &Node) -> Result<Inertial, String> {
+fn inertial(node: &Node) -> Result<DescriptionInertia, String> {
     let given = child(node, "inertial");
-    let mut out = Inertial {
+    let mut out = DescriptionInertia {
         mass: 1.0,
-        at: Placed::identity(),
+        at: DescriptionPose::identity(),
         inertia: Matrix3::identity(),
     };
     let Some(given) = given else {
@@ -198,7 +198,7 @@ fn inertial(node: &Node) -> Result<Inertial, String> {
     if let Some(auto) = given.attribute("auto")
         && auto == "true"
     {
-        return Err(at(
+        return Err(located_message(
             &given,
             "mass and inertia from shapes are not worked out here; write them into the file",
         ));
@@ -209,7 +209,7 @@ fn inertial(node: &Node) -> Result<Inertial, String> {
             .attribute("relative_to")
             .is_some_and(|name| !name.is_empty())
         {
-            return Err(at(
+            return Err(located_message(
                 &pose,
                 "the pose of an inertial is that in its link; delete `relative_to`",
             ));
@@ -232,13 +232,13 @@ fn inertial(node: &Node) -> Result<Inertial, String> {
 fn joint(
     node: &Node,
     links: &[Node],
-    frames: &[Frame],
+    frames: &[SdfFrame],
     version: f64,
-    out: &mut Description,
-) -> Result<Between, String> {
-    let name = word(node, "name")?;
+    out: &mut RobotDescription,
+) -> Result<SdfJoint, String> {
+    let name = required_attribute(node, "name")?;
     let end = |tag: &str| -> Result<Option<usize>, String> {
-        let inner = required(node, tag)?;
+        let inner = required_child(node, tag)?;
         let mut name = inner.text().unwrap_or("").trim().to_owned();
         // A frame stands for the link that it is attached to.
         for _ in 0..LONGEST_CHAIN {
@@ -254,27 +254,27 @@ fn joint(
             let frame = frames
                 .iter()
                 .find(|frame| frame.name == name)
-                .ok_or_else(|| at(&inner, &format!("no link is called `{name}`")))?;
+                .ok_or_else(|| located_message(&inner, &format!("no link is called `{name}`")))?;
             if frame.usually == "__model__" {
                 return Ok(links.first().map(|_| 0));
             }
             name.clone_from(&frame.usually);
         }
-        Err(at(
+        Err(located_message(
             &inner,
             "its frame is attached to itself by way of others",
         ))
     };
-    let kind = word(node, "type")?;
-    let wanted: &[(&str, Kind)] = match kind.as_str() {
+    let kind = required_attribute(node, "type")?;
+    let wanted: &[(&str, DescriptionJointKind)] = match kind.as_str() {
         "fixed" => &[],
-        "revolute" | "continuous" => &[("axis", Kind::Turn)],
-        "prismatic" => &[("axis", Kind::Slide)],
-        "ball" => &[("", Kind::Ball)],
-        "universal" | "revolute2" => &[("axis", Kind::Turn), ("axis2", Kind::Turn)],
-        "screw" => &[("axis", Kind::Turn), ("axis", Kind::Slide)],
+        "revolute" | "continuous" => &[("axis", DescriptionJointKind::Revolute)],
+        "prismatic" => &[("axis", DescriptionJointKind::Prismatic)],
+        "ball" => &[("", DescriptionJointKind::Ball)],
+        "universal" | "revolute2" => &[("axis", DescriptionJointKind::Revolute), ("axis2", DescriptionJointKind::Revolute)],
+        "screw" => &[("axis", DescriptionJointKind::Revolute), ("axis", DescriptionJointKind::Prismatic)],
         other => {
-            return Err(at(
+            return Err(located_message(
                 node,
                 &format!(
                     "models have no joint of the type {other}; write it as several of revolute, prismatic, screw, ball and fixed"
@@ -282,28 +282,28 @@ fn joint(
             ));
         }
     };
-    let place = in_model(frames, &name_in(frames, node, &name)?, node, 0)?;
+    let place = pose_in_model(frames, &name_in(frames, node, &name)?, node, 0)?;
     let (parent, child_link) = (end("parent")?, end("child")?);
     let mut joints = Vec::new();
     for (k, (tag, kind)) in wanted.iter().enumerate() {
         let suffix = if k == 0 { "" } else { "_2" };
-        let mut joint = Joint::new(format!("{name}{suffix}"), *kind, line(node));
+        let mut joint = DescriptionJoint::new(format!("{name}{suffix}"), *kind, line(node));
         if let Some(axis) = child(node, tag) {
             read_axis(&mut joint, &axis, frames, version, &place, out)?;
-        } else if *kind != Kind::Ball {
-            return Err(at(node, &format!("it needs <{tag}>")));
+        } else if *kind != DescriptionJointKind::Ball {
+            return Err(located_message(node, &format!("it needs <{tag}>")));
         }
         joints.push(joint);
     }
     if let [turn, slide] = joints.as_mut_slice()
         && kind == "screw"
     {
-        out.couplings.push(screw(node, turn, slide)?);
+        out.couplings.push(screw_coupling(node, turn, slide)?);
     }
     if let Some(physics) = child(node, "sensor").or(child(node, "physics")) {
-        out.remarks.push(at(&physics, "not read"));
+        out.remarks.push(located_message(&physics, "not read"));
     }
-    Ok(Between {
+    Ok(SdfJoint {
         parent,
         child: child_link,
         joints,
@@ -315,30 +315,30 @@ fn joint(
 }
 
 /// A screw: limits and losses are those of its turn, and what slides follows.
-fn screw(node: &Node, turn: &Joint, slide: &mut Joint) -> Result<Coupling, String> {
+fn screw_coupling(node: &Node, turn: &DescriptionJoint, slide: &mut DescriptionJoint) -> Result<DescriptionCoupling, String> {
     let pitch = number_of(node, "screw_thread_pitch")?.ok_or_else(|| {
-        at(
+        located_message(
             node,
             "it needs <screw_thread_pitch>, in metres for each turn; the older <thread_pitch> had several meanings",
         )
     })?;
-    let mut bare = Joint::new(slide.name.clone(), Kind::Slide, slide.line);
+    let mut bare = DescriptionJoint::new(slide.name.clone(), DescriptionJointKind::Prismatic, slide.line);
     (bare.axis, bare.anchor) = (slide.axis, slide.anchor);
     bare.is_driven = false;
     *slide = bare;
-    Ok(Coupling {
+    Ok(DescriptionCoupling {
         line: line(node),
         joint: slide.name.clone(),
-        of: Some(turn.name.clone()),
+        leader: Some(turn.name.clone()),
         ratio: pitch / std::f64::consts::TAU,
         offset: 0.0,
     })
 }
 
 /// The name under which a joint's own frame is found; links and joints may share names in old files.
-fn name_in(frames: &[Frame], node: &Node, name: &str) -> Result<String, String> {
+fn name_in(frames: &[SdfFrame], node: &Node, name: &str) -> Result<String, String> {
     if frames.iter().filter(|frame| frame.name == name).count() > 1 {
-        return Err(at(
+        return Err(located_message(
             node,
             "a joint and a link or frame have this name, so that poses cannot tell them apart; rename one",
         ));
@@ -348,12 +348,12 @@ fn name_in(frames: &[Frame], node: &Node, name: &str) -> Result<String, String> 
 
 /// Axis (in the axes of the model), limits and losses of one degree of freedom.
 fn read_axis(
-    joint: &mut Joint,
+    joint: &mut DescriptionJoint,
     node: &Node,
-    frames: &[Frame],
+    frames: &[SdfFrame],
     version: f64,
-    place: &Placed,
-    out: &mut Description,
+    place: &DescriptionPose,
+    out: &mut RobotDescription,
 ) -> Result<(), String> {
     let (xyz, turned) = match child(node, "xyz") {
         Some(xyz) => {
@@ -361,11 +361,11 @@ fn read_axis(
                 .attribute("expressed_in")
                 .filter(|name| !name.is_empty());
             let turned = match given {
-                Some(name) => in_model(frames, name, node, 0)?.r,
+                Some(name) => pose_in_model(frames, name, node, 0)?.r,
                 None => place.r,
             };
             (
-                vector(exactly(&xyz, "xyz", xyz.text().unwrap_or(""))?),
+                vector(exact_numbers(&xyz, "xyz", xyz.text().unwrap_or(""))?),
                 turned,
             )
         }
@@ -377,7 +377,7 @@ fn read_axis(
     };
     joint.axis = if in_model_frame { xyz } else { turned * xyz };
     if joint.axis.norm() == 0.0 {
-        return Err(at(node, "the axis has no direction"));
+        return Err(located_message(node, "the axis has no direction"));
     }
     if let Some(limit) = child(node, "limit") {
         let low = number_of(&limit, "lower")?.filter(|x| *x > -NO_LIMIT);
@@ -404,16 +404,16 @@ fn read_axis(
         joint.armature = rotor * gear * gear;
     }
     if let Some(mimic) = child(node, "mimic") {
-        let mut of = word(&mimic, "joint")?;
+        let mut of = required_attribute(&mimic, "joint")?;
         if mimic.attribute("axis") == Some("axis2") {
             of.push_str("_2");
         }
         let ratio = number_of(&mimic, "multiplier")?.unwrap_or(1.0);
         let reference = number_of(&mimic, "reference")?.unwrap_or(0.0);
-        out.couplings.push(Coupling {
+        out.couplings.push(DescriptionCoupling {
             line: line(&mimic),
             joint: joint.name.clone(),
-            of: Some(of),
+            leader: Some(of),
             ratio,
             offset: number_of(&mimic, "offset")?.unwrap_or(0.0) - ratio * reference,
         });
@@ -427,11 +427,11 @@ fn read_axis(
     reason = "tree first, then what closes rings, on the same tables"
 )]
 fn tree(
-    out: &mut Description,
+    out: &mut RobotDescription,
     nodes: &[Node],
-    places: &[Placed],
-    joints: &[Between],
-    own: &Placed,
+    places: &[DescriptionPose],
+    joints: &[SdfJoint],
+    own: &DescriptionPose,
     base: usize,
 ) -> Result<(), String> {
     // Which joints belong to the tree: the world is the last part.
@@ -466,13 +466,13 @@ fn tree(
                 format!("_{}", nodes[link].attribute("name").unwrap_or_default())
             };
             index[link] = Some(out.links.len());
-            out.links.push(Link {
-                name: word(&nodes[link], "name")?,
+            out.links.push(DescriptionLink {
+                name: required_attribute(&nodes[link], "name")?,
                 parent: None,
-                at: own.then(&places[link]),
-                joints: vec![Joint::new(
+                at: own.compose(&places[link]),
+                joints: vec![DescriptionJoint::new(
                     format!("base{suffix}"),
-                    Kind::Free,
+                    DescriptionJointKind::Free,
                     line(&nodes[link]),
                 )],
                 inertial: inertial(&nodes[link])?,
@@ -497,14 +497,14 @@ fn tree(
                 let to_link = places[link].inverse();
                 let mut moving = between.joints.clone();
                 for joint in &mut moving {
-                    joint.anchor = to_link.then(&between.place).p;
+                    joint.anchor = to_link.compose(&between.place).p;
                     joint.axis = to_link.r * joint.axis;
                     if !is_forward {
                         joint.axis = -joint.axis;
                     }
                 }
                 if !is_forward {
-                    if moving.iter().any(|joint| joint.kind == Kind::Ball) {
+                    if moving.iter().any(|joint| joint.kind == DescriptionJointKind::Ball) {
                         out.remarks.push(format!(
                             "line {}: the ball joint `{}` is passed from child to parent: its angles are those of the parent",
                             between.line, between.name
@@ -513,10 +513,10 @@ fn tree(
                     moving.reverse();
                 }
                 index[link] = Some(out.links.len());
-                out.links.push(Link {
-                    name: word(&nodes[link], "name")?,
+                out.links.push(DescriptionLink {
+                    name: required_attribute(&nodes[link], "name")?,
                     parent: here.and_then(|link| index[link]),
-                    at: carrier.inverse().then(&places[link]),
+                    at: carrier.inverse().compose(&places[link]),
                     joints: moving,
                     inertial: inertial(&nodes[link])?,
                 });
@@ -531,9 +531,9 @@ fn tree(
         .map(|(b, _)| b)
     {
         let holds = match between.kind.as_str() {
-            "ball" => Holds::Origins,
-            "revolute" | "continuous" => Holds::Axes,
-            "fixed" => Holds::Frames,
+            "ball" => ClosureConstraint::Origins,
+            "revolute" | "continuous" => ClosureConstraint::Axes,
+            "fixed" => ClosureConstraint::Frames,
             other => {
                 return Err(format!(
                     "line {}: the joint `{}` closes a loop and is {other}; loops are closed by ball, revolute and fixed joints",
@@ -542,7 +542,7 @@ fn tree(
             }
         };
         let mut place = between.place;
-        if let (Holds::Axes, Some(joint)) = (holds, between.joints.first()) {
+        if let (ClosureConstraint::Axes, Some(joint)) = (holds, between.joints.first()) {
             let turned = nalgebra::Rotation3::rotation_between(&Vector3::x(), &joint.axis);
             // Against x it is half a turn about any axis across.
             place.r = turned.map_or_else(
@@ -551,8 +551,8 @@ fn tree(
             );
         }
         let end = |link: Option<usize>| match link {
-            Some(link) => (index[link], places[link].inverse().then(&place)),
-            None => (None, own.then(&place)),
+            Some(link) => (index[link], places[link].inverse().compose(&place)),
+            None => (None, own.compose(&place)),
         };
         for joint in &between.joints {
             if joint.damping != 0.0 || joint.friction != 0.0 || joint.stiffness != 0.0 {
@@ -562,11 +562,11 @@ fn tree(
                 ));
             }
         }
-        out.closures.push(Closure {
+        out.closures.push(DescriptionClosure {
             name: between.name.clone(),
             line: between.line,
             ends: [end(between.parent), end(between.child)],
-            holds,
+            constraint: holds,
         });
     }
     Ok(())

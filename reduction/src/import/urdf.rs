@@ -5,18 +5,18 @@
 use nalgebra::Vector3;
 use roxmltree::{Document, Node};
 
-use super::closures_file::{self, Becomes, Closures};
-use super::description::{Closure, Coupling, Description, Holds, Inertial, Joint, Kind, Link};
-use super::placed::Placed;
-use super::xml::{at, child, children, line, number, required, symmetric, three, vector, word};
+use super::closures_file::{self, JointReplacement, ClosureFile};
+use super::description::{DescriptionClosure, DescriptionCoupling, RobotDescription, ClosureConstraint, DescriptionInertia, DescriptionJoint, DescriptionJointKind, DescriptionLink};
+use super::placed::DescriptionPose;
+use super::xml::{located_message, child, children, line, number_attribute, required_child, symmetric, three_numbers, vector, required_attribute};
 
 /// A joint between two links, as the file has it.
-struct Between {
+struct UrdfJoint {
     parent: String,
     child: String,
-    origin: Placed,
+    origin: DescriptionPose,
     /// One after the other; none is fixed.
-    joints: Vec<Joint>,
+    joints: Vec<DescriptionJoint>,
     name: String,
     line: u32,
 }
@@ -27,12 +27,12 @@ pub(crate) fn read(
     document: &Document,
     closures: Option<&str>,
     is_floating: bool,
-) -> Result<Description, String> {
+) -> Result<RobotDescription, String> {
     let robot = document.root_element();
-    let mut out = Description {
+    let mut out = RobotDescription {
         name: robot.attribute("name").unwrap_or("robot").to_owned(),
         format: "URDF",
-        ..Description::default()
+        ..RobotDescription::default()
     };
     let links: Vec<Node> = children(&robot, "link").collect();
     let mut joints = Vec::new();
@@ -42,9 +42,9 @@ pub(crate) fn read(
     let closures = closures.map(closures_file::read).transpose()?;
     if let Some(file) = &closures {
         out.remarks.extend(file.remarks.iter().cloned());
-        replace(&mut joints, &file.joints)?;
+        replace_joints(&mut joints, &file.joints)?;
     }
-    follow_fixed(&mut out, &joints);
+    resolve_fixed_couplings(&mut out, &joints);
     for node in children(&robot, "transmission") {
         for reduction in node.descendants().filter(|node| {
             node.tag_name().name() == "mechanicalReduction"
@@ -64,22 +64,22 @@ pub(crate) fn read(
         .children()
         .find(|node| node.tag_name().name() == "loop_joint")
     {
-        return Err(at(
+        return Err(located_message(
             &node,
             "a proposal for closed chains that was never settled; write the closure into a robot.yaml beside the file",
         ));
     }
     check_names(&links, &joints)?;
-    let root = root(&links, &joints)?;
+    let root = root_link(&links, &joints)?;
     let mut order = vec![(root, None)];
     let mut k = 0;
     while k < order.len() {
         let (node, between): (Node, Option<usize>) = order[k];
-        let name = word(&node, "name")?;
-        let mut link = Link {
+        let name = required_attribute(&node, "name")?;
+        let mut link = DescriptionLink {
             name: name.clone(),
             parent: None,
-            at: Placed::identity(),
+            at: DescriptionPose::identity(),
             joints: Vec::new(),
             inertial: inertial(&node)?,
         };
@@ -88,8 +88,8 @@ pub(crate) fn read(
             link.parent = out.links.iter().position(|link| link.name == joint.parent);
             link.at = joint.origin;
             link.joints.clone_from(&joint.joints);
-            if joint.joints.iter().any(|j| j.kind == Kind::Free)
-                && joint.parent != word(&root, "name")?
+            if joint.joints.iter().any(|j| j.kind == DescriptionJointKind::Free)
+                && joint.parent != required_attribute(&root, "name")?
             {
                 return Err(format!(
                     "line {}: the joint `{}` is floating on a link that is not the root; a free body hangs on nothing",
@@ -98,7 +98,7 @@ pub(crate) fn read(
             }
         } else if is_floating {
             link.joints
-                .push(Joint::new("root_joint".to_owned(), Kind::Free, line(&node)));
+                .push(DescriptionJoint::new("root_joint".to_owned(), DescriptionJointKind::Free, line(&node)));
         }
         out.links.push(link);
         for (j, joint) in joints.iter().enumerate() {
@@ -128,41 +128,41 @@ pub(crate) fn read(
             .iter()
             .all(|link| Some(link.name.as_str()) != node.attribute("name"))
     }) {
-        return Err(at(
+        return Err(located_message(
             node,
             "it is in a ring of joints that the root does not reach",
         ));
     }
     if let Some(file) = closures {
-        close(&mut out, &joints, file)?;
+        add_closures(&mut out, &joints, file)?;
     }
     Ok(out)
 }
 
 /// Puts in the place of joints what the file of closures says that they are.
-fn replace(joints: &mut [Between], by: &[(String, Becomes)]) -> Result<(), String> {
+fn replace_joints(joints: &mut [UrdfJoint], by: &[(String, JointReplacement)]) -> Result<(), String> {
     for (name, becomes) in by {
         let found = joints.iter_mut().find(|joint| &joint.name == name);
-        let Some(Between { joints, line, .. }) = found else {
+        let Some(UrdfJoint { joints, line, .. }) = found else {
             return Err(format!(
                 "the file of closures says what `{name}` is, which is no joint"
             ));
         };
         let old = std::mem::take(joints);
-        let new = |name: String, kind: Kind| {
-            let mut joint = Joint::new(name, kind, *line);
+        let new = |name: String, kind: DescriptionJointKind| {
+            let mut joint = DescriptionJoint::new(name, kind, *line);
             (joint.damping, joint.friction) = old
                 .first()
                 .map_or((0.0, 0.0), |old| (old.damping, old.friction));
             joint
         };
         match becomes {
-            Becomes::Fixed => {}
-            Becomes::Ball => joints.push(new(name.clone(), Kind::Ball)),
-            Becomes::Cross(axes) => {
+            JointReplacement::Fixed => {}
+            JointReplacement::Ball => joints.push(new(name.clone(), DescriptionJointKind::Ball)),
+            JointReplacement::Cross(axes) => {
                 for letter in axes {
                     let own = format!("{name}_{}", letter.to_ascii_uppercase());
-                    let mut joint = new(own, Kind::Turn);
+                    let mut joint = new(own, DescriptionJointKind::Revolute);
                     joint.axis = Vector3::zeros();
                     joint.axis[usize::from(*letter as u8 - b'x')] = 1.0;
                     joints.push(joint);
@@ -174,14 +174,14 @@ fn replace(joints: &mut [Between], by: &[(String, Becomes)]) -> Result<(), Strin
 }
 
 /// A joint that is fixed follows nothing, and what follows a fixed one is held.
-fn follow_fixed(out: &mut Description, joints: &[Between]) {
+fn resolve_fixed_couplings(out: &mut RobotDescription, joints: &[UrdfJoint]) {
     let is_fixed = |name: &str| {
         let mut joints = joints.iter();
         joints.any(|joint| joint.name == name && joint.joints.is_empty())
     };
     let remarks = &mut out.remarks;
     out.couplings.retain_mut(|coupling| {
-        if let Some(of) = coupling.of.take_if(|of| is_fixed(of)) {
+        if let Some(of) = coupling.leader.take_if(|of| is_fixed(of)) {
             remarks.push(format!(
                 "line {}: `{}` follows `{of}`, which is fixed: it is held at {}",
                 coupling.line, coupling.joint, coupling.offset
@@ -198,14 +198,14 @@ fn follow_fixed(out: &mut Description, joints: &[Between]) {
     });
 }
 
-fn check_names(links: &[Node], joints: &[Between]) -> Result<(), String> {
+fn check_names(links: &[Node], joints: &[UrdfJoint]) -> Result<(), String> {
     for (i, node) in links.iter().enumerate() {
-        let name = word(node, "name")?;
+        let name = required_attribute(node, "name")?;
         if links[..i]
             .iter()
             .any(|other| other.attribute("name") == Some(name.as_str()))
         {
-            return Err(at(
+            return Err(located_message(
                 node,
                 &format!("two links are called `{name}`; rename one"),
             ));
@@ -234,7 +234,7 @@ fn check_names(links: &[Node], joints: &[Between]) -> Result<(), String> {
 }
 
 /// The link that no joint moves; all others must hang on it.
-fn root<'a, 'i>(links: &[Node<'a, 'i>], joints: &[Between]) -> Result<Node<'a, 'i>, String> {
+fn root_link<'a, 'i>(links: &[Node<'a, 'i>], joints: &[UrdfJoint]) -> Result<Node<'a, 'i>, String> {
     let is_child = |node: &&Node| {
         joints
             .iter()
@@ -244,7 +244,7 @@ fn root<'a, 'i>(links: &[Node<'a, 'i>], joints: &[Between]) -> Result<Node<'a, '
     match (roots.next(), roots.next()) {
         (Some(root), None) => Ok(*root),
         (None, _) => Err("no link is the root: every link hangs on another".to_owned()),
-        (Some(one), Some(two)) => Err(at(
+        (Some(one), Some(two)) => Err(located_message(
             two,
             &format!(
                 "this link and `{}` hang on nothing; join them to one robot",
@@ -254,36 +254,36 @@ fn root<'a, 'i>(links: &[Node<'a, 'i>], joints: &[Between]) -> Result<Node<'a, '
     }
 }
 
-fn inertial(node: &Node) -> Result<Inertial, String> {
+fn inertial(node: &Node) -> Result<DescriptionInertia, String> {
     let Some(inertial) = child(node, "inertial") else {
-        return Ok(Inertial::default());
+        return Ok(DescriptionInertia::default());
     };
-    let mass = number(&required(&inertial, "mass")?, "value")?;
-    let inertia = required(&inertial, "inertia")?;
+    let mass = number_attribute(&required_child(&inertial, "mass")?, "value")?;
+    let inertia = required_child(&inertial, "inertia")?;
     let mut entries = [0.0; 6];
     for (entry, key) in entries
         .iter_mut()
         .zip(["ixx", "iyy", "izz", "ixy", "ixz", "iyz"])
     {
-        *entry = number(&inertia, key)?;
+        *entry = number_attribute(&inertia, key)?;
     }
-    Ok(Inertial {
+    Ok(DescriptionInertia {
         mass,
         at: origin(&inertial)?,
         inertia: symmetric(entries),
     })
 }
 
-fn joint(node: &Node, out: &mut Description) -> Result<Between, String> {
-    let name = word(node, "name")?;
-    let kind = match word(node, "type")?.as_str() {
+fn joint(node: &Node, out: &mut RobotDescription) -> Result<UrdfJoint, String> {
+    let name = required_attribute(node, "name")?;
+    let kind = match required_attribute(node, "type")?.as_str() {
         "fixed" => None,
-        "revolute" | "continuous" => Some(Kind::Turn),
-        "prismatic" => Some(Kind::Slide),
-        "floating" => Some(Kind::Free),
-        "spherical" | "ball" => Some(Kind::Ball),
+        "revolute" | "continuous" => Some(DescriptionJointKind::Revolute),
+        "prismatic" => Some(DescriptionJointKind::Prismatic),
+        "floating" => Some(DescriptionJointKind::Free),
+        "spherical" | "ball" => Some(DescriptionJointKind::Ball),
         other => {
-            return Err(at(
+            return Err(located_message(
                 node,
                 &format!(
                     "this joint is {other}; models have revolute, continuous, prismatic, floating and fixed joints: write it \
@@ -294,21 +294,21 @@ fn joint(node: &Node, out: &mut Description) -> Result<Between, String> {
     };
     let (limit, dynamics) = (child(node, "limit"), child(node, "dynamics"));
     let given = |of: Option<Node>, key: &str| match of {
-        Some(node) if node.has_attribute(key) => number(&node, key).map(Some),
+        Some(node) if node.has_attribute(key) => number_attribute(&node, key).map(Some),
         _ => Ok(None),
     };
     let mut moving = None;
     if let Some(kind) = kind {
-        let mut joint = Joint::new(name.clone(), kind, line(node));
+        let mut joint = DescriptionJoint::new(name.clone(), kind, line(node));
         joint.axis = match child(node, "axis") {
-            Some(axis) => vector(three(&axis, "xyz")?),
+            Some(axis) => vector(three_numbers(&axis, "xyz")?),
             None => vector([1.0, 0.0, 0.0]),
         };
-        if joint.axis.norm() == 0.0 && matches!(kind, Kind::Turn | Kind::Slide) {
-            return Err(at(node, "the axis has no direction"));
+        if joint.axis.norm() == 0.0 && matches!(kind, DescriptionJointKind::Revolute | DescriptionJointKind::Prismatic) {
+            return Err(located_message(node, "the axis has no direction"));
         }
         let (lower, upper) = (given(limit, "lower")?, given(limit, "upper")?);
-        if word(node, "type")? != "continuous" && (lower.is_some() || upper.is_some()) {
+        if required_attribute(node, "type")? != "continuous" && (lower.is_some() || upper.is_some()) {
             // An absent bound is zero, says the format.
             let range = [lower.unwrap_or(0.0), upper.unwrap_or(0.0)];
             joint.range = (range[0] < range[1]).then_some(range);
@@ -322,17 +322,17 @@ fn joint(node: &Node, out: &mut Description) -> Result<Between, String> {
         moving = Some(joint);
     }
     if let Some(mimic) = child(node, "mimic") {
-        out.couplings.push(Coupling {
+        out.couplings.push(DescriptionCoupling {
             line: line(&mimic),
             joint: name.clone(),
-            of: Some(word(&mimic, "joint")?),
+            leader: Some(required_attribute(&mimic, "joint")?),
             ratio: given(Some(mimic), "multiplier")?.unwrap_or(1.0),
             offset: given(Some(mimic), "offset")?.unwrap_or(0.0),
         });
     }
-    Ok(Between {
-        parent: word(&required(node, "parent")?, "link")?,
-        child: word(&required(node, "child")?, "link")?,
+    Ok(UrdfJoint {
+        parent: required_attribute(&required_child(node, "parent")?, "link")?,
+        child: required_attribute(&required_child(node, "child")?, "link")?,
         origin: origin(node)?,
         joints: moving.into_iter().collect(),
         name,
@@ -341,22 +341,22 @@ fn joint(node: &Node, out: &mut Description) -> Result<Between, String> {
 }
 
 /// The `<origin>` of an element; without one it is where the element is.
-fn origin(of: &Node) -> Result<Placed, String> {
+fn origin(of: &Node) -> Result<DescriptionPose, String> {
     let Some(node) = child(of, "origin") else {
-        return Ok(Placed::identity());
+        return Ok(DescriptionPose::identity());
     };
     let or_zeros = |key: &str| {
         if node.has_attribute(key) {
-            three(&node, key)
+            three_numbers(&node, key)
         } else {
             Ok([0.0; 3])
         }
     };
-    Ok(Placed::of(or_zeros("xyz")?, or_zeros("rpy")?))
+    Ok(DescriptionPose::from_xyz_rpy(or_zeros("xyz")?, or_zeros("rpy")?))
 }
 
 /// Puts in what a file of closures says: frames that coincide and joints that are driven.
-fn close(out: &mut Description, joints: &[Between], file: Closures) -> Result<(), String> {
+fn add_closures(out: &mut RobotDescription, joints: &[UrdfJoint], file: ClosureFile) -> Result<(), String> {
     let place = |name: &str| -> Result<Option<usize>, String> {
         let joint = joints.iter().find(|joint| joint.name == name);
         let link = joint.map_or(name, |joint| joint.child.as_str());
@@ -367,15 +367,15 @@ fn close(out: &mut Description, joints: &[Between], file: Closures) -> Result<()
     };
     for closure in file.pairs {
         let [one, other] = &closure.ends;
-        let ends = [place(one)?, place(other)?].map(|link| (link, Placed::identity()));
-        out.closures.push(Closure {
+        let ends = [place(one)?, place(other)?].map(|link| (link, DescriptionPose::identity()));
+        out.closures.push(DescriptionClosure {
             name: format!("{one}_{other}"),
             line: closure.line,
             ends,
-            holds: if closure.is_full {
-                Holds::Frames
+            constraint: if closure.is_full {
+                ClosureConstraint::Frames
             } else {
-                Holds::Origins
+                ClosureConstraint::Origins
             },
         });
     }

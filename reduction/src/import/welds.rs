@@ -7,34 +7,34 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::description::{Closure, Description, Holds, Joint, Kind, Link};
-use super::placed::Placed;
+use super::description::{DescriptionClosure, RobotDescription, ClosureConstraint, DescriptionJoint, DescriptionJointKind, DescriptionLink};
+use super::placed::DescriptionPose;
 
 /// Axes meet where they come this near to each other, m.
-const MEET: f64 = 1e-9;
+const MEETING_DISTANCE: f64 = 1e-9;
 /// Axes whose volume is below this do not turn about all directions.
-const FLAT: f64 = 1e-6;
+const COPLANAR_VOLUME: f64 = 1e-6;
 
 /// A joint at which a loop can be cut.
-struct Cut {
+struct LoopCut {
     /// From the welded link upwards to the one that hangs on the joint.
-    turned: Vec<usize>,
+    inverted_links: Vec<usize>,
     /// Links that weigh nothing between the parts of the joint.
-    within: Vec<usize>,
+    massless_links: Vec<usize>,
     /// The place of the joint in the link that hangs on it, its axis along x.
-    at: Placed,
-    holds: Holds,
+    at: DescriptionPose,
+    constraint: ClosureConstraint,
 }
 
-impl Cut {
+impl LoopCut {
     /// Points before axes, and then as little as can be hung anew.
     fn rank(&self) -> (bool, usize) {
-        (self.holds != Holds::Origins, self.turned.len())
+        (self.constraint != ClosureConstraint::Origins, self.inverted_links.len())
     }
 }
 
 /// Cuts welds at joints, where there are such.
-pub(crate) fn cut_at_joints(description: &mut Description) {
+pub(crate) fn cut_at_joints(description: &mut RobotDescription) {
     for k in 0..description.closures.len() {
         let closure = &mut description.closures[k];
         for (link, placed) in &mut closure.ends {
@@ -42,34 +42,34 @@ pub(crate) fn cut_at_joints(description: &mut Description) {
             while let Some(own) = *link
                 && description.links[own].joints.is_empty()
             {
-                *placed = description.links[own].at.then(placed);
+                *placed = description.links[own].at.compose(placed);
                 *link = description.links[own].parent;
             }
         }
-        if closure.holds != Holds::Frames {
+        if closure.constraint != ClosureConstraint::Frames {
             continue;
         }
         let ends = closure.ends.map(|(link, _)| link);
         let cuts = [1, 0].map(|end| {
-            let best = cuts(description, ends[end], ends[1 - end])
+            let best = possible_cuts(description, ends[end], ends[1 - end])
                 .into_iter()
-                .min_by_key(Cut::rank);
+                .min_by_key(LoopCut::rank);
             best.map(|cut| (end, cut))
         });
         if let Some((end, cut)) = cuts.into_iter().flatten().min_by_key(|(_, cut)| cut.rank()) {
-            apply(description, k, end, &cut);
+            apply_cut(description, k, end, &cut);
         }
     }
-    sort(description);
+    sort_links(description);
 }
 
 /// A link and those that carry it.
-fn ancestors(links: &[Link], link: Option<usize>) -> Vec<usize> {
+fn ancestors(links: &[DescriptionLink], link: Option<usize>) -> Vec<usize> {
     std::iter::successors(link, |link| links[*link].parent).collect()
 }
 
 /// The joints at which what hangs between them and one end of a weld can go to the other end.
-fn cuts(description: &Description, end: Option<usize>, other: Option<usize>) -> Vec<Cut> {
+fn possible_cuts(description: &RobotDescription, end: Option<usize>, other: Option<usize>) -> Vec<LoopCut> {
     let links = &description.links;
     let shared = ancestors(links, other);
     let mut turned = Vec::new();
@@ -79,13 +79,13 @@ fn cuts(description: &Description, end: Option<usize>, other: Option<usize>) -> 
             break;
         }
         turned.push(link);
-        found.extend(cut(description, &turned));
+        found.extend(cut_below(description, &turned));
         // Only what has one axis can be hung the other way round.
         let joints = &links[link].joints;
         if joints.len() > 1
             || joints
                 .iter()
-                .any(|j| matches!(j.kind, Kind::Ball | Kind::Free))
+                .any(|j| matches!(j.kind, DescriptionJointKind::Ball | DescriptionJointKind::Free))
         {
             break;
         }
@@ -94,12 +94,12 @@ fn cuts(description: &Description, end: Option<usize>, other: Option<usize>) -> 
 }
 
 /// The cut between the last of some links and what carries it.
-fn cut(description: &Description, turned: &[usize]) -> Option<Cut> {
+fn cut_below(description: &RobotDescription, turned: &[usize]) -> Option<LoopCut> {
     let links = &description.links;
-    let may_go = |joint: &Joint| {
+    let may_go = |joint: &DescriptionJoint| {
         let mut couplings = description.couplings.iter();
         let is_coupled =
-            couplings.any(|c| c.joint == joint.name || c.of.as_ref() == Some(&joint.name));
+            couplings.any(|c| c.joint == joint.name || c.leader.as_ref() == Some(&joint.name));
         let acts = [
             joint.damping,
             joint.friction,
@@ -109,9 +109,9 @@ fn cut(description: &Description, turned: &[usize]) -> Option<Cut> {
         !joint.is_driven && !is_coupled && acts.iter().all(|x| x.abs() <= 0.0)
     };
     // Joints upwards, each with its place in the link that hangs on them while all stand at their zero.
-    let mut found: Vec<(Kind, Placed)> = Vec::new();
+    let mut found: Vec<(DescriptionJointKind, DescriptionPose)> = Vec::new();
     let mut within = Vec::new();
-    let mut seen = Placed::identity();
+    let mut seen = DescriptionPose::identity();
     let own = *turned.last()?;
     let mut here = own;
     loop {
@@ -120,18 +120,18 @@ fn cut(description: &Description, turned: &[usize]) -> Option<Cut> {
             break;
         }
         for joint in link.joints.iter().rev() {
-            let at = Placed {
+            let at = DescriptionPose {
                 p: joint.anchor,
-                r: along_x(&joint.axis)?,
+                r: axes_along(&joint.axis)?,
             };
-            found.push((joint.kind, seen.then(&at)));
+            found.push((joint.kind, seen.compose(&at)));
         }
         if is_ball(&found) {
-            return Some(Cut {
-                turned: turned.to_vec(),
-                within,
+            return Some(LoopCut {
+                inverted_links: turned.to_vec(),
+                massless_links: within,
                 at: found[0].1,
-                holds: Holds::Origins,
+                constraint: ClosureConstraint::Origins,
             });
         }
         let parent = link.parent?;
@@ -146,35 +146,35 @@ fn cut(description: &Description, turned: &[usize]) -> Option<Cut> {
         if !is_bare || found.len() >= 3 {
             break;
         }
-        seen = seen.then(&link.at.inverse());
+        seen = seen.compose(&link.at.inverse());
         here = parent;
         within.push(here);
     }
     // One hinge by itself, if no ball joint is there.
     let (kind, at) = found.first()?;
-    (*kind == Kind::Turn && links[own].joints.len() == 1).then(|| Cut {
-        turned: turned.to_vec(),
-        within: Vec::new(),
+    (*kind == DescriptionJointKind::Revolute && links[own].joints.len() == 1).then(|| LoopCut {
+        inverted_links: turned.to_vec(),
+        massless_links: Vec::new(),
         at: *at,
-        holds: Holds::Axes,
+        constraint: ClosureConstraint::Axes,
     })
 }
 
 /// Whether joints are one ball joint together.
-fn is_ball(found: &[(Kind, Placed)]) -> bool {
+fn is_ball(found: &[(DescriptionJointKind, DescriptionPose)]) -> bool {
     match found {
-        [(Kind::Ball, _)] => true,
-        [(Kind::Turn, a), (Kind::Turn, b), (Kind::Turn, c)] => {
-            let meet = |x: &Placed| (x.p - a.p).amax() < MEET;
+        [(DescriptionJointKind::Ball, _)] => true,
+        [(DescriptionJointKind::Revolute, a), (DescriptionJointKind::Revolute, b), (DescriptionJointKind::Revolute, c)] => {
+            let meet = |x: &DescriptionPose| (x.p - a.p).amax() < MEETING_DISTANCE;
             let axes = Matrix3::from_columns(&[a.r.column(0), b.r.column(0), c.r.column(0)]);
-            meet(b) && meet(c) && axes.determinant().abs() > FLAT
+            meet(b) && meet(c) && axes.determinant().abs() > COPLANAR_VOLUME
         }
         _ => false,
     }
 }
 
 /// Axes of which x points along a direction.
-fn along_x(direction: &Vector3<f64>) -> Option<Matrix3<f64>> {
+fn axes_along(direction: &Vector3<f64>) -> Option<Matrix3<f64>> {
     let x = direction.try_normalize(0.0)?;
     let mut away = Vector3::zeros();
     away[x.iamin()] = 1.0;
@@ -183,21 +183,21 @@ fn along_x(direction: &Vector3<f64>) -> Option<Matrix3<f64>> {
 }
 
 /// Hangs what lies between weld and joint on the other end of the weld, and makes the joint the closure.
-fn apply(description: &mut Description, closure: usize, end: usize, cut: &Cut) {
+fn apply_cut(description: &mut RobotDescription, closure: usize, end: usize, cut: &LoopCut) {
     let (other, there) = description.closures[closure].ends[1 - end];
     let (_, here) = description.closures[closure].ends[end];
-    let own = cut.turned[cut.turned.len() - 1];
+    let own = cut.inverted_links[cut.inverted_links.len() - 1];
     // Where the joint is in what carries it.
     let parts: Vec<usize> = [own]
         .into_iter()
-        .chain(cut.within.iter().copied())
+        .chain(cut.massless_links.iter().copied())
         .collect();
     let mut carrier = None;
     let mut in_carrier = cut.at;
     let mut names = Vec::new();
     for part in parts {
         let link = &mut description.links[part];
-        in_carrier = link.at.then(&in_carrier);
+        in_carrier = link.at.compose(&in_carrier);
         carrier = link.parent;
         let joints = std::mem::take(&mut link.joints);
         names.extend(
@@ -208,15 +208,15 @@ fn apply(description: &mut Description, closure: usize, end: usize, cut: &Cut) {
         );
     }
     names.reverse();
-    let (mut parent, mut at, mut joints) = (other, there.then(&here.inverse()), Vec::new());
-    for link in &cut.turned {
+    let (mut parent, mut at, mut joints) = (other, there.compose(&here.inverse()), Vec::new());
+    for link in &cut.inverted_links {
         let now = &mut description.links[*link];
         let before = std::mem::replace(&mut now.at, at);
         let reversed = std::mem::replace(&mut now.joints, joints);
         now.parent = parent;
         joints = reversed
             .into_iter()
-            .map(|joint| Joint {
+            .map(|joint| DescriptionJoint {
                 anchor: before.p + before.r * joint.anchor,
                 axis: -(before.r * joint.axis),
                 ..joint
@@ -225,10 +225,10 @@ fn apply(description: &mut Description, closure: usize, end: usize, cut: &Cut) {
         parent = Some(*link);
         at = before.inverse();
     }
-    let Closure {
-        line, ends, holds, ..
+    let DescriptionClosure {
+        line, ends, constraint: holds, ..
     } = &mut description.closures[closure];
-    *holds = cut.holds;
+    *holds = cut.constraint;
     *ends = [(carrier, in_carrier), (Some(own), cut.at)];
     let says = format!(
         "line {line}: the loop is cut at {}, which {} no coordinate of {} own here",
@@ -240,7 +240,7 @@ fn apply(description: &mut Description, closure: usize, end: usize, cut: &Cut) {
 }
 
 /// Puts parents before their children again, in the order in which they stood otherwise.
-fn sort(description: &mut Description) {
+fn sort_links(description: &mut RobotDescription) {
     let mut order: Vec<usize> = Vec::new();
     while order.len() < description.links.len() {
         for (k, link) in description.links.iter().enumerate() {
@@ -255,12 +255,12 @@ fn sort(description: &mut Description) {
             *link = link.map(place);
         }
     }
-    for line in &mut description.lines {
+    for line in &mut description.straight_drives {
         for (link, _) in &mut line.ends {
             *link = link.map(place);
         }
     }
-    let mut links: Vec<(usize, Link)> = description.links.drain(..).enumerate().collect();
+    let mut links: Vec<(usize, DescriptionLink)> = description.links.drain(..).enumerate().collect();
     for (_, link) in &mut links {
         link.parent = link.parent.map(place);
     }

@@ -16,14 +16,14 @@ pub(crate) fn children<'a, 'i>(
         .filter(move |node| node.tag_name().name() == tag)
 }
 
-pub(crate) fn required<'a, 'i>(of: &Node<'a, 'i>, tag: &str) -> Result<Node<'a, 'i>, String> {
-    child(of, tag).ok_or_else(|| at(of, &format!("it needs <{tag}>")))
+pub(crate) fn required_child<'a, 'i>(of: &Node<'a, 'i>, tag: &str) -> Result<Node<'a, 'i>, String> {
+    child(of, tag).ok_or_else(|| located_message(of, &format!("it needs <{tag}>")))
 }
 
-pub(crate) fn word(of: &Node, key: &str) -> Result<String, String> {
+pub(crate) fn required_attribute(of: &Node, key: &str) -> Result<String, String> {
     let text = of.attribute(key);
     text.map(str::to_owned)
-        .ok_or_else(|| at(of, &format!("it needs the attribute `{key}`")))
+        .ok_or_else(|| located_message(of, &format!("it needs the attribute `{key}`")))
 }
 
 /// Finite numbers between blanks.
@@ -32,10 +32,10 @@ pub(crate) fn numbers(of: &Node, key: &str, text: &str) -> Result<Vec<f64>, Stri
         .split_whitespace()
         .map(|part| part.parse().ok().filter(|x: &f64| x.is_finite()))
         .collect();
-    parsed.ok_or_else(|| at(of, &format!("expected finite numbers in `{key}`")))
+    parsed.ok_or_else(|| located_message(of, &format!("expected finite numbers in `{key}`")))
 }
 
-pub(crate) fn exactly<const N: usize>(
+pub(crate) fn exact_numbers<const N: usize>(
     of: &Node,
     key: &str,
     text: &str,
@@ -44,16 +44,16 @@ pub(crate) fn exactly<const N: usize>(
     let n = found.len();
     found
         .try_into()
-        .map_err(|_| at(of, &format!("expected {N} numbers in `{key}`, found {n}")))
+        .map_err(|_| located_message(of, &format!("expected {N} numbers in `{key}`, found {n}")))
 }
 
-pub(crate) fn number(of: &Node, key: &str) -> Result<f64, String> {
-    let text = word(of, key)?;
-    exactly(of, key, &text).map(|[x]| x)
+pub(crate) fn number_attribute(of: &Node, key: &str) -> Result<f64, String> {
+    let text = required_attribute(of, key)?;
+    exact_numbers(of, key, &text).map(|[x]| x)
 }
 
-pub(crate) fn three(of: &Node, key: &str) -> Result<[f64; 3], String> {
-    exactly(of, key, &word(of, key)?)
+pub(crate) fn three_numbers(of: &Node, key: &str) -> Result<[f64; 3], String> {
+    exact_numbers(of, key, &required_attribute(of, key)?)
 }
 
 /// A symmetric matrix of its entries xx, yy, zz, xy, xz, yz.
@@ -70,7 +70,7 @@ pub(crate) fn line(node: &Node) -> u32 {
 }
 
 /// A fault with the place of its element.
-pub(crate) fn at(node: &Node, fault: &str) -> String {
+pub(crate) fn located_message(node: &Node, fault: &str) -> String {
     let name = node
         .attribute("name")
         .map_or_else(String::new, |name| format!(" `{name}`"));

@@ -1,12 +1,12 @@
 //! What is not exact is found and sized: each number here is worked out by hand.
 
-use modelmill_boundary::files::Memory;
-use modelmill_reduction::{Finding, Reduction, plan, plan_for, reduce, sampled_forces};
+use modelmill_boundary::files::MemoryFiles;
+use modelmill_reduction::{ReductionFinding, PlanarReduction, plan, plan_for, reduce, sampled_forces};
 use modelmill_rig::Rig;
 
 fn rig(text: &str) -> Rig {
     let text = format!("schema = 1\nname = \"test\"\ngravity = [0, -9.81, 0]\n{text}");
-    modelmill_rig::load("test.toml", &text, &Memory::default())
+    modelmill_rig::load("test.toml", &text, &MemoryFiles::default())
         .unwrap_or_else(|f| panic!("{f}"))
         .rig
 }
@@ -58,12 +58,12 @@ lumped_mass = [{ name = "rod", groups = ["rod"], at = ["near", "far"] }]
 drive = [{ name = "ram", contact_on_axis = true }]
 "#;
 
-fn reduced() -> Reduction {
+fn reduced() -> PlanarReduction {
     let plan = plan("plan.toml", PLAN).unwrap_or_else(|failure| panic!("{failure}"));
     reduce(&machine(), &plan).unwrap_or_else(|failure| panic!("{failure}"))
 }
 
-fn finding(reduction: &Reduction, about: &str, says: &str) -> Finding {
+fn finding(reduction: &PlanarReduction, about: &str, says: &str) -> ReductionFinding {
     let found = reduction
         .report
         .findings
@@ -152,15 +152,15 @@ fn a_rig_without_a_plan() {
         coordinate = [{ name = "phi", joint = "shaft" }]
         drive = [{ name = "motor", joint = "shaft" }]
     "#);
-    let plan = plan_for(&rig).unwrap_or_else(|says| panic!("{says}"));
+    let plan = default_plan(&rig).unwrap_or_else(|says| panic!("{says}"));
     let reduction = reduce(plan.rig(&rig), &plan).unwrap_or_else(|failure| panic!("{failure}"));
-    let mechanism = modelmill_spec::load("model.toml", &reduction.model, &Memory::default())
+    let mechanism = modelmill_spec::load("model.toml", &reduction.model, &MemoryFiles::default())
         .expect("a model")
         .mechanism;
     assert_eq!((mechanism.parts.len(), mechanism.loops.len()), (3, 1));
     let derivation = modelmill_codegen::derive(&mechanism).expect("a derivation");
     let sampled = sampled_forces(&rig, 40, 0.3).expect("forces");
-    let column = |of: fn(&modelmill_rig::State) -> f64| -> Vec<f64> {
+    let column = |of: fn(&modelmill_rig::RigState) -> f64| -> Vec<f64> {
         sampled.iter().map(|(s, _)| of(s)).collect()
     };
     let (q, qd, qdd) = (
@@ -168,13 +168,13 @@ fn a_rig_without_a_plan() {
         column(|s| s.qd[0]),
         column(|s| s.qdd[0]),
     );
-    let states = modelmill_codegen::States {
+    let states = modelmill_codegen::MotionStates {
         q: vec![&q],
         qd: vec![&qd],
         qdd: vec![&qdd],
         load: Vec::new(),
     };
-    let evaluator = modelmill_codegen::Evaluator::new(&derivation);
+    let evaluator = modelmill_codegen::ModelEvaluator::new(&derivation);
     let found = evaluator
         .inverse_dynamics(&states, &derivation.nominal_base_values())
         .expect("forces");
@@ -186,7 +186,7 @@ fn a_rig_without_a_plan() {
         );
     }
 
-    let says = plan_for(&machine()).expect_err("a weld");
+    let says = default_plan(&machine()).expect_err("a weld");
     assert!(
         says.contains("`weld` is no revolute joint") && says.contains("option `plan`"),
         "{says}"

@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use modelmill_boundary::files::Disk;
-use modelmill_codegen::{Evaluator, States, derive};
+use modelmill_boundary::files::DiskFiles;
+use modelmill_codegen::{ModelEvaluator, MotionStates, derive};
 use modelmill_reduction::{ExportFormat, ImportOptions, export, import};
-use modelmill_spec::{DriveKind, Loaded, Mechanism};
+use modelmill_spec::{DriveKind, LoadedModel, Mechanism};
 
 fn bundled(name: &str) -> Mechanism {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../model-spec/models");
@@ -15,8 +15,8 @@ fn bundled(name: &str) -> Mechanism {
         .mechanism
 }
 
-fn loaded(name: &str, text: &str) -> Loaded {
-    modelmill_spec::load(name, text, &Disk::default())
+fn loaded(name: &str, text: &str) -> LoadedModel {
+    modelmill_spec::load(name, text, &DiskFiles::default())
         .unwrap_or_else(|failure| panic!("{name}: {failure}\n{text}"))
 }
 
@@ -41,7 +41,7 @@ fn motion(mechanism: &Mechanism, samples: usize) -> Vec<(String, [Vec<f64>; 3])>
 /// Forces of the drives along a motion, by the coordinates of joints or by their own names.
 fn forces(mechanism: &Mechanism, motion: &[(String, [Vec<f64>; 3])]) -> Vec<(String, Vec<f64>)> {
     let derivation = derive(mechanism).expect("a derivation");
-    let evaluator = Evaluator::new(&derivation);
+    let evaluator = ModelEvaluator::new(&derivation);
     let active = mechanism.coordinates.iter().filter(|one| !one.passive);
     let names: Vec<&str> = active.map(|one| one.name.as_str()).collect();
     let column = |k: usize| -> Vec<&[f64]> {
@@ -51,7 +51,7 @@ fn forces(mechanism: &Mechanism, motion: &[(String, [Vec<f64>; 3])]) -> Vec<(Str
         };
         names.iter().map(of).collect()
     };
-    let states = States {
+    let states = MotionStates {
         q: column(0),
         qd: column(1),
         qdd: column(2),

@@ -51,7 +51,7 @@ fn options_that_change_forces_are_said() {
 }
 
 /// A bar that a tendon lifts, with what else pulls.
-fn pulled(tendon: &str, actuators: &str) -> Result<modelmill_reduction::Imported, String> {
+fn pulled(tendon: &str, actuators: &str) -> Result<modelmill_reduction::DescriptionImport, String> {
     let inside = "<site name=\"tip\" pos=\"0.3 0 0\"/>";
     let one = bar("bar", "0 0 0", inside);
     let text = format!(

@@ -2,10 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use modelmill_boundary::files::Memory;
-use modelmill_codegen::{Derivation, Evaluator, States};
-use modelmill_reduction::{Reduction, plan_file, reduce};
-use modelmill_rig::{Rig, State, Tracker, forces};
+use modelmill_boundary::files::MemoryFiles;
+use modelmill_codegen::{Derivation, ModelEvaluator, MotionStates};
+use modelmill_reduction::{PlanarReduction, plan_file, reduce};
+use modelmill_rig::{Rig, RigState, RigTracker, forces};
 
 fn workspace(path: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(path)
@@ -18,14 +18,14 @@ fn rig() -> Rig {
         .rig
 }
 
-fn reduced() -> Reduction {
+fn reduced() -> PlanarReduction {
     let plan = plan_file(&workspace("model-spec/rigs/spidermill-plan.toml"))
         .unwrap_or_else(|f| panic!("{f}"));
     reduce(&rig(), &plan).unwrap_or_else(|failure| panic!("{failure}"))
 }
 
 fn derived(text: &str) -> Derivation {
-    let loaded = modelmill_spec::load("model.toml", text, &Memory::default());
+    let loaded = modelmill_spec::load("model.toml", text, &MemoryFiles::default());
     let loaded = loaded.unwrap_or_else(|failure| panic!("{failure}"));
     assert_eq!(loaded.render(false), "", "no warnings");
     modelmill_codegen::derive(&loaded.mechanism).expect("a derivation")
@@ -106,14 +106,14 @@ fn rods_and_coupled_drives_go_over() {
     holds_the_forces(&rig, &reduced);
 }
 
-fn holds_the_forces(rig: &Rig, reduced: &Reduction) {
+fn holds_the_forces(rig: &Rig, reduced: &PlanarReduction) {
     let derivation = derived(&reduced.model);
-    let mut tracker = Tracker::new(rig).expect("a pose");
+    let mut tracker = RigTracker::new(rig).expect("a pose");
     let mut columns = vec![Vec::new(); 6];
     let mut expected = vec![Vec::new(); 2];
     for i in 0..60 {
         let wave = |k: f64| (k * f64::from(i)).sin();
-        let state = State {
+        let state = RigState {
             q: vec![
                 1.8 + 0.2 * wave(0.7),
                 1.341_592_653_589_793 + 0.2 * wave(1.1),
@@ -130,14 +130,14 @@ fn holds_the_forces(rig: &Rig, reduced: &Reduction) {
         }
     }
     let slices = |range: std::ops::Range<usize>| columns[range].iter().map(Vec::as_slice).collect();
-    let states = States {
+    let states = MotionStates {
         q: slices(0..2),
         qd: slices(2..4),
         qdd: slices(4..6),
         load: Vec::new(),
     };
     let values = derivation.nominal_base_values();
-    let found = Evaluator::new(&derivation)
+    let found = ModelEvaluator::new(&derivation)
         .inverse_dynamics(&states, &values)
         .expect("forces");
     for (found, expected) in found.iter().zip(&expected) {
@@ -173,29 +173,29 @@ fn the_report_names_every_approximation() {
         finding("G8", "perpendicular")
             .sizes
             .iter()
-            .all(|size| !size.is_felt())
+            .all(|size| !size.is_significant())
     );
     // Step 2: eq. (1) holds for the cranks, not for the coupling, which only translates.
     assert!(
         finding("S1", "50.9597")
             .sizes
             .iter()
-            .all(|size| !size.is_felt())
+            .all(|size| !size.is_significant())
     );
     let elbow = finding("elbow_left", "only translates");
     assert!(
-        !elbow.sizes[0].is_felt() && (elbow.sizes[1].value - 0.018_f64.hypot(0.062)).abs() < 1e-9
+        !elbow.sizes[0].is_significant() && (elbow.sizes[1].value - 0.018_f64.hypot(0.062)).abs() < 1e-9
     );
     // A point mass has no inertia about itself.
     assert!((elbow.sizes[2].value - 0.12).abs() < 1e-9);
     // Step 3: both sides are alike.
-    assert!(!finding("m1", "S1 and S7").sizes[0].is_felt());
+    assert!(!finding("m1", "S1 and S7").sizes[0].is_significant());
     // Step 4: the spindles push where they did.
     assert!(
         finding("spindle_left", "same points")
             .sizes
             .iter()
-            .all(|size| !size.is_felt())
+            .all(|size| !size.is_significant())
     );
     let steps: Vec<u8> = report.findings.iter().map(|finding| finding.step).collect();
     assert!((1..=4).all(|step| steps.contains(&step)));

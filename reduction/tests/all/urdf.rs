@@ -1,9 +1,9 @@
 //! A robot description of ROS as a starting point: its model must have the forces that another path gives.
 
-use modelmill_boundary::files::Memory;
-use modelmill_codegen::{Derivation, Evaluator, States};
+use modelmill_boundary::files::MemoryFiles;
+use modelmill_codegen::{Derivation, ModelEvaluator, MotionStates};
 use modelmill_reduction::{ImportOptions, import};
-use modelmill_rig::{State, Tracker, forces};
+use modelmill_rig::{RigState, RigTracker, forces};
 
 /// An arm with a joint along a slanted axis, a prismatic one, a tool behind a fixed joint, and roundings as CAD
 /// exports have them.
@@ -141,13 +141,13 @@ fn rig() -> modelmill_rig::Rig {
         text.push_str(&named("drive", &format!("{name}_drive"), name));
     }
     text += "[[effect]]\nkind = \"viscous_friction\"\nat = [\"shoulder_drive\"]\nvalues = { Fv = 0.8 }\n";
-    modelmill_rig::load("arm.toml", &text, &Memory::default())
+    modelmill_rig::load("arm.toml", &text, &MemoryFiles::default())
         .unwrap_or_else(|f| panic!("{f}"))
         .rig
 }
 
 fn derived(text: &str) -> Derivation {
-    let loaded = modelmill_spec::load("model.toml", text, &Memory::default());
+    let loaded = modelmill_spec::load("model.toml", text, &MemoryFiles::default());
     modelmill_codegen::derive(
         &loaded
             .unwrap_or_else(|failure| panic!("{failure}"))
@@ -173,13 +173,13 @@ fn an_imported_arm_has_the_forces_of_its_rig() {
         .collect();
     assert_eq!(names, ["shoulder", "elbow", "quill"]);
     let rig = rig();
-    let mut tracker = Tracker::new(&rig).expect("a pose");
+    let mut tracker = RigTracker::new(&rig).expect("a pose");
     let mut columns = vec![Vec::new(); 9];
     let mut expected = vec![Vec::new(); 3];
     for i in 0..40 {
         let wave = |k: f64| (k * f64::from(i)).sin();
         let draw = |k: f64| vec![wave(k), wave(k + 0.3), 0.2 * wave(k + 0.7)];
-        let state = State {
+        let state = RigState {
             q: draw(0.7),
             qd: draw(1.9),
             qdd: draw(2.9),
@@ -193,13 +193,13 @@ fn an_imported_arm_has_the_forces_of_its_rig() {
         }
     }
     let slices = |range: std::ops::Range<usize>| columns[range].iter().map(Vec::as_slice).collect();
-    let states = States {
+    let states = MotionStates {
         q: slices(0..3),
         qd: slices(3..6),
         qdd: slices(6..9),
         load: Vec::new(),
     };
-    let found = Evaluator::new(&derivation)
+    let found = ModelEvaluator::new(&derivation)
         .inverse_dynamics(&states, &derivation.nominal_base_values())
         .expect("forces");
     for (found, expected) in found.iter().zip(&expected) {

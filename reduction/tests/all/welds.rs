@@ -1,8 +1,8 @@
 //! A strut welded to a crank's pin, and the same strut hung on the pin from the start: one mechanism, whatever its file says.
 
-use modelmill_boundary::files::Memory;
-use modelmill_codegen::{Derivation, Evaluator, States, derive};
-use modelmill_reduction::{ImportOptions, Imported, import};
+use modelmill_boundary::files::MemoryFiles;
+use modelmill_codegen::{Derivation, ModelEvaluator, MotionStates, derive};
+use modelmill_reduction::{ImportOptions, DescriptionImport, import};
 
 fn link(name: &str, mass: f64, at: &str) -> String {
     format!(
@@ -34,7 +34,7 @@ fn common() -> String {
         + &link("rod", 0.8, "0.15 0 0.01")
 }
 
-fn imported(robot: &str, closures: &str) -> Imported {
+fn imported(robot: &str, closures: &str) -> DescriptionImport {
     let options = ImportOptions {
         closures: Some(closures),
         ..ImportOptions::default()
@@ -42,8 +42,8 @@ fn imported(robot: &str, closures: &str) -> Imported {
     import(&format!("<robot name='strut'>{robot}</robot>"), &options).expect("a model")
 }
 
-fn derived(imported: &Imported) -> Derivation {
-    let loaded = modelmill_spec::load("model.toml", &imported.model, &Memory::default());
+fn derived(imported: &DescriptionImport) -> Derivation {
+    let loaded = modelmill_spec::load("model.toml", &imported.model, &MemoryFiles::default());
     let loaded = loaded.unwrap_or_else(|failure| panic!("{failure}"));
     derive(&loaded.mechanism).expect("a derivation")
 }
@@ -62,13 +62,13 @@ fn forces(derivation: &Derivation) -> Vec<f64> {
     let q: Vec<f64> = (0..8).map(|k| start + 0.01 * f64::from(k)).collect();
     let qd: Vec<f64> = (0..8).map(|k| 0.3 - 0.1 * f64::from(k)).collect();
     let qdd: Vec<f64> = (0..8).map(|k| 0.2 * f64::from(k) - 0.5).collect();
-    let states = States {
+    let states = MotionStates {
         q: vec![&q],
         qd: vec![&qd],
         qdd: vec![&qdd],
         load: Vec::new(),
     };
-    let found = Evaluator::new(derivation)
+    let found = ModelEvaluator::new(derivation)
         .inverse_dynamics(&states, &derivation.nominal_base_values())
         .expect("forces");
     found[0].clone()
@@ -152,7 +152,7 @@ fn the_pose_says_which_assembly_is_meant() {
         let pose = [("turn", turn), ("hinge", hinge), ("extend", 0.4)];
         let pose = pose.map(|(name, value)| (name.to_owned(), value));
         let imported = at(&pose).expect("a model");
-        let loaded = modelmill_spec::load("model.toml", &imported.model, &Memory::default());
+        let loaded = modelmill_spec::load("model.toml", &imported.model, &MemoryFiles::default());
         let loaded = loaded.unwrap_or_else(|failure| panic!("{failure}"));
         let found = loaded
             .mechanism
@@ -195,7 +195,7 @@ fn rod_between(joint_of_rod: &str) -> String {
 
 const SEATED: &str = "closed_loop: [['top', 'seat']]\ntype: ['3d']\nname_mot: ['turn']\n";
 
-fn with(robot: &str, closures: &str) -> Result<Imported, String> {
+fn with(robot: &str, closures: &str) -> Result<DescriptionImport, String> {
     let options = ImportOptions {
         closures: Some(closures),
         ..ImportOptions::default()

@@ -6,9 +6,9 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use modelmill_boundary::files::Memory;
-use modelmill_codegen::{Derivation, Evaluator, States};
-use modelmill_reduction::{ImportOptions, Imported, ImportedJoint, import};
+use modelmill_boundary::files::MemoryFiles;
+use modelmill_codegen::{Derivation, ModelEvaluator, MotionStates};
+use modelmill_reduction::{ImportOptions, DescriptionImport, ImportedJoint, import};
 use modelmill_spec::DriveKind;
 use nalgebra::{DMatrix, Matrix3, Quaternion, UnitQuaternion, Vector3};
 
@@ -103,7 +103,7 @@ fn reference_pose(manifest: &serde_json::Value) -> Vec<(String, f64)> {
 }
 
 /// The import of a robot as its manifest says.
-fn imported(folder: &Path, reference: &Reference) -> Result<Imported, String> {
+fn imported(folder: &Path, reference: &Reference) -> Result<DescriptionImport, String> {
     let manifest = &reference.manifest;
     let file = manifest["file"].as_str().expect("a file");
     let closures = folder.join("robot.yaml");
@@ -239,7 +239,7 @@ fn coordinates_of(joint: &ImportedJoint, reference: &Reference) -> Vec<[Vec<f64>
 type TreeRate = (String, Vec<(String, Vec<f64>)>);
 
 fn tree_rates(
-    imported: &Imported,
+    imported: &DescriptionImport,
     motion: &dyn Fn(&str) -> [Vec<f64>; 3],
     n: usize,
 ) -> Vec<TreeRate> {
@@ -288,7 +288,7 @@ fn tree_rates(
 )]
 fn deviations(
     derivation: &Derivation,
-    imported: &Imported,
+    imported: &DescriptionImport,
     reference: &Reference,
 ) -> Result<[f64; 2], String> {
     let mechanism = &derivation.mechanism;
@@ -326,7 +326,7 @@ fn deviations(
         .map(|coordinate| coordinate.name.as_str())
         .collect();
     let moved: Vec<[Vec<f64>; 3]> = active.iter().map(|name| motion(name)).collect();
-    let evaluator = Evaluator::new(derivation);
+    let evaluator = ModelEvaluator::new(derivation);
     // Each state of a mechanism with loops is reached in steps from the nominal pose, and left again: which way loops are
     // assembled follows from where they come from.
     let m = active.len();
@@ -361,7 +361,7 @@ fn deviations(
     }
     let length = 2 * steps + m + 1;
     let slices = |k: usize| path.iter().map(|m| m[k].as_slice()).collect();
-    let states = States {
+    let states = MotionStates {
         q: slices(0),
         qd: slices(1),
         qdd: slices(2),
@@ -381,7 +381,7 @@ fn deviations(
     let of_passive = if passive.is_empty() {
         Vec::new()
     } else {
-        evaluator.passive(&states).map_err(place)?
+        evaluator.passive_motion(&states).map_err(place)?
     };
     let here = |i: usize| i * length + steps;
     let rate = |name: &str, i: usize, j: usize| -> f64 {
@@ -487,10 +487,10 @@ fn check(name: &str) {
         Err(error) => panic!("{name}: not imported: {error}"),
     };
     let start = Instant::now();
-    let loaded = modelmill_spec::load("model.toml", &rigid(&imported.model), &Memory::default())
+    let loaded = modelmill_spec::load("model.toml", &rigid(&imported.model), &MemoryFiles::default())
         .unwrap_or_else(|failure| panic!("{name}: {failure}"));
     // Ranks of the reference are those of the file's values.
-    let derivation = match modelmill_codegen::derive(&loaded.mechanism.at_values()) {
+    let derivation = match modelmill_codegen::derive(&loaded.mechanism.with_numeric_constants()) {
         Ok(derivation) => derivation,
         Err(error) => panic!("{name}: imported, not derived: {error}"),
     };

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use crate::common::{close, force, rig, states};
-use modelmill_rig::{Law, Rig, Samples, State, Tracker, Trajectory, forces_along, simulate};
+use modelmill_rig::{RigLaw, Rig, CoordinateSamples, RigState, RigTracker, Trajectory, forces_along, simulate};
 
 /// A cart of 2 kg on an upright rail: its load is `2*(qdd + 9.81)`.
 fn cart() -> Rig {
@@ -16,12 +16,12 @@ fn cart() -> Rig {
     "#)
 }
 
-fn load(state: &State) -> f64 {
+fn load(state: &RigState) -> f64 {
     2.0 * (state.qdd[0] + 9.81)
 }
 
 /// What an effect adds, at a drive and, where it may act there too, in the drive's joint.
-fn check(kind: &str, values: &[(&str, f64)], adds: impl Fn(&State) -> f64) {
+fn check(kind: &str, values: &[(&str, f64)], adds: impl Fn(&RigState) -> f64) {
     for place in ["screw", "z", "rail"] {
         let mut rig = cart();
         let effect = match rig.effect(kind, &[place], values) {
@@ -32,7 +32,7 @@ fn check(kind: &str, values: &[(&str, f64)], adds: impl Fn(&State) -> f64) {
             }
         };
         rig.effects.push(effect);
-        let mut tracker = Tracker::new(&rig).expect("a pose");
+        let mut tracker = RigTracker::new(&rig).expect("a pose");
         for state in states(1, 25) {
             close(
                 force(&rig, &mut tracker, &state)[0],
@@ -41,7 +41,7 @@ fn check(kind: &str, values: &[(&str, f64)], adds: impl Fn(&State) -> f64) {
             );
         }
         // At standstill dry friction is zero and nothing divides by the rate.
-        let rest = State {
+        let rest = RigState {
             q: vec![0.3],
             qd: vec![0.0],
             qdd: vec![0.0],
@@ -109,13 +109,13 @@ fn laws_at_a_drive_and_in_its_joint() {
 
 #[test]
 fn every_kind_has_values_and_a_law() {
-    for kind in Law::KINDS {
+    for kind in RigLaw::KINDS {
         assert!(
-            Law::values(kind).is_some_and(|values| !values.is_empty()),
+            RigLaw::values(kind).is_some_and(|values| !values.is_empty()),
             "{kind}"
         );
     }
-    assert!(Law::values("magic").is_none());
+    assert!(RigLaw::values("magic").is_none());
 }
 
 /// The wrist of the TX40: each motor feels the other's rotor and their common seals.
@@ -132,7 +132,7 @@ fn coupled_drives_feel_each_other() {
         effect = [{ kind = "coupled_drive", at = ["f", "g"], values = { Ia = 0.4, Fv = 7.0, Fs = 2.0 } }]
     "#;
     let rig = rig(text);
-    let mut tracker = Tracker::new(&rig).expect("a pose");
+    let mut tracker = RigTracker::new(&rig).expect("a pose");
     for state in states(2, 20) {
         let together = 2.0 * sign(state.qd[0] + state.qd[1]);
         let found = force(&rig, &mut tracker, &state);
@@ -170,8 +170,8 @@ fn friction_in_a_passive_joint() {
             .expect("an effect"),
     );
     let mut trackers = [
-        Tracker::new(&plain).expect("a pose"),
-        Tracker::new(&worn).expect("a pose"),
+        RigTracker::new(&plain).expect("a pose"),
+        RigTracker::new(&worn).expect("a pose"),
     ];
     for state in states(1, 20) {
         let q = state.q[0];
@@ -213,7 +213,7 @@ fn check_bar(
     }
     rig.effects
         .push(rig.effect(kind, at, values).expect("an effect"));
-    let mut tracker = Tracker::new(&rig).expect("a pose");
+    let mut tracker = RigTracker::new(&rig).expect("a pose");
     for state in states(1, 20) {
         close(
             force(&rig, &mut tracker, &state)[0],
@@ -276,7 +276,7 @@ fn a_delay_shifts_the_forces_alone() {
             .expect("an effect"),
     );
     let time: Vec<f64> = (0..200).map(|i| f64::from(i) * 0.005).collect();
-    let z = |t: f64| State {
+    let z = |t: f64| RigState {
         q: vec![(3.0 * t).sin()],
         qd: vec![3.0 * (3.0 * t).cos()],
         qdd: vec![-9.0 * (3.0 * t).sin()],
@@ -334,7 +334,7 @@ fn faulty_effects_are_named() {
 fn missing_derivatives_are_found() {
     let time: Vec<f64> = (0..500).map(|i| f64::from(i) * 0.004).collect();
     let q: Vec<f64> = time.iter().map(|t| 0.3 * (2.0 * t).sin()).collect();
-    let samples = vec![Samples {
+    let samples = vec![CoordinateSamples {
         q,
         qd: None,
         qdd: None,

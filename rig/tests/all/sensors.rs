@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use crate::common::{close, column, rig};
-use modelmill_rig::{Rig, Run, State, Trajectory, simulate};
+use modelmill_rig::{Rig, RigRecording, RigState, Trajectory, simulate};
 
 fn pendulum(sensors: &str) -> Rig {
     rig(&format!(
@@ -20,7 +20,7 @@ fn pendulum(sensors: &str) -> Rig {
 
 fn swing(n: u32) -> Trajectory {
     let time = (0..n).map(|i| f64::from(i) * 0.004).collect();
-    Trajectory::from_function(time, |t| State {
+    Trajectory::from_function(time, |t| RigState {
         q: vec![0.6 * (2.0 * t).sin()],
         qd: vec![1.2 * (2.0 * t).cos()],
         qdd: vec![-2.4 * (2.0 * t).sin()],
@@ -28,7 +28,7 @@ fn swing(n: u32) -> Trajectory {
     .expect("a trajectory")
 }
 
-fn run(rig: &Rig, trajectory: &Trajectory, seed: Option<u64>) -> Run {
+fn run(rig: &Rig, trajectory: &Trajectory, seed: Option<u64>) -> RigRecording {
     simulate(rig, trajectory, seed, || {}).expect("a run")
 }
 
@@ -67,7 +67,7 @@ fn noise_is_seeded_and_has_its_deviation() {
         run(&rig, &swing(4000), Some(4)),
     );
     assert_eq!(one, again);
-    let errors = |made: &Run| -> Vec<f64> {
+    let errors = |made: &RigRecording| -> Vec<f64> {
         let ideal = column(&ideal.columns, "motor");
         column(&made.columns, "motor")
             .iter()
@@ -155,7 +155,7 @@ fn runs_that_cannot_be_are_refused() {
         says("encoder = [{ of = [\"q\"], delay = 9 }]", &swing(100)).contains("shorten the delay")
     );
     assert!(says("sampling = { rate = 1e12 }", &swing(100)).contains("lower the rate"));
-    let two = Trajectory::from_function(vec![0.0], |_| State {
+    let two = Trajectory::from_function(vec![0.0], |_| RigState {
         q: vec![0.0; 2],
         qd: vec![0.0; 2],
         qdd: vec![0.0; 2],

@@ -111,6 +111,6 @@ fn a_run_has_the_columns_of_a_recording() {
     );
     assert_eq!(
         made.columns[1].1[7].to_bits(),
-        trajectory.at(short.time()[7]).q[0].to_bits()
+        trajectory.state_at(short.time()[7]).q[0].to_bits()
     );
 }

@@ -8,12 +8,12 @@ use crate::Real;
 
 /// A row of the regressor with what was measured for it.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Row<T, const NB: usize> {
+pub(super) struct WatchRow<T, const NB: usize> {
     pub(super) row: [T; NB],
     pub(super) value: T,
 }
 
-impl<T: Real, const NB: usize> Row<T, NB> {
+impl<T: Real, const NB: usize> WatchRow<T, NB> {
     pub(super) fn zero() -> Self {
         Self {
             row: [T::from_f64(0.0); NB],
@@ -27,7 +27,7 @@ impl<T: Real, const NB: usize> Row<T, NB> {
         terms.fold(self.value, |rest, (x, p)| rest - *x * *p)
     }
 
-    fn combined(&self, a: T, other: &Self, b: T) -> Self {
+    fn linear_combination(&self, a: T, other: &Self, b: T) -> Self {
         let mut result = *self;
         for (x, y) in result.row.iter_mut().zip(&other.row) {
             *x = a * *x + b * *y;
@@ -39,21 +39,21 @@ impl<T: Real, const NB: usize> Row<T, NB> {
 
 /// A drive's block in the making, and the noise of the drive.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Averages<T, const NB: usize> {
-    sum: Row<T, NB>,
+pub(super) struct DriveAverages<T, const NB: usize> {
+    sum: WatchRow<T, NB>,
     /// Whether every sample of the block could be counted.
-    whole: bool,
-    before: Option<Row<T, NB>>,
+    is_complete: bool,
+    before: Option<WatchRow<T, NB>>,
     /// What of a block's residual is that of the block before.
     colour: T,
     /// One over the deviation of the rest.
     weight: T,
-    learned: Moments<T>,
+    learned: ResidualMoments<T>,
 }
 
 /// Sums over residuals of blocks.
 #[derive(Clone, Copy, Debug)]
-struct Moments<T> {
+struct ResidualMoments<T> {
     last: Option<T>,
     squares: T,
     products: T,
@@ -61,16 +61,16 @@ struct Moments<T> {
     n_products: T,
 }
 
-impl<T: Real, const NB: usize> Averages<T, NB> {
+impl<T: Real, const NB: usize> DriveAverages<T, NB> {
     pub(super) fn new() -> Self {
         let zero = T::from_f64(0.0);
         Self {
-            sum: Row::zero(),
-            whole: true,
+            sum: WatchRow::zero(),
+            is_complete: true,
             before: None,
             colour: zero,
             weight: T::from_f64(1.0),
-            learned: Moments {
+            learned: ResidualMoments {
                 last: None,
                 squares: zero,
                 products: zero,
@@ -81,19 +81,19 @@ impl<T: Real, const NB: usize> Averages<T, NB> {
     }
 
     /// Takes a sample; one with something that is no number spoils its block.
-    pub(super) fn take(&mut self, row: &[T; NB], force: T) {
+    pub(super) fn add_sample(&mut self, row: &[T; NB], force: T) {
         for (sum, x) in self.sum.row.iter_mut().zip(row) {
             *sum = *sum + *x;
         }
         self.sum.value = self.sum.value + force;
-        self.whole &= force.abs() < T::largest();
+        self.is_complete &= force.abs() < T::largest();
     }
 
     /// The mean of the block that ends here, its value less what the parameters explain; none if it is spoilt.
-    pub(super) fn end(&mut self, share: T, parameters: &[T; NB]) -> Option<Row<T, NB>> {
-        let sum = core::mem::replace(&mut self.sum, Row::zero());
-        let whole = core::mem::replace(&mut self.whole, true);
-        let mut mean = sum.combined(share, &sum, T::from_f64(0.0));
+    pub(super) fn end_block(&mut self, share: T, parameters: &[T; NB]) -> Option<WatchRow<T, NB>> {
+        let sum = core::mem::replace(&mut self.sum, WatchRow::zero());
+        let whole = core::mem::replace(&mut self.is_complete, true);
+        let mut mean = sum.linear_combination(share, &sum, T::from_f64(0.0));
         mean.value = mean.residual(parameters);
         let fine = mean.value.is_finite() && mean.row.iter().all(|x| x.abs() < T::largest());
         if whole && fine {
@@ -105,13 +105,13 @@ impl<T: Real, const NB: usize> Averages<T, NB> {
     }
 
     /// A block with the noise made white and of deviation one; none behind a gap.
-    pub(super) fn whitened(&mut self, mean: &Row<T, NB>) -> Option<Row<T, NB>> {
+    pub(super) fn whiten(&mut self, mean: &WatchRow<T, NB>) -> Option<WatchRow<T, NB>> {
         let before = self.before.replace(*mean)?;
-        Some(mean.combined(self.weight, &before, -self.weight * self.colour))
+        Some(mean.linear_combination(self.weight, &before, -self.weight * self.colour))
     }
 
     /// Learns from the residual of a block.
-    pub(super) fn learn(&mut self, residual: T) {
+    pub(super) fn add_residual(&mut self, residual: T) {
         let (m, one) = (&mut self.learned, T::from_f64(1.0));
         if let Some(last) = m.last.replace(residual) {
             m.products = m.products + last * residual;
@@ -122,7 +122,7 @@ impl<T: Real, const NB: usize> Averages<T, NB> {
     }
 
     /// Takes what was learned for the drive's noise.
-    pub(super) fn settle(&mut self) {
+    pub(super) fn update_noise_model(&mut self) {
         let m = &self.learned;
         let (zero, one, most) = (T::from_f64(0.0), T::from_f64(1.0), T::from_f64(0.98));
         let variance = m.squares / m.n;

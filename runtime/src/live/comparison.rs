@@ -5,12 +5,12 @@
 //! of p allowed for. A change of parameter j alone then explains `(m_j' z)^2 / m_j' m_j` of the squares, with the columns
 //! m of what is left and its values z.
 
-use super::estimator::{Estimator, rotation, turn};
+use super::estimator::{RecursiveEstimator, givens_rotation, rotate_rows};
 use crate::Real;
 
 /// The elimination in the making; each call of [`Self::advance`] does one row of `NB`.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Comparison<T, const NB: usize> {
+pub(super) struct WindowComparison<T, const NB: usize> {
     /// The triangle of both in p, its part in d, and its values.
     both: [[T; NB]; NB],
     change: [[T; NB]; NB],
@@ -23,14 +23,14 @@ pub(super) struct Comparison<T, const NB: usize> {
 
 /// A change of one parameter alone, in units of whitened rows.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Single<T> {
+pub(super) struct ChangeScore<T> {
     /// Information of the window on the change.
     pub(super) information: T,
     /// The change times that.
     pub(super) score: T,
 }
 
-impl<T: Real> Single<T> {
+impl<T: Real> ChangeScore<T> {
     /// Squares that the change explains; 0 where nothing is known of it.
     pub(super) fn gain(&self) -> T {
         let zero = T::from_f64(0.0);
@@ -42,9 +42,9 @@ impl<T: Real> Single<T> {
     }
 }
 
-impl<T: Real, const NB: usize> Comparison<T, NB> {
+impl<T: Real, const NB: usize> WindowComparison<T, NB> {
     /// There is nothing to compare.
-    pub(super) fn idle() -> Self {
+    pub(super) fn new_idle() -> Self {
         let zero = T::from_f64(0.0);
         let zeros = [[zero; NB]; NB];
         Self {
@@ -58,7 +58,7 @@ impl<T: Real, const NB: usize> Comparison<T, NB> {
     }
 
     /// Begins with a window and a reference as they are now.
-    pub(super) fn start(&mut self, reference: &Estimator<T, NB>, window: &Estimator<T, NB>) {
+    pub(super) fn start(&mut self, reference: &RecursiveEstimator<T, NB>, window: &RecursiveEstimator<T, NB>) {
         self.both = reference.rows;
         self.values = reference.values;
         self.change = [[T::from_f64(0.0); NB]; NB];
@@ -79,11 +79,11 @@ impl<T: Real, const NB: usize> Comparison<T, NB> {
         let triangle = triangle.zip(&mut self.values).enumerate();
         // Above the row's place the window has zeros.
         for (k, ((both, change), both_value)) in triangle.skip(place) {
-            let Some((c, s)) = rotation(both, &common, k) else {
+            let Some((c, s)) = givens_rotation(both, &common, k) else {
                 continue;
             };
-            turn(c, s, both, &mut common, k);
-            turn(c, s, change, &mut own, 0);
+            rotate_rows(c, s, both, &mut common, k);
+            rotate_rows(c, s, change, &mut own, 0);
             (*both_value, *value) = (c * *both_value + s * *value, c * *value - s * *both_value);
         }
         *row = own;
@@ -99,9 +99,9 @@ impl<T: Real, const NB: usize> Comparison<T, NB> {
     /// What is left of the window: a change of each parameter alone.
     ///
     /// `alone` is the information of the window: what is no more than rounding beside it is none.
-    pub(super) fn singles(&self, alone: &[T; NB]) -> [Single<T>; NB] {
+    pub(super) fn single_changes(&self, alone: &[T; NB]) -> [ChangeScore<T>; NB] {
         let zero = T::from_f64(0.0);
-        let mut singles = [Single {
+        let mut singles = [ChangeScore {
             information: zero,
             score: zero,
         }; NB];
@@ -123,7 +123,7 @@ impl<T: Real, const NB: usize> Comparison<T, NB> {
     }
 
     /// The same for a further change besides that of parameter `first`.
-    pub(super) fn besides(&self, first: usize, singles: &[Single<T>; NB]) -> [Single<T>; NB] {
+    pub(super) fn second_changes(&self, first: usize, singles: &[ChangeScore<T>; NB]) -> [ChangeScore<T>; NB] {
         let zero = T::from_f64(0.0);
         let mut common = [zero; NB];
         for row in &self.window {
@@ -152,7 +152,7 @@ impl<T: Real, const NB: usize> Comparison<T, NB> {
     }
 
     /// Squares that changes of all parameters together explain.
-    pub(super) fn all(&self) -> T {
+    pub(super) fn total_gain(&self) -> T {
         let squares = self.window_values.iter();
         squares.fold(T::from_f64(0.0), |sum, z| sum + *z * *z)
     }

@@ -23,7 +23,7 @@ const FADED: f64 = 1e-30;
 /// assert!((values[0] - 3.0).abs() < 1e-12 && (values[1] - 2.0).abs() < 1e-12);
 /// ```
 #[derive(Clone, Copy, Debug)]
-pub struct Estimator<T, const NB: usize> {
+pub struct RecursiveEstimator<T, const NB: usize> {
     /// The upper triangle; below its diagonal stand zeros.
     pub(super) rows: [[T; NB]; NB],
     /// The right side of each of its rows.
@@ -33,17 +33,17 @@ pub struct Estimator<T, const NB: usize> {
 
 /// What is known of parameters besides the rows: each within a deviation of its own.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Prior<T, const NB: usize> {
+pub struct EstimatorPrior<T, const NB: usize> {
     /// Expected values.
     pub values: [T; NB],
     /// One over the deviation of each, as a share of the deviation of a row; 0 where nothing is known.
     pub weights: [T; NB],
 }
 
-impl<T: Real, const NB: usize> Prior<T, NB> {
+impl<T: Real, const NB: usize> EstimatorPrior<T, NB> {
     /// Nothing is known.
     #[must_use]
-    pub fn none() -> Self {
+    pub fn uninformative() -> Self {
         let zeros = [T::from_f64(0.0); NB];
         Self {
             values: zeros,
@@ -52,13 +52,13 @@ impl<T: Real, const NB: usize> Prior<T, NB> {
     }
 }
 
-impl<T: Real, const NB: usize> Default for Estimator<T, NB> {
+impl<T: Real, const NB: usize> Default for RecursiveEstimator<T, NB> {
     fn default() -> Self {
         Self::new()
     }
 }
 
-impl<T: Real, const NB: usize> Estimator<T, NB> {
+impl<T: Real, const NB: usize> RecursiveEstimator<T, NB> {
     /// Knows nothing yet.
     #[must_use]
     pub fn new() -> Self {
@@ -72,11 +72,11 @@ impl<T: Real, const NB: usize> Estimator<T, NB> {
 
     /// Lets all information fade to this share of itself, between 0 and 1: `exp(-dt/tau)` for a memory of `tau` seconds.
     pub fn forget(&mut self, share: T) {
-        self.scale(share.sqrt());
+        self.scale_information(share.sqrt());
     }
 
     /// [`Self::forget`] by the root of the share.
-    pub(super) fn scale(&mut self, root: T) {
+    pub(super) fn scale_information(&mut self, root: T) {
         let faded = T::from_f64(FADED);
         let fade = |x: &mut T| {
             let y = *x * root;
@@ -99,10 +99,10 @@ impl<T: Real, const NB: usize> Estimator<T, NB> {
         }
         let triangle = self.rows.iter_mut().zip(&mut self.values);
         for (k, (own, own_value)) in triangle.enumerate() {
-            let Some((c, s)) = rotation(own, &row, k) else {
+            let Some((c, s)) = givens_rotation(own, &row, k) else {
                 continue;
             };
-            turn(c, s, own, &mut row, k);
+            rotate_rows(c, s, own, &mut row, k);
             (*own_value, value) = (c * *own_value + s * value, c * value - s * *own_value);
         }
         self.squares = self.squares + value * value;
@@ -113,7 +113,7 @@ impl<T: Real, const NB: usize> Estimator<T, NB> {
     ///
     /// A parameter of which neither knows anything is 0. Takes a copy of the triangle and `NB` rows more.
     #[must_use]
-    pub fn solve(&self, prior: &Prior<T, NB>) -> [T; NB] {
+    pub fn solve(&self, prior: &EstimatorPrior<T, NB>) -> [T; NB] {
         let zero = T::from_f64(0.0);
         let mut all = *self;
         for (k, (value, weight)) in prior.values.iter().zip(&prior.weights).enumerate() {
@@ -159,7 +159,7 @@ impl<T: Real, const NB: usize> Estimator<T, NB> {
 }
 
 /// Cosine and sine of the rotation that turns entry `k` of a row into the triangle's own; none where it is zero already.
-pub(super) fn rotation<T: Real, const N: usize>(
+pub(super) fn givens_rotation<T: Real, const N: usize>(
     own: &[T; N],
     row: &[T; N],
     k: usize,
@@ -172,7 +172,7 @@ pub(super) fn rotation<T: Real, const N: usize>(
 
 /// Turns two rows into each other, from entry `from` on.
 #[inline]
-pub(super) fn turn<T: Real, const N: usize>(
+pub(super) fn rotate_rows<T: Real, const N: usize>(
     c: T,
     s: T,
     own: &mut [T; N],
@@ -196,8 +196,8 @@ mod tests {
 
     /// Rows and values from a seed.
     fn sample(random: &mut Random) -> ([f64; N], f64) {
-        let row = core::array::from_fn(|_| random.between(-1.0, 1.0));
-        let noise = random.between(-0.3, 0.3);
+        let row = core::array::from_fn(|_| random.uniform(-1.0, 1.0));
+        let noise = random.uniform(-0.3, 0.3);
         (
             row,
             row[0] - 2.0 * row[1] + 0.5 * row[2] + 3.0 * row[3] + noise,
@@ -208,7 +208,7 @@ mod tests {
     fn batch(
         rows: &[([f64; N], f64)],
         weight: impl Fn(usize) -> f64,
-        prior: &Prior<f64, N>,
+        prior: &EstimatorPrior<f64, N>,
     ) -> [f64; N] {
         let (mut matrix, mut right) = ([[0.0; N]; N], [0.0; N]);
         for (age, (row, value)) in rows.iter().rev().enumerate() {
@@ -227,11 +227,11 @@ mod tests {
         right
     }
 
-    fn check(share: f64, prior: &Prior<f64, N>) {
+    fn check(share: f64, prior: &EstimatorPrior<f64, N>) {
         extern crate std;
         let mut random = Random::new(3);
         let mut rows = std::vec::Vec::new();
-        let mut estimator = Estimator::<f64, N>::new();
+        let mut estimator = RecursiveEstimator::<f64, N>::new();
         for _ in 0..400 {
             let (row, value) = sample(&mut random);
             rows.push((row, value));
@@ -244,7 +244,7 @@ mod tests {
         for (a, b) in found.iter().zip(&expected) {
             assert!((a - b).abs() < 1e-9, "{found:?} {expected:?}");
         }
-        let solution = estimator.solve(&Prior::none());
+        let solution = estimator.solve(&EstimatorPrior::uninformative());
         let left: f64 = rows.iter().rev().enumerate().fold(0.0, |sum, (i, (h, y))| {
             let e = y - h.iter().zip(&solution).map(|(a, b)| a * b).sum::<f64>();
             sum + age(i) * e * e
@@ -254,19 +254,19 @@ mod tests {
 
     #[test]
     fn without_forgetting_it_is_least_squares_of_all_rows() {
-        check(1.0, &Prior::none());
+        check(1.0, &EstimatorPrior::uninformative());
     }
 
     #[test]
     fn with_forgetting_it_is_least_squares_of_rows_that_fade() {
-        check(0.97, &Prior::none());
+        check(0.97, &EstimatorPrior::uninformative());
     }
 
     #[test]
     fn a_prior_does_not_fade() {
         check(
             0.9,
-            &Prior {
+            &EstimatorPrior {
                 values: [1.0, 2.0, 3.0, 4.0],
                 weights: [0.0, 2.0, 0.1, 5.0],
             },
@@ -276,7 +276,7 @@ mod tests {
     #[test]
     fn a_direction_that_rests_keeps_its_value_and_nothing_winds_up() {
         let mut random = Random::new(5);
-        let mut estimator = Estimator::<f32, N>::new();
+        let mut estimator = RecursiveEstimator::<f32, N>::new();
         for step in 0..2_000_000 {
             let (mut row, mut value) = sample(&mut random);
             if step >= 1000 {
@@ -288,11 +288,11 @@ mod tests {
             let taken = estimator.add(row.map(|x| x as f32), value as f32);
             assert!(taken);
             if step == 3000 {
-                assert!((estimator.solve(&Prior::none())[3] - 3.0).abs() < 0.3);
+                assert!((estimator.solve(&EstimatorPrior::uninformative())[3] - 3.0).abs() < 0.3);
             }
         }
         // At last it has faded altogether, and what is expected takes its place.
-        let prior = Prior {
+        let prior = EstimatorPrior {
             values: [0.0, 0.0, 0.0, 7.0],
             weights: [0.0, 0.0, 0.0, 1e-3],
         };
@@ -303,10 +303,10 @@ mod tests {
 
     #[test]
     fn what_is_no_number_is_not_taken() {
-        let mut estimator = Estimator::<f64, 2>::new();
+        let mut estimator = RecursiveEstimator::<f64, 2>::new();
         assert!(!estimator.add([1.0, f64::NAN], 1.0));
         assert!(!estimator.add([1.0, 1.0], f64::INFINITY));
-        let nothing = estimator.solve(&Prior::none()).map(f64::to_bits);
+        let nothing = estimator.solve(&EstimatorPrior::uninformative()).map(f64::to_bits);
         assert_eq!(nothing, [0.0_f64.to_bits(); 2]);
     }
 }

@@ -20,6 +20,6 @@ mod options;
 mod scatter;
 mod watch;
 
-pub use estimator::{Estimator, Prior};
+pub use estimator::{RecursiveEstimator, EstimatorPrior};
 pub use options::Options;
-pub use watch::{Change, Verdict, Watch};
+pub use watch::{WatchChange, WatchVerdict, ParameterWatch};

@@ -17,7 +17,7 @@ pub struct Options {
     /// be that of every day.
     pub learning: f64,
     /// Mean time between false alarms that thresholds are made for, with noise that is all chance.
-    pub calm: f64,
+    pub false_alarm_interval: f64,
 }
 
 impl Options {
@@ -30,14 +30,14 @@ impl Options {
             window: 2.0,
             memory: 600.0,
             learning: 60.0,
-            calm: 360_000.0,
+            false_alarm_interval: 360_000.0,
         }
     }
 }
 
 /// What options are in samples, blocks and shares.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Plan<T> {
+pub(super) struct WatchSchedule<T> {
     /// Samples of a block.
     pub(super) block: u32,
     /// Blocks between two comparisons.
@@ -60,27 +60,27 @@ pub(super) struct Plan<T> {
     pub(super) limit: T,
 }
 
-impl<T: Real> Plan<T> {
+impl<T: Real> WatchSchedule<T> {
     pub(super) fn new(options: &Options, n_base: usize) -> Self {
         let rate = options.rate.max(1e-6);
-        let block = count(options.block * rate);
+        let block = positive_count(options.block * rate);
         let block_time = f64::from(block) / rate;
         let window = options.window.max(block_time);
         let memory = options.memory.max(10.0 * window);
         let learning = options.learning.max(10.0 * window) / block_time;
         // A comparison takes a step for each parameter.
         let samples = (window / 6.0 * rate).max(n_base as f64 + 2.0);
-        let interval = count(samples / f64::from(block));
+        let interval = positive_count(samples / f64::from(block));
         let interval_time = f64::from(interval) * block_time;
         let root = |memory: f64, dt: f64| T::from_f64(libm::exp(-0.5 * dt / memory));
         // Tests that have little to do with each other: two in each window, for each parameter.
-        let tests = 2.0 * n_base.max(1) as f64 * (options.calm / window).max(1.0);
+        let tests = 2.0 * n_base.max(1) as f64 * (options.false_alarm_interval / window).max(1.0);
         Self {
             block,
             interval,
-            noise: count(learning / 3.0),
-            scatter: count(learning * 2.0 / 3.0),
-            steady: count(window / interval_time),
+            noise: positive_count(learning / 3.0),
+            scatter: positive_count(learning * 2.0 / 3.0),
+            steady: positive_count(window / interval_time),
             window_root: root(window, block_time),
             memory_root: root(memory, block_time),
             scatter_share: root(0.5 * memory, interval_time),
@@ -94,7 +94,7 @@ impl<T: Real> Plan<T> {
 
 /// A whole number of samples or blocks, at least one.
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-fn count(x: f64) -> u32 {
+fn positive_count(x: f64) -> u32 {
     // What is no number becomes one.
     libm::round(x.clamp(1.0, 1e9)).max(1.0) as u32
 }

@@ -4,19 +4,19 @@
 //! would have them: noise of other colours, faults of the model along the motion, and all else that is there every day.
 //! A change is held against that. How many windows it was learned from says how far a window may be off by chance.
 
-use super::comparison::Single;
+use super::comparison::ChangeScore;
 use crate::Real;
 
 /// The factor is never taken for less: what has no noise at all is a simulation.
-const LEAST: f64 = 1e-2;
+const MINIMUM_DISPERSION: f64 = 1e-2;
 /// A window that is off by more than this many times its scatter counts as if it were off by no more.
-const FURTHEST: f64 = 9.0;
+const WINSOR_LIMIT: f64 = 9.0;
 /// So many windows before single ones are held against the rest.
-const FEW: f64 = 5.0;
+const MINIMUM_WINDOWS: f64 = 5.0;
 
 /// Sums over windows.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Scatter<T, const NB: usize> {
+pub(super) struct WindowScatter<T, const NB: usize> {
     squares: [T; NB],
     information: [T; NB],
     /// Comparisons that were taken.
@@ -27,14 +27,14 @@ pub(super) struct Scatter<T, const NB: usize> {
 
 /// What a change of a parameter is held against.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Measure<T> {
+pub(super) struct ScatterEstimate<T> {
     /// Factor on the variance of white noise.
     pub(super) dispersion: T,
     /// Windows, of the present one's information, from which it was learned.
     windows: T,
 }
 
-impl<T: Real> Measure<T> {
+impl<T: Real> ScatterEstimate<T> {
     /// The gain that chance does not reach, where `limit` is that of a dispersion that is known: Student's distribution by
     /// its likelihood ratio, `nu log(1 + F/nu)`.
     pub(super) fn threshold(&self, limit: T) -> T {
@@ -49,7 +49,7 @@ impl<T: Real> Measure<T> {
     }
 }
 
-impl<T: Real, const NB: usize> Scatter<T, NB> {
+impl<T: Real, const NB: usize> WindowScatter<T, NB> {
     pub(super) fn new(per_comparison: T) -> Self {
         let zero = T::from_f64(0.0);
         Self {
@@ -61,26 +61,26 @@ impl<T: Real, const NB: usize> Scatter<T, NB> {
     }
 
     /// What parameter `k` is held against, with what a window knows of it.
-    pub(super) fn measure(&self, k: usize, information: T) -> Measure<T> {
+    pub(super) fn estimate(&self, k: usize, information: T) -> ScatterEstimate<T> {
         let zero = T::from_f64(0.0);
         let entry = |array: &[T; NB]| array.get(k).copied().unwrap_or(zero);
         let (squares, known) = (entry(&self.squares), entry(&self.information));
-        let (least, found) = (T::from_f64(LEAST), squares / known);
+        let (least, found) = (T::from_f64(MINIMUM_DISPERSION), squares / known);
         // Windows that knew much more do not count more than once.
         let n = known / information;
         let n = if n < self.n { n } else { self.n };
-        Measure {
+        ScatterEstimate {
             dispersion: if found > least { found } else { least },
             windows: n * self.per_comparison,
         }
     }
 
     /// Takes a window in which nothing has changed; those before count `share` as much.
-    pub(super) fn take(&mut self, singles: &[Single<T>; NB], share: T) {
-        let (few, furthest) = (T::from_f64(FEW), T::from_f64(FURTHEST));
+    pub(super) fn add_window(&mut self, singles: &[ChangeScore<T>; NB], share: T) {
+        let (few, furthest) = (T::from_f64(MINIMUM_WINDOWS), T::from_f64(WINSOR_LIMIT));
         self.n = self.n * share + T::from_f64(1.0);
         for (k, single) in singles.iter().enumerate() {
-            let measure = self.measure(k, single.information);
+            let measure = self.estimate(k, single.information);
             let mut square = single.score * single.score;
             let most = furthest * measure.dispersion * single.information;
             if measure.windows > few && square > most {

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use modelmill_codegen::{Method, OperationCount, PassCount, Program, Stage};
+use modelmill_codegen::{ReductionMethod, OperationCount, PassCount, StraightLineProgram, ProgramStage};
 use modelmill_tests::counts::{HEADINGS, best_known, row, text};
 use modelmill_tests::fixtures::derived;
 
@@ -36,7 +36,7 @@ pub(crate) fn passes(names: &[&str]) -> Result<Vec<Passes>, String> {
         .map(|name| {
             let derivation = derived(name);
             let fault = |error: modelmill_codegen::DeriveError| format!("{name}: {error}");
-            let count = |program: &Program| program.count(Stage::State);
+            let count = |program: &StraightLineProgram| program.count_operations(ProgramStage::State);
             Ok(Passes {
                 name,
                 counts: derivation.operations_by_pass().map_err(fault)?,
@@ -280,7 +280,7 @@ fn generation(page: &mut String, all: &[Figures], peers: &Peers) {
             ms.map_or_else(|| "-".to_owned(), |ms| format!("{ms:.1}"))
         };
         let reduction = match f.derivation.reduction.method {
-            Method::Exact { .. } => "exact",
+            ReductionMethod::Exact { .. } => "exact",
             _ => "numeric",
         };
         let mut cells = vec![

@@ -2,9 +2,9 @@
 
 use std::f64::consts::PI;
 
-use modelmill_boundary::files::Disk;
-use modelmill_codegen::{Evaluator, Method, States};
-use modelmill_rig::{Rig, State, Tracker, forces};
+use modelmill_boundary::files::DiskFiles;
+use modelmill_codegen::{ModelEvaluator, ReductionMethod, MotionStates};
+use modelmill_rig::{Rig, RigState, RigTracker, forces};
 use modelmill_spec::Mechanism;
 use modelmill_tests::fixtures::{derive, fixtures, model_file};
 use modelmill_tests::laws::Case;
@@ -20,7 +20,7 @@ fn spidermill_rig() -> Rig {
 fn with(model: &str, more: &str) -> Mechanism {
     let path = model_file(model);
     let text = std::fs::read_to_string(&path).expect("a model") + "\n" + more;
-    modelmill_spec::load(&path.to_string_lossy(), &text, &Disk::default())
+    modelmill_spec::load(&path.to_string_lossy(), &text, &DiskFiles::default())
         .unwrap_or_else(|failure| panic!("{failure}"))
         .mechanism
 }
@@ -43,11 +43,11 @@ fn effect(kind: &str, at: &[&str], values: &[(&str, f64)], constants: &[(&str, f
 }
 
 /// A motion of the SpiderMill within its limits, with both directions and standstill.
-fn motion(n: i32) -> Vec<State> {
+fn motion(n: i32) -> Vec<RigState> {
     (0..n)
         .map(|i| {
             let wave = |k: f64| (k * f64::from(i)).sin();
-            State {
+            RigState {
                 q: vec![
                     1.8 + 0.2 * wave(0.7),
                     1.341_592_653_589_793 + 0.2 * wave(1.1),
@@ -59,8 +59,8 @@ fn motion(n: i32) -> Vec<State> {
         .collect()
 }
 
-fn rig_forces(rig: &Rig, states: &[State]) -> Vec<Vec<f64>> {
-    let mut tracker = Tracker::new(rig).expect("a pose");
+fn rig_forces(rig: &Rig, states: &[RigState]) -> Vec<Vec<f64>> {
+    let mut tracker = RigTracker::new(rig).expect("a pose");
     let mut columns = vec![Vec::new(); rig.drives.len()];
     for state in states {
         let found = forces(rig, &tracker.follow(state).expect("a pose")).expect("forces");
@@ -76,17 +76,17 @@ fn slices(columns: &[Vec<f64>]) -> Vec<&[f64]> {
 }
 
 /// Forces of the model by its reduced regressor, with nominal values.
-fn model_forces(mechanism: &Mechanism, states: &[State], load: &[Vec<f64>]) -> Vec<Vec<f64>> {
+fn model_forces(mechanism: &Mechanism, states: &[RigState], load: &[Vec<f64>]) -> Vec<Vec<f64>> {
     let n = states[0].q.len();
-    let column = |of: fn(&State) -> &Vec<f64>| -> Vec<Vec<f64>> {
+    let column = |of: fn(&RigState) -> &Vec<f64>| -> Vec<Vec<f64>> {
         (0..n)
             .map(|i| states.iter().map(|state| of(state)[i]).collect())
             .collect()
     };
     let (q, qd, qdd) = (column(|s| &s.q), column(|s| &s.qd), column(|s| &s.qdd));
     let derivation = derive(mechanism);
-    let evaluator = Evaluator::new(&derivation);
-    let states = States {
+    let evaluator = ModelEvaluator::new(&derivation);
+    let states = MotionStates {
         q: slices(&q),
         qd: slices(&qd),
         qdd: slices(&qdd),
@@ -363,7 +363,7 @@ fn a_rod_in_space_obeys_dalembert() {
     }
     let reduction = &case.derivation.reduction;
     // Roots do not stand in the way.
-    assert!(matches!(reduction.method, Method::Exact { .. }));
+    assert!(matches!(reduction.method, ReductionMethod::Exact { .. }));
     assert!(reduction.without_effect.is_empty());
 }
 
@@ -395,7 +395,7 @@ fn what_pulls_two_points_together_obeys_virtual_power() {
             figure.unwrap_or_else(|breach| panic!("{model}: {breach}"));
         }
         let reduction = &case.derivation.reduction;
-        assert!(matches!(reduction.method, Method::Exact { .. }), "{model}");
+        assert!(matches!(reduction.method, ReductionMethod::Exact { .. }), "{model}");
         // Nothing else pulls along that line.
         let more = reduction.retained.len() - plain.reduction.retained.len();
         assert_eq!(more, 3, "{model}");
@@ -417,7 +417,7 @@ fn an_element_needs_two_bodies() {
     ] {
         let more = effect("two_point_element", at, &[], &[]);
         let file = path.to_string_lossy();
-        let failure = modelmill_spec::load(&file, &format!("{text}\n{more}"), &Disk::default());
+        let failure = modelmill_spec::load(&file, &format!("{text}\n{more}"), &DiskFiles::default());
         let told = failure.map(|_| ()).expect_err("a refusal").to_string();
         assert!(told.contains(says), "{told}");
     }

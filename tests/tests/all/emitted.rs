@@ -1,7 +1,7 @@
 //! The emitted code: every model's module against the block evaluator, and both SpiderMill models against the tables.
 
 use crate::{fixture_models, random_models};
-use modelmill_codegen::{Derivation, Evaluator, PoseReason, States};
+use modelmill_codegen::{Derivation, ModelEvaluator, PoseReason, MotionStates};
 use modelmill_generated as generated;
 use modelmill_runtime::{PoseError, Real};
 use modelmill_tests::base_parameters;
@@ -123,12 +123,12 @@ fn sample_of(derivation: &Derivation) -> Sample {
         0.25
     };
     Sample::random(mechanism, 50, reach, &mut Stream::new(21))
-        .reachable(&Evaluator::new(derivation))
+        .reachable(&ModelEvaluator::new(derivation))
 }
 
 /// Compares a module's outputs with the evaluator's, column by column relative to the column's largest entry.
 fn check(derivation: &Derivation, sample: &Sample, found: &Outputs, tolerance: f64) {
-    let evaluator = Evaluator::new(derivation);
+    let evaluator = ModelEvaluator::new(derivation);
     let states = sample.states();
     assert!(sample.len() > 30, "too few states");
     let reduction = &derivation.reduction;
@@ -148,9 +148,9 @@ fn check(derivation: &Derivation, sample: &Sample, found: &Outputs, tolerance: f
     check_columns("H_min", &columns(&h_min), &columns(&found.h_min), tolerance);
     let forces = evaluator.inverse_dynamics(&states, &base).expect(reachable);
     check_columns("forces", &forces, &found.forces, tolerance);
-    let drives = evaluator.drives(&states).expect(reachable);
+    let drives = evaluator.drive_motion(&states).expect(reachable);
     check_columns("drives", &drives, &found.drives, tolerance);
-    let passive = evaluator.passive(&states).expect(reachable);
+    let passive = evaluator.passive_motion(&states).expect(reachable);
     check_columns("passive coordinates", &passive, &found.passive, tolerance);
 }
 
@@ -353,7 +353,7 @@ fn another_geometry_needs_no_new_code() {
             other => panic!("a new constant {other}"),
         })
         .collect();
-    let evaluator = Evaluator::with_constants(&derivation, constants);
+    let evaluator = ModelEvaluator::with_constants(&derivation, constants);
     let sample = sample_of(&derivation);
     let expected = evaluator
         .regressor(&sample.states())
@@ -378,7 +378,7 @@ fn poses_without_an_answer_are_errors_in_both() {
     use generated::spidermill::{Geometry, Model, State};
     use std::f64::consts::PI;
     let derivation = derived("spidermill");
-    let evaluator = Evaluator::new(&derivation);
+    let evaluator = ModelEvaluator::new(&derivation);
     let model = Model::new(&Geometry::<f64>::default());
     // The elbows too far apart, and the left crank in line with its spindle.
     let stretched = [PI, 0.0];
@@ -394,7 +394,7 @@ fn poses_without_an_answer_are_errors_in_both() {
         };
         assert_eq!(model.regressor(&state), Err(error));
         let [q1, q2] = [[q[0]], [q[1]]];
-        let states = States {
+        let states = MotionStates {
             q: vec![&q1, &q2],
             qd: vec![&[0.1], &[0.2]],
             qdd: vec![&[0.3], &[0.4]],

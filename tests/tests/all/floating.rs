@@ -3,8 +3,8 @@
 //!
 //! The tables come from `fixtures/reference/make_pinocchio_floating.py`, made by Pinocchio 4.1.
 
-use modelmill_codegen::{Derivation, Evaluator};
-use modelmill_spec::{Mechanism, Step, TwistAxes};
+use modelmill_codegen::{Derivation, ModelEvaluator};
+use modelmill_spec::{Mechanism, FrameStep, TwistAxes};
 use modelmill_tests::base_parameters::{base, nominal, products};
 use modelmill_tests::fixtures::{Table, derive, derived, model};
 use modelmill_tests::laws::{Case, motion};
@@ -26,7 +26,7 @@ const TWISTS: [(&str, TwistAxes, TwistAxes); 3] = [
 fn free_body(mechanism: &Mechanism) -> modelmill_spec::FreeBody {
     let mut steps = mechanism.frames.iter().flat_map(|frame| &frame.steps);
     let free = steps.find_map(|step| match step {
-        Step::Free(body) => Some(*body),
+        FrameStep::Free(body) => Some(*body),
         _ => None,
     });
     free.expect("a floating model")
@@ -39,7 +39,7 @@ fn with_twist(name: &str, linear: TwistAxes, angular: TwistAxes) -> Derivation {
         .iter_mut()
         .flat_map(|frame| &mut frame.steps)
     {
-        if let Step::Free(body) = step {
+        if let FrameStep::Free(body) = step {
             (body.linear, body.angular) = (linear, angular);
         }
     }
@@ -76,7 +76,7 @@ fn check(name: &str, twist: &str, linear: TwistAxes, angular: TwistAxes) {
         .collect();
     assert_eq!(parameters.len(), values.names().len());
     let sample = Sample::from_table(mechanism, &table);
-    let (states, evaluator) = (sample.states(), Evaluator::new(&derivation));
+    let (states, evaluator) = (sample.states(), ModelEvaluator::new(&derivation));
     let p_min = base(&derivation, &parameters);
     let h = evaluator.full_regressor(&states).expect("a pose");
     let by_products = h * DVector::from_vec(products(&derivation, &parameters));
@@ -257,7 +257,7 @@ fn power_of_the_wrench_is_the_rate_of_energy() {
         let mechanism = &derivation.mechanism;
         let body = free_body(mechanism);
         let parameters = nominal(mechanism);
-        let evaluator = Evaluator::new(&derivation);
+        let evaluator = ModelEvaluator::new(&derivation);
         let numbers = Numbers::new(mechanism, parameters.clone());
         let p_min = base(&derivation, &parameters);
         let mut stream = Stream::new(5);
@@ -271,7 +271,7 @@ fn power_of_the_wrench_is_the_rate_of_energy() {
             let forces = evaluator
                 .inverse_dynamics(&one.states(), &p_min)
                 .expect("a pose");
-            let rates = evaluator.drives(&one.states()).expect("a pose");
+            let rates = evaluator.drive_motion(&one.states()).expect("a pose");
             let n = forces.len();
             let power: f64 = (0..n).map(|d| forces[d][0] * rates[n + d][0]).sum();
             let size: f64 = (0..n).map(|d| (forces[d][0] * rates[n + d][0]).abs()).sum();

@@ -3,8 +3,8 @@
 
 use std::fmt::Write;
 
-use modelmill_boundary::files::Memory;
-use modelmill_codegen::Method;
+use modelmill_boundary::files::MemoryFiles;
+use modelmill_codegen::ReductionMethod;
 use modelmill_spec::Mechanism;
 use modelmill_tests::laws::{ACCURACY, Case};
 
@@ -40,7 +40,7 @@ fn twisted(n: usize) -> Mechanism {
         writeln!(text, "[[drive]]\nname = \"t{i}\"\njoint = \"q{i}\"").unwrap();
         on = format!("l{i}");
     }
-    let loaded = modelmill_spec::load("twisted.toml", &text, &Memory::default());
+    let loaded = modelmill_spec::load("twisted.toml", &text, &MemoryFiles::default());
     let mut mechanism = match loaded {
         Ok(loaded) => loaded.mechanism,
         Err(failure) => panic!("{}", failure.render(false)),
@@ -58,7 +58,7 @@ fn check(n: usize) {
     let case = Case::new(&twisted(n), 40, 1.0).unwrap();
     let reduction = &case.derivation.reduction;
     assert!(
-        matches!(reduction.method, Method::Exact { .. }),
+        matches!(reduction.method, ReductionMethod::Exact { .. }),
         "{n}: {:?}",
         reduction.method
     );
@@ -85,7 +85,7 @@ fn arms_of_many_symbolic_twists_are_reduced_exactly() {
 fn long_arms_are_grouped_link_by_link() {
     let case = Case::new(&twisted(18), 12, 0.5).unwrap();
     let reduction = &case.derivation.reduction;
-    assert!(matches!(reduction.method, Method::Exact { .. }));
+    assert!(matches!(reduction.method, ReductionMethod::Exact { .. }));
     assert_eq!(reduction.retained.len(), 7 * 18 - 6);
     let sums = case.derivation.base_sums();
     assert!(!sums.is_empty());

@@ -1,6 +1,6 @@
 //! What is emitted on request: reactions against the evaluator, and self-tests, which must see what is wrong.
 
-use modelmill_codegen::Evaluator;
+use modelmill_codegen::ModelEvaluator;
 use modelmill_runtime::{SelfTestError, Wrench};
 use modelmill_spec::Mechanism;
 use modelmill_tests::fixtures::{derive, model};

@@ -1,14 +1,14 @@
 //! Operations per call of the straight-line programs, beside the lowest counts that other tools reach; and that fewer
 //! operations give the same values.
 
-use modelmill_codegen::{Evaluator, OperationCount, Program, Stage};
+use modelmill_codegen::{ModelEvaluator, OperationCount, StraightLineProgram, ProgramStage};
 use modelmill_tests::base_parameters::{base, products};
 use modelmill_tests::fixtures::derived;
 use modelmill_tests::sample::Sample;
 use modelmill_tests::stream::Stream;
 
-fn count(program: &Program) -> OperationCount {
-    program.count(Stage::State)
+fn count(program: &StraightLineProgram) -> OperationCount {
+    program.count_operations(ProgramStage::State)
 }
 
 /// Additions and multiplications per call of inverse dynamics and base regressor, at most what has been reached.
@@ -77,7 +77,7 @@ fn symmetric_five_bar_is_at_most_what_was_reached() {
 fn check_values(name: &str) {
     let derivation = derived(name);
     let mechanism = &derivation.mechanism;
-    let evaluator = Evaluator::new(&derivation);
+    let evaluator = ModelEvaluator::new(&derivation);
     let reach = if mechanism.loops.is_empty() {
         3.0
     } else {

@@ -3,7 +3,7 @@
 //! The tables come from `fixtures/reference/make_pinocchio_tables.py`; they cover modified and standard
 //! Denavit-Hartenberg frames and frames by roll, pitch and yaw.
 
-use modelmill_codegen::Evaluator;
+use modelmill_codegen::ModelEvaluator;
 use modelmill_tests::base_parameters;
 use modelmill_tests::fixtures::{Table, derived};
 use modelmill_tests::sample::Sample;
@@ -23,7 +23,7 @@ fn check(name: &str) {
         .collect();
     assert_eq!(parameters.len(), values.names().len());
     let sample = Sample::from_table(mechanism, &table);
-    let evaluator = Evaluator::new(&derivation);
+    let evaluator = ModelEvaluator::new(&derivation);
     let h = evaluator
         .full_regressor(&sample.states())
         .expect("an open chain");

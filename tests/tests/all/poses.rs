@@ -4,7 +4,7 @@
 use std::f64::consts::FRAC_PI_2;
 
 use crate::fixture_models as fixtures;
-use modelmill_codegen::{Derivation, Evaluator, PoseFault, PoseReason, States};
+use modelmill_codegen::{Derivation, ModelEvaluator, PoseFault, PoseReason, MotionStates};
 use modelmill_generated::{spidermill, three_rrr};
 use modelmill_runtime::{Loops, PoseError};
 use modelmill_tests::base_parameters;
@@ -27,7 +27,7 @@ fn at_rest(q: &[Vec<f64>]) -> Sample {
 /// Passive coordinates of the evaluator: one vector per coordinate.
 fn passive_of(derivation: &Derivation, q: &[Vec<f64>]) -> Result<Vec<Vec<f64>>, PoseFault> {
     let sample = at_rest(q);
-    let mut all = Evaluator::new(derivation).passive(&sample.states())?;
+    let mut all = ModelEvaluator::new(derivation).passive_motion(&sample.states())?;
     all.truncate(all.len() / 3);
     Ok(all)
 }
@@ -245,7 +245,7 @@ fn spidermill_fault(
     let derivation = derived("spidermill");
     let mut sample = at_rest(&columns(poses));
     spoil(&mut sample);
-    let found = Evaluator::new(&derivation).regressor(&sample.states());
+    let found = ModelEvaluator::new(&derivation).regressor(&sample.states());
     found.err().map(|fault| (fault.sample, fault.reason))
 }
 
@@ -291,7 +291,7 @@ fn newtons_method_reports_the_earliest_fault() {
         poses[far_at] = far;
         let mut sample = at_rest(&columns(&poses));
         sample.qdd[2][nan_at] = f64::INFINITY;
-        let fault = Evaluator::new(&derivation).regressor(&sample.states());
+        let fault = ModelEvaluator::new(&derivation).regressor(&sample.states());
         let fault = fault.expect_err("two states are at fault");
         let reason = if far_at < nan_at {
             PoseReason::OutOfReach
@@ -352,7 +352,7 @@ fn inputs_that_are_no_numbers_are_named() {
     let derivation = derived("spidermill");
     let sample = at_rest(&columns(&[[1.8, 1.35]]));
     let fault = |constants: Vec<f64>, base: &[f64]| {
-        let evaluator = Evaluator::with_constants(&derivation, constants);
+        let evaluator = ModelEvaluator::with_constants(&derivation, constants);
         let fault = evaluator.inverse_dynamics(&sample.states(), base);
         fault.map_err(|f| f.to_string()).err()
     };
@@ -375,8 +375,8 @@ fn an_effect_that_takes_signs_names_what_is_no_number() {
     let n_active = derivation.coordinates().0.len();
     let mut sample = at_rest(&vec![vec![0.1; 5]; n_active]);
     sample.qd[0][2] = f64::NAN;
-    let states: States<'_> = sample.states();
-    let fault = Evaluator::new(&derivation).regressor(&states);
+    let states: MotionStates<'_> = sample.states();
+    let fault = ModelEvaluator::new(&derivation).regressor(&states);
     let fault = fault.expect_err("a rate is no number");
     assert_eq!(fault.sample, 2);
     assert!(matches!(fault.reason, PoseReason::NotFinite { input } if input.ends_with("_d")));
@@ -412,7 +412,7 @@ fn terms_without_a_finite_value_are_errors() {
         assert_eq!(model.regressor(&state).err(), expected, "{q:?}");
         assert_eq!(dynamics.forces(&state).err(), expected, "{q:?}");
         let sample = at_rest(&columns(&[q]));
-        let found = Evaluator::new(&derivation).regressor(&sample.states());
+        let found = ModelEvaluator::new(&derivation).regressor(&sample.states());
         assert_eq!(
             found.err().map(|fault| fault.reason),
             expected.map(PoseReason::from),

@@ -1,6 +1,6 @@
 //! What joints transmit: against bodies by themselves, on bundled models and on random mechanisms, and in emitted code.
 
-use modelmill_codegen::Evaluator;
+use modelmill_codegen::ModelEvaluator;
 use modelmill_tests::fixtures::{derived, model};
 use modelmill_tests::free_bodies::Found;
 use modelmill_tests::laws::Case;
@@ -130,8 +130,8 @@ fn a_bearing_by_hand() {
     let names: Vec<&str> = reactions.joints.iter().map(|j| j.name.as_str()).collect();
     assert_eq!(names.len(), 2, "{names:?}");
     let mechanism = &derivation.mechanism;
-    let evaluator = Evaluator::new(&derivation);
-    let at_rest = modelmill_codegen::States {
+    let evaluator = ModelEvaluator::new(&derivation);
+    let at_rest = modelmill_codegen::MotionStates {
         q: vec![&[0.0], &[0.0]],
         qd: vec![&[0.0], &[0.0]],
         qdd: vec![&[0.0], &[0.0]],

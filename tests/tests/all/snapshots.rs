@@ -2,7 +2,7 @@
 //!
 //! Their truth is shown elsewhere: `emitted`, `spidermill`, `published_groupings`, `operation_counts`.
 
-use modelmill_codegen::review::{Format, page};
+use modelmill_codegen::review::{PageFormat, page};
 use modelmill_tests::fixtures::derived;
 
 /// Models whose code is too long for anyone to look through; their pages are looked at.

@@ -2,14 +2,14 @@
 
 use std::collections::BTreeMap;
 
-use modelmill_codegen::{Derivation, Evaluator};
+use modelmill_codegen::{Derivation, ModelEvaluator};
 use modelmill_tests::base_parameters;
 use modelmill_tests::fixtures::{Table, derived, fixtures};
 use modelmill_tests::published::{Fraction, Map};
 use modelmill_tests::sample::Sample;
 
 fn products(derivation: &Derivation) -> Vec<String> {
-    let text = |m: &modelmill_codegen::Monomial| m.text(&derivation.mechanism);
+    let text = |m: &modelmill_codegen::ParameterMonomial| m.text(&derivation.mechanism);
     derivation.reduction.products.iter().map(text).collect()
 }
 
@@ -87,7 +87,7 @@ fn check_table(name: &str, table: &str) {
     let derivation = derived(name);
     let mechanism = &derivation.mechanism;
     let table = Table::reference(table);
-    let evaluator = Evaluator::new(&derivation);
+    let evaluator = ModelEvaluator::new(&derivation);
     let sample = Sample::from_table(mechanism, &table);
     let close = |what: &str, expected: &[f64], found: &dyn Fn(usize) -> f64| {
         let scale = expected.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
@@ -101,7 +101,7 @@ fn check_table(name: &str, table: &str) {
             );
         }
     };
-    let passive = evaluator.passive(&sample.states()).expect("all in reach");
+    let passive = evaluator.passive_motion(&sample.states()).expect("all in reach");
     for (k, angle) in ["gamma1", "gamma2"].into_iter().enumerate() {
         close(angle, table.column(angle), &|i| passive[k][i]);
     }

@@ -3,17 +3,17 @@
 use std::path::Path;
 use std::sync::{Arc, MutexGuard, PoisonError};
 
-use modelmill::excite::{Limit, Options, Request, limits};
-use modelmill::files::Kind;
+use modelmill::excite::{TrajectoryLimit, Options, ExcitationRequest, limits};
+use modelmill::files::PathKind;
 use modelmill::text::table::significant;
 use modelmill::{Error, Outcome};
 use serde::Deserialize;
 use serde_json::{Value, json};
 
-use super::{Sitting, thinned};
-use crate::options::Excitation;
+use super::{WorkbenchSession, thin_out};
+use crate::options::ExcitationSettings;
 use crate::told;
-use crate::watch::Watch;
+use crate::watch::JobWatch;
 
 /// Harmonics, random trajectories and starts, samples of a file: more of them is a slip of the hand.
 const MOST_HARMONICS: usize = 50;
@@ -22,18 +22,18 @@ const MOST_SAMPLES: f64 = 5e6;
 
 /// A search, and what came of the last one.
 #[derive(Default)]
-pub(crate) struct Planning {
+pub(crate) struct ExcitationJob {
     /// Counts the searches of the sitting.
     number: u64,
     /// The text that is asked about.
     revision: u64,
-    asked: Excitation,
-    going: Option<(Arc<Watch>, f64)>,
-    answer: Option<Result<Planned, String>>,
+    settings: ExcitationSettings,
+    running: Option<(Arc<JobWatch>, f64)>,
+    answer: Option<Result<PlannedTrajectory, String>>,
     was_cancelled: bool,
 }
 
-impl Planning {
+impl ExcitationJob {
     /// Nothing was asked for yet; searches are counted from `first` on.
     pub(crate) fn new(first: u64) -> Self {
         Self {
@@ -44,22 +44,22 @@ impl Planning {
 }
 
 /// A trajectory that was found.
-struct Planned {
-    told: Value,
+struct PlannedTrajectory {
+    view: Value,
     csv: String,
 }
 
 /// The name under which a trajectory is to be kept.
 #[derive(Debug, Deserialize)]
-pub(crate) struct Keeping {
+pub(crate) struct KeepTrajectoryRequest {
     name: String,
 }
 
-impl Excitation {
+impl ExcitationSettings {
     /// As the library is asked.
     ///
     /// Fails with a sentence where a value cannot be meant.
-    fn request(&self) -> Result<Request, String> {
+    fn request(&self) -> Result<ExcitationRequest, String> {
         if !(1..=MOST_HARMONICS).contains(&self.harmonics) {
             return Err(format!("harmonics: expected 1 to {MOST_HARMONICS}"));
         }
@@ -76,8 +76,8 @@ impl Excitation {
                 "rate: expected 1 to 100000 samples per second, and no more than {MOST_SAMPLES} of them in a period"
             ));
         }
-        let limit = |text: &String| Limit::parse(text).map_err(|says| format!("`{text}`: {says}"));
-        Ok(Request {
+        let limit = |text: &String| TrajectoryLimit::parse(text).map_err(|says| format!("`{text}`: {says}"));
+        Ok(ExcitationRequest {
             options: Options {
                 harmonics: self.harmonics,
                 period: self.period,
@@ -93,24 +93,24 @@ impl Excitation {
     }
 }
 
-impl Sitting {
-    fn planning(&self) -> MutexGuard<'_, Planning> {
+impl WorkbenchSession {
+    fn planning(&self) -> MutexGuard<'_, ExcitationJob> {
         self.planning.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// What an editor offers while one types.
-    pub(crate) fn words(&self) -> Result<Value, String> {
-        let kinds = match self.state().now.found.as_ref() {
+    pub(crate) fn completions(&self) -> Result<Value, String> {
+        let kinds = match self.state().derived.found.as_ref() {
             Ok(model) => model.loaded.kinds.clone(),
-            Err(_) => self.host.kinds().map_err(|error| self.said(&error))?,
+            Err(_) => self.host.kinds().map_err(|error| self.error_text(&error))?,
         };
-        Ok(told::words(&kinds))
+        Ok(told::completion_data(&kinds))
     }
 
     /// Limits of the active coordinates as the text has them; what has none is `null`.
     pub(crate) fn limits(&self) -> Result<Value, String> {
         let (model, _) = self.model()?;
-        let known = limits::limits(&model, &[]).map_err(|error| self.said(&error))?;
+        let known = limits::merged_limits(&model, &[]).map_err(|error| self.error_text(&error))?;
         let mechanism = &model.derivation.mechanism;
         let of = |(name, is_angle): &(String, bool)| {
             let mut all = known.coordinates.iter();
@@ -130,25 +130,25 @@ impl Sitting {
     /// Begins to search for a trajectory for the text as it stands.
     ///
     /// Fails with a sentence when a search goes on, or a value cannot be meant.
-    pub(crate) fn excite(self: &Arc<Self>, asked: Excitation) -> Result<Value, String> {
+    pub(crate) fn excite(self: &Arc<Self>, asked: ExcitationSettings) -> Result<Value, String> {
         self.model()?;
         let request = asked.request()?;
-        let watch = Arc::new(Watch::new(Arc::clone(&self.surroundings)));
+        let watch = Arc::new(JobWatch::new(Arc::clone(&self.surroundings)));
         let (text, revision) = {
             let state = self.state();
             (state.draft.text().to_owned(), state.draft.revision())
         };
         let number = {
             let mut planning = self.planning();
-            if planning.going.is_some() {
+            if planning.running.is_some() {
                 return Err("a search goes on; wait for it, or cancel it".to_owned());
             }
-            *planning = Planning {
+            *planning = ExcitationJob {
                 number: planning.number + 1,
                 revision,
-                asked,
-                going: Some((Arc::clone(&watch), self.surroundings.seconds())),
-                ..Planning::default()
+                settings: asked,
+                running: Some((Arc::clone(&watch), self.surroundings.seconds())),
+                ..ExcitationJob::default()
             };
             planning.number
         };
@@ -162,56 +162,56 @@ impl Sitting {
                     "the search ended by a fault of the program, which is none of yours",
                 ))
             });
-            sitting.planned(number, found);
+            sitting.finish_excitation(number, found);
         };
-        if let Err(error) = self.surroundings.begin(Box::new(work)) {
-            self.planning().going = None;
+        if let Err(error) = self.surroundings.spawn_work(Box::new(work)) {
+            self.planning().running = None;
             return Err(format!("the search cannot begin: {error}"));
         }
         Ok(self.excitation())
     }
 
-    fn plan(&self, host: &modelmill::Host, text: &str, request: &Request) -> Outcome<Planned> {
+    fn plan(&self, host: &modelmill::Host, text: &str, request: &ExcitationRequest) -> Outcome<PlannedTrajectory> {
         let path = &self.options.model;
         let model = host.derive(&self.name(), host.load_text(path, text)?)?;
         let found = model.excite(request, &[])?;
         let mut told = found.json();
         told["picture"] = json!(found.picture);
         told["names"] = json!(found.coordinates);
-        told["time"] = json!(thinned(&found.time));
-        told["q"] = found.motion.q.iter().map(|q| json!(thinned(q))).collect();
+        told["time"] = json!(thin_out(&found.time));
+        told["q"] = found.motion.q.iter().map(|q| json!(thin_out(q))).collect();
         told["samples"] = json!(found.time.len());
         told["says"] = json!(format!(
             "Condition number {}, {} for the best of {} random trajectories that keep the limits.",
             significant(found.found.condition_number, 4),
-            significant(found.found.start, 4),
-            found.found.random
+            significant(found.found.start_condition_number, 4),
+            found.found.feasible_starts
         ));
         told["notes"] = json!(found.notes);
-        Ok(Planned {
-            told,
+        Ok(PlannedTrajectory {
+            view: told,
             csv: found.csv(),
         })
     }
 
-    fn planned(&self, number: u64, found: Outcome<Planned>) {
+    fn finish_excitation(&self, number: u64, found: Outcome<PlannedTrajectory>) {
         let mut planning = self.planning();
         if planning.number != number {
             return;
         }
-        planning.going = None;
+        planning.running = None;
         match found {
             Ok(planned) => planning.answer = Some(Ok(planned)),
             Err(Error::Cancelled) => planning.was_cancelled = true,
-            Err(error) => planning.answer = Some(Err(self.said(&error))),
+            Err(error) => planning.answer = Some(Err(self.error_text(&error))),
         }
         drop(planning);
-        self.tell();
+        self.notify_pages();
     }
 
     /// Asks the search that goes on to stop.
     pub(crate) fn stop_excitation(&self) -> Value {
-        if let Some((watch, _)) = &self.planning().going {
+        if let Some((watch, _)) = &self.planning().running {
             watch.cancel();
         }
         self.excitation()
@@ -221,8 +221,8 @@ impl Sitting {
     pub(crate) fn excitation(&self) -> Value {
         let revision = self.state().draft.revision();
         let planning = self.planning();
-        let going = planning.going.as_ref().map(|(watch, since)| {
-            let mut told = watch.told();
+        let going = planning.running.as_ref().map(|(watch, since)| {
+            let mut told = watch.progress_view();
             told["seconds"] = json!(self.surroundings.seconds() - since);
             told
         });
@@ -231,9 +231,9 @@ impl Sitting {
             "number": planning.number,
             "going": going,
             "cancelled": planning.was_cancelled,
-            "found": answer.and_then(|answer| answer.as_ref().ok()).map(|planned| &planned.told),
+            "found": answer.and_then(|answer| answer.as_ref().ok()).map(|planned| &planned.view),
             "failed": answer.and_then(|answer| answer.as_ref().err()),
-            "command": self.commands.excite(&planning.asked),
+            "command": self.commands.excite_command(&planning.settings),
             "of_this_text": planning.revision == revision,
         })
     }
@@ -249,7 +249,7 @@ impl Sitting {
     /// Writes the trajectory to a file of the model's folder that is not there yet.
     ///
     /// Fails with a sentence when the name is none of such a file.
-    pub(crate) fn keep_trajectory(&self, keeping: &Keeping) -> Result<Value, String> {
+    pub(crate) fn keep_trajectory(&self, keeping: &KeepTrajectoryRequest) -> Result<Value, String> {
         let name = keeping.name.trim();
         let is_plain = Path::new(name).file_name().is_some_and(|own| own == name)
             && !name.starts_with('.')
@@ -262,7 +262,7 @@ impl Sitting {
         }
         let folder = self.options.model.parent().unwrap_or(Path::new(""));
         let path = folder.join(name);
-        if self.surroundings.files().kind(&path) != Kind::Missing {
+        if self.surroundings.files().kind(&path) != PathKind::Missing {
             return Err(format!(
                 "{} is there already; give another name",
                 path.display()
@@ -283,23 +283,23 @@ mod tests {
 
     #[test]
     fn what_cannot_be_meant_is_refused() {
-        let usual = Excitation::default();
+        let usual = ExcitationSettings::default();
         assert!(usual.request().is_ok());
         for wrong in [
-            Excitation {
+            ExcitationSettings {
                 harmonics: 0,
                 ..usual.clone()
             },
-            Excitation {
+            ExcitationSettings {
                 period: f64::NAN,
                 ..usual.clone()
             },
-            Excitation {
+            ExcitationSettings {
                 rate: 1e5,
                 period: 1e3,
                 ..usual.clone()
             },
-            Excitation {
+            ExcitationSettings {
                 limits: vec!["theta1=2:1".to_owned()],
                 ..usual.clone()
             },

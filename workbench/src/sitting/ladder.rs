@@ -4,22 +4,22 @@ use serde_json::{Value, json};
 
 /// Steps of a sitting, each with the errors of the text that it led to. Errors come later than the step, if anybody waits for them
 /// at all: what led to a text whose errors nobody knows has no rung, since those of another text are not its own.
-pub(super) struct Ladder {
+pub(super) struct ErrorLadder {
     /// What was done since the last rung, and to which revision that led.
     done: Vec<(u64, String)>,
     /// The errors that were found last, and of which revision.
     compared: Option<(u64, Value)>,
     /// The revision of the last rung.
     last: Option<u64>,
-    rungs: Vec<Rung>,
+    rungs: Vec<LadderStep>,
 }
 
-struct Rung {
+struct LadderStep {
     what: String,
     errors: Value,
 }
 
-impl Ladder {
+impl ErrorLadder {
     /// Of a text that was opened with this revision.
     pub(super) fn new(opened: u64) -> Self {
         Self {
@@ -31,7 +31,7 @@ impl Ladder {
     }
 
     /// The rungs, as pages read them.
-    pub(super) fn told(&self) -> Value {
+    pub(super) fn view(&self) -> Value {
         let rungs = self.rungs.iter();
         rungs
             .map(|rung| json!({ "what": rung.what, "errors": rung.errors }))
@@ -39,27 +39,27 @@ impl Ladder {
     }
 
     /// Something was done that led to a revision of the text, and whose effect on the errors is to stand here.
-    pub(super) fn did(&mut self, revision: u64, what: &str) {
+    pub(super) fn record_step(&mut self, revision: u64, what: &str) {
         if (self.done.iter()).all(|(at, one)| *at != revision || one != what) {
             self.done.push((revision, what.to_owned()));
         }
-        self.stands(revision);
+        self.add_step_if_known(revision);
     }
 
     /// Takes the errors of a revision, and says whether a rung came of them.
-    pub(super) fn compared(&mut self, revision: u64, errors: Value) -> bool {
+    pub(super) fn add_errors(&mut self, revision: u64, errors: Value) -> bool {
         self.compared = Some((revision, errors));
-        self.stands(revision)
+        self.add_step_if_known(revision)
     }
 
     /// What was typed until a revision is a step of its own, before something else is done to the text.
-    pub(super) fn ends_typing(&mut self, revision: u64) {
+    pub(super) fn end_typing(&mut self, revision: u64) {
         let Some(errors) = self.errors_of(revision) else {
             return;
         };
         let is_news = self.rungs.last().is_none_or(|rung| rung.errors != *errors);
         if is_news && self.last != Some(revision) {
-            self.did(revision, "edited");
+            self.record_step(revision, "edited");
         }
     }
 
@@ -69,7 +69,7 @@ impl Ladder {
     }
 
     /// Puts what led to a revision on the ladder, if its errors are known.
-    fn stands(&mut self, revision: u64) -> bool {
+    fn add_step_if_known(&mut self, revision: u64) -> bool {
         let Some(errors) = self.errors_of(revision).cloned() else {
             return false;
         };
@@ -80,7 +80,7 @@ impl Ladder {
             return false;
         }
         self.last = Some(revision);
-        self.rungs.push(Rung {
+        self.rungs.push(LadderStep {
             what: what.join(", "),
             errors,
         });

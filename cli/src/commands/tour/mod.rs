@@ -6,21 +6,21 @@ mod story;
 
 use std::path::{Path, PathBuf};
 
-use modelmill::compare::Compared;
-use modelmill::diagnose::{Findings, Held, Question, words};
-use modelmill::print::{Spelling, edit};
-use modelmill::recording::{Reading, Recording};
+use modelmill::compare::ModelComparison;
+use modelmill::diagnose::{DiagnosisFindings, FixedParameters, DiagnosisOptions, words};
+use modelmill::print::{AdviceFormatter, edit};
+use modelmill::recording::{RecordingOptions, PreparedRecording};
 use modelmill::report::page;
 use modelmill::{Host, Model, along, bundled};
-use modelmill_recordings::{PLAIN, Runs, WITH_RODS};
+use modelmill_recordings::{PLAIN, BundledRuns, WITH_RODS};
 
 use crate::args::TourArgs;
-use crate::failure::{Failure, Outcome};
-use crate::flags::{Flags, quoted};
+use crate::failure::{CommandFailure, CommandOutcome};
+use crate::flags::{CommandLineAdvice, quote_word};
 use crate::output;
 use crate::terminal;
 
-use story::Story;
+use story::TourText;
 
 /// The page of the robot with rods.
 const RODS_PAGE: &str = "report.html";
@@ -30,23 +30,23 @@ const PAPER_PAGE: &str = "report-paper.html";
 const EDITED: &str = "spidermill-completed.toml";
 
 /// Tells the story and writes its files.
-pub(crate) fn run(host: &Host, args: &TourArgs) -> Outcome {
+pub(crate) fn run(host: &Host, args: &TourArgs) -> CommandOutcome {
     let folder = args
         .out
         .clone()
         .unwrap_or_else(|| std::env::temp_dir().join("modelmill-tour"));
     output::make_folder(&folder)?;
-    let place = Place::unpack(&folder)?;
-    let mut story = Story::new(terminal::style());
+    let place = TourFolder::unpack(&folder)?;
+    let mut story = TourText::new(terminal::style());
 
     let model = place.model(host, "spidermill.toml")?;
     let runs = place.read(&model, &WITH_RODS)?;
     story.derive(&place.name("spidermill.toml"), &model);
-    let seen = Seen::new(&model, &runs[1])?;
+    let seen = TourComparison::new(&model, &runs[1])?;
     story.compare(&place, &model, &seen);
 
     let flags = place.flags(&WITH_RODS);
-    let rods = diagnose(&model, &runs, Held::Known)?;
+    let rods = diagnose(&model, &runs, FixedParameters::Known)?;
     story.diagnose(&place, &rods);
     let edited = place.add(&rods, &flags)?;
     story.add(&place, edited.as_ref());
@@ -55,7 +55,7 @@ pub(crate) fn run(host: &Host, args: &TourArgs) -> Outcome {
 
     let model = place.model(host, "spidermill-paper.toml")?;
     let runs = place.read(&model, &PLAIN)?;
-    let paper = diagnose(&model, &runs, Held::All)?;
+    let paper = diagnose(&model, &runs, FixedParameters::All)?;
     story.paper(&place, &paper);
     place.write(PAPER_PAGE, &page(&paper, &place.flags(&PLAIN))?)?;
 
@@ -63,22 +63,22 @@ pub(crate) fn run(host: &Host, args: &TourArgs) -> Outcome {
     terminal::print(story.text.trim_start())
 }
 
-fn diagnose(model: &Model, [fit, check]: &[Recording; 2], held: Held) -> Outcome<Findings> {
-    let question = Question {
-        held,
-        again_with_nominal: false,
+fn diagnose(model: &Model, [fit, check]: &[PreparedRecording; 2], held: FixedParameters) -> CommandOutcome<DiagnosisFindings> {
+    let question = DiagnosisOptions {
+        fixed: held,
+        repeat_with_nominal: false,
     };
     Ok(model.diagnose(&[fit], &[check], &question)?)
 }
 
 /// The folder of the tour.
-struct Place {
+struct TourFolder {
     folder: PathBuf,
 }
 
-impl Place {
+impl TourFolder {
     /// Writes models and recordings of the program into a folder.
-    fn unpack(folder: &Path) -> Outcome<Self> {
+    fn unpack(folder: &Path) -> CommandOutcome<Self> {
         let place = Self {
             folder: folder.to_owned(),
         };
@@ -93,17 +93,17 @@ impl Place {
         Ok(place)
     }
 
-    fn write(&self, name: &str, text: &str) -> Outcome {
+    fn write(&self, name: &str, text: &str) -> CommandOutcome {
         output::write(&self.folder.join(name), text)
     }
 
     /// A file of the folder as a command has it.
     fn name(&self, file: &str) -> String {
-        quoted(&self.folder.join(file).display().to_string())
+        quote_word(&self.folder.join(file).display().to_string())
     }
 
     /// Recordings as a command has them.
-    fn recordings(&self, runs: &Runs) -> String {
+    fn recordings(&self, runs: &BundledRuns) -> String {
         format!(
             "--data {} --check {}",
             self.name(file_name(runs.fit.0)),
@@ -115,33 +115,33 @@ impl Place {
         self.folder.join(file_name(name))
     }
 
-    fn model(&self, host: &Host, name: &str) -> Outcome<Model> {
+    fn model(&self, host: &Host, name: &str) -> CommandOutcome<Model> {
         Ok(host.model(self.path(name))?)
     }
 
-    fn read(&self, model: &Model, runs: &Runs) -> Outcome<[Recording; 2]> {
-        let read = |name: &str| model.recording(self.path(name), &Reading::default());
+    fn read(&self, model: &Model, runs: &BundledRuns) -> CommandOutcome<[PreparedRecording; 2]> {
+        let read = |name: &str| model.recording(self.path(name), &RecordingOptions::default());
         Ok([read(runs.fit.0)?, read(runs.check.0)?])
     }
 
     /// How the command line asks for the same.
-    fn flags(&self, runs: &Runs) -> Flags {
+    fn flags(&self, runs: &BundledRuns) -> CommandLineAdvice {
         let [fit, check] = [runs.fit.0, runs.check.0].map(|name| self.path(name));
-        Flags::new(&[fit], &[check], &Reading::default())
+        CommandLineAdvice::new(&[fit], &[check], &RecordingOptions::default())
     }
 
     /// Writes the model with what was found beside the one it came from; the commands for it, and the difference.
-    fn add(&self, findings: &Findings, flags: &Flags) -> Outcome<Option<(Vec<String>, String)>> {
+    fn add(&self, findings: &DiagnosisFindings, flags: &CommandLineAdvice) -> CommandOutcome<Option<(Vec<String>, String)>> {
         let Some(edited) = &findings.edited else {
             return Ok(None);
         };
         self.write(EDITED, &edited.text)?;
         let model = &findings.before.model;
         let commands = findings.entries.iter();
-        let commands = commands.map(|entry| flags.add(model, entry)).collect();
+        let commands = commands.map(|entry| flags.add_effect(model, entry)).collect();
         let names = ["spidermill.toml", EDITED];
         let difference = edit::difference(model.text(), &edited.text, names);
-        let coloured = edit::coloured(&difference, terminal::style());
+        let coloured = edit::colour_diff(&difference, terminal::style());
         Ok(Some((commands, coloured)))
     }
 }
@@ -152,21 +152,21 @@ fn file_name(name: &str) -> &str {
 }
 
 /// The model with nominal parameters held against a recording.
-struct Seen {
-    compared: Compared,
+struct TourComparison {
+    compared: ModelComparison,
     time: Vec<f64>,
     measured: Vec<Vec<f64>>,
     errors: Vec<Vec<f64>>,
 }
 
-impl Seen {
-    fn new(model: &Model, recording: &Recording) -> Outcome<Self> {
+impl TourComparison {
+    fn new(model: &Model, recording: &PreparedRecording) -> CommandOutcome<Self> {
         let one = recording
-            .stretches
+            .segments
             .first()
-            .ok_or_else(|| Failure::Input("the bundled recording has no sample".to_owned()))?;
-        let measured = along::measured(one)?;
-        let forces = along::decimated(along::forces(model, one, &model.nominal)?, one)?;
+            .ok_or_else(|| CommandFailure::Input("the bundled recording has no sample".to_owned()))?;
+        let measured = along::measured_forces(one)?;
+        let forces = along::filter_and_decimate(along::forces(model, one, &model.nominal)?, one)?;
         let errors = measured
             .iter()
             .zip(&forces)
@@ -182,6 +182,6 @@ impl Seen {
 }
 
 /// The verdict of a diagnosis in words.
-fn verdict(findings: &Findings) -> String {
-    words::verdict(&findings.diagnosis, findings.channels(), findings.judged)
+fn verdict(findings: &DiagnosisFindings) -> String {
+    words::verdict(&findings.diagnosis, findings.channels(), findings.validation)
 }

@@ -1,13 +1,13 @@
 //! The words of the tour: paragraphs, tables and figures in the order in which they are told.
 
 use modelmill::Model;
-use modelmill::diagnose::{Findings, Rung, words};
+use modelmill::diagnose::{DiagnosisFindings, SelectionStep, words};
 use modelmill::print::tables;
-use modelmill::text::Style;
-use modelmill::text::table::{Align, count, percent, table};
+use modelmill::text::TerminalStyle;
+use modelmill::text::table::{ColumnAlignment, count, percent, table};
 
-use super::{EDITED, PAPER_PAGE, PLAIN, Place, RODS_PAGE, Seen, WITH_RODS, verdict};
-use crate::terminal::plot::{Curve, bar, time_axis};
+use super::{EDITED, PAPER_PAGE, PLAIN, TourFolder, RODS_PAGE, TourComparison, WITH_RODS, verdict};
+use crate::terminal::plot::{TerminalCurve, bar, time_axis};
 
 /// Width of a paragraph.
 const WIDTH: usize = 76;
@@ -17,14 +17,14 @@ const BAR: usize = 30;
 const OTHERS: usize = 5;
 
 /// The text as it grows.
-pub(super) struct Story {
+pub(super) struct TourText {
     pub(super) text: String,
-    style: Style,
+    style: TerminalStyle,
 }
 
-impl Story {
+impl TourText {
     /// An empty story.
-    pub(super) fn new(style: Style) -> Self {
+    pub(super) fn new(style: TerminalStyle) -> Self {
         Self {
             text: String::new(),
             style,
@@ -51,7 +51,7 @@ impl Story {
     }
 
     /// A paragraph, wrapped.
-    fn say(&mut self, text: &str) {
+    fn paragraph(&mut self, text: &str) {
         self.lines(&words::lines(text, WIDTH));
         self.line("");
     }
@@ -68,7 +68,7 @@ impl Story {
         self.heading("1  Derive: from a model file to what can be known");
         let mechanism = &model.derivation.mechanism;
         let reduction = &model.derivation.reduction;
-        self.say(&format!(
+        self.paragraph(&format!(
             "A parallel robot carries a platform on two cranks, each pushed by a ball screw. Its model file has {}, {} and {}. \
              The forces of the screws are linear in {} of masses, lengths and inertias, but many say the same thing. These {} are \
              all that any measurement can tell, found exactly and in symbols:",
@@ -84,9 +84,9 @@ impl Story {
     }
 
     /// How far the model is off, and where.
-    pub(super) fn compare(&mut self, place: &Place, model: &Model, seen: &Seen) {
+    pub(super) fn compare(&mut self, place: &TourFolder, model: &Model, seen: &TourComparison) {
         self.heading("2  Compare: where does the model fail?");
-        self.say(&format!(
+        self.paragraph(&format!(
             "Another house's multibody code simulated the whole robot, eleven groups of bodies, and something besides that the \
              model file does not know of. Held against that recording, with the masses of the drawings, the model misses the \
              forces by {}. First the force of one screw, then what the model misses:",
@@ -100,7 +100,7 @@ impl Story {
             ] {
                 let title = self.style.dim(&title);
                 self.line(&format!("{:>9}  {title}", ""));
-                let curve = Curve {
+                let curve = TerminalCurve {
                     values,
                     height,
                     limit: None,
@@ -113,7 +113,7 @@ impl Story {
         self.line("Where the error lives:");
         self.lines(&tables::places(&seen.compared.places));
         self.line("");
-        self.say("True, but it does not say what is missing. This is as far as other tools go; the thinking is left to you.");
+        self.paragraph("True, but it does not say what is missing. This is as far as other tools go; the thinking is left to you.");
         self.command(&format!(
             "compare {} --data {}",
             place.name("spidermill.toml"),
@@ -122,42 +122,42 @@ impl Story {
     }
 
     /// What is missing, and what else was tried.
-    pub(super) fn diagnose(&mut self, place: &Place, findings: &Findings) {
+    pub(super) fn diagnose(&mut self, place: &TourFolder, findings: &DiagnosisFindings) {
         self.heading("3  Diagnose: what is missing?");
         let all = &findings.diagnosis.candidates;
-        self.say(&format!(
+        self.paragraph(&format!(
             "modelmill writes down every effect of its library at every place of this mechanism, {} in all: friction of many \
              kinds, springs, inertias, offsets, delays, rods. It fits them beside the model on one run, and believes only what \
              also lowers the error on another, which it did not fit.",
             count(all.len(), "candidate", "candidates")
         ));
-        self.say(&verdict(findings));
-        let shown = all.iter().filter(|c| c.refused.is_none());
-        let others = all.iter().filter(|c| c.refused.is_some()).take(OTHERS);
+        self.paragraph(&verdict(findings));
+        let shown = all.iter().filter(|c| c.rejection_reason.is_none());
+        let others = all.iter().filter(|c| c.rejection_reason.is_some()).take(OTHERS);
         let rows: Vec<Vec<String>> = shown
             .chain(others)
             .map(|c| {
                 vec![
                     words::effect(&c.effect),
                     format!("{:.0} %", 100.0 * c.explained),
-                    c.refused.clone().unwrap_or_else(|| "found".to_owned()),
+                    c.rejection_reason.clone().unwrap_or_else(|| "found".to_owned()),
                 ]
             })
             .collect();
         let columns = [
-            ("candidate", Align::Left),
-            ("explains alone", Align::Right),
-            ("verdict", Align::Left),
+            ("candidate", ColumnAlignment::Left),
+            ("explains alone", ColumnAlignment::Right),
+            ("verdict", ColumnAlignment::Left),
         ];
         self.lines(&table(2, &columns, &rows));
         self.line("");
         for found in &findings.diagnosis.effects {
             let kinds = &findings.before.model.loaded.kinds;
             if let Some(kind) = kinds.iter().find(|k| k.name == found.effect.kind) {
-                self.say(&format!("{}: {}", words::effect(&found.effect), kind.says));
+                self.paragraph(&format!("{}: {}", words::effect(&found.effect), kind.says));
             }
             if !found.indistinguishable_from.is_empty() {
-                self.say(&format!(
+                self.paragraph(&format!(
                     "This recording cannot tell it from {}.",
                     words::effects(&found.indistinguishable_from)
                 ));
@@ -171,13 +171,13 @@ impl Story {
     }
 
     /// What changes in the model file.
-    pub(super) fn add(&mut self, place: &Place, edited: Option<&(Vec<String>, String)>) {
+    pub(super) fn add(&mut self, place: &TourFolder, edited: Option<&(Vec<String>, String)>) {
         self.heading("4  Add: the model file learns it");
         let Some((commands, difference)) = edited else {
-            self.say("Nothing was found that could be added.");
+            self.paragraph("Nothing was found that could be added.");
             return;
         };
-        self.say(&format!(
+        self.paragraph(&format!(
             "An effect is some lines of the model file, with the estimates for nominal values. Comments and layout stay. Here \
              the result is written to {}:",
             place.name(EDITED)
@@ -193,10 +193,10 @@ impl Story {
     }
 
     /// Errors step by step, and the parameters in the end.
-    pub(super) fn ladder(&mut self, findings: &Findings) {
+    pub(super) fn ladder(&mut self, findings: &DiagnosisFindings) {
         self.heading("5  Identify again, and watch the error fall");
         let diagnosis = &findings.diagnosis;
-        self.bars(&diagnosis.ladder, diagnosis.noise_floor);
+        self.bars(&diagnosis.steps, diagnosis.noise_floor);
         if let Ok(after) = &findings.after
             && let Some(result) = &after.identified
         {
@@ -206,14 +206,14 @@ impl Story {
             self.lines(&tables::parameters(&result.fit.parameters));
             self.line("");
         }
-        self.say(
+        self.paragraph(
             "What was hidden: each screw is a rod of 8 kg and 0.9 m that swings about its base. Its moment of inertia is \
              8 * 0.9^2 / 3 = 2.16 kg m^2, its first moment 8 * 0.9 / 2 = 3.6 kg m. Compare with Jr and Sr above.",
         );
     }
 
     /// Errors on the check as bars over decades, down to the noise.
-    fn bars(&mut self, ladder: &[Rung], noise: f64) {
+    fn bars(&mut self, ladder: &[SelectionStep], noise: f64) {
         let largest = ladder.iter().map(|rung| rung.check).fold(noise, f64::max);
         let least = ladder.iter().map(|rung| rung.check);
         let least = least.chain([noise]).filter(|e| *e > 0.0);
@@ -244,26 +244,26 @@ impl Story {
             }
         }
         self.line("");
-        self.say(
+        self.paragraph(
             "Error relative to the force on the check run, which was not fitted; bars are decades.",
         );
     }
 
     /// The treatment of the paper.
-    pub(super) fn paper(&mut self, place: &Place, findings: &Findings) {
+    pub(super) fn paper(&mut self, place: &TourFolder, findings: &DiagnosisFindings) {
         self.heading("6  The same question to a published model");
-        self.say(
+        self.paragraph(
             "The paper that describes this robot lets the platform's mass m4 act at the joint in the balance of forces, and at \
              the middle of the coupler in the balance of moments. Its parameters come from drawings, and its authors saw an \
              error that they could not name. On a simulation of the robot exactly as the paper has it, with all parameters held:",
         );
-        self.say(&verdict(findings));
+        self.paragraph(&verdict(findings));
         let diagnosis = &findings.diagnosis;
-        self.bars(&diagnosis.ladder, diagnosis.noise_floor);
+        self.bars(&diagnosis.steps, diagnosis.noise_floor);
         for found in &diagnosis.effects {
             let kinds = &findings.before.model.loaded.kinds;
             if let Some(kind) = kinds.iter().find(|k| k.name == found.effect.kind) {
-                self.say(&format!("{}: {}", words::effect(&found.effect), kind.says));
+                self.paragraph(&format!("{}: {}", words::effect(&found.effect), kind.says));
             }
         }
         self.command(&format!(
@@ -274,9 +274,9 @@ impl Story {
     }
 
     /// Where to look on.
-    pub(super) fn pages(&mut self, place: &Place) {
+    pub(super) fn pages(&mut self, place: &TourFolder) {
         self.heading("7  The pages");
-        self.say(
+        self.paragraph(
             "All of this, with curves that can be zoomed, error maps, every candidate, parameters and equations, is on two pages \
              that need no network. Open them in a browser:",
         );
@@ -284,7 +284,7 @@ impl Story {
             self.line(&format!("  {}", place.name(page)));
         }
         self.line("");
-        self.say("For a mechanism of yours:");
+        self.paragraph("For a mechanism of yours:");
         self.command("report MODEL --data RUN --check OTHER_RUN --out DIR");
     }
 }

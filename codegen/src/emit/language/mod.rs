@@ -7,7 +7,7 @@ pub(in crate::emit) mod c99;
 pub(in crate::emit) mod rust;
 mod syntax;
 
-use crate::{Derivation, Dynamics, Reactions};
+use crate::{Derivation, DynamicsPrograms, ReactionPrograms};
 
 /// A text file of what is emitted.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -20,20 +20,20 @@ pub struct EmittedFile {
 
 /// What is written of a model.
 #[derive(Clone, Copy)]
-pub struct Source<'a> {
+pub struct EmissionRequest<'a> {
     /// The model: regressor, inverse dynamics, drives, passive coordinates.
     pub derivation: &'a Derivation,
     /// Its equation of motion, if that is wanted.
-    pub dynamics: Option<&'a Dynamics>,
+    pub dynamics: Option<&'a DynamicsPrograms>,
     /// What its joints transmit, if that is wanted.
-    pub reactions: Option<&'a Reactions>,
+    pub reactions: Option<&'a ReactionPrograms>,
     /// Whether a test of the base parameters is wanted.
     pub self_test: bool,
 }
 
 /// What the files of a language are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Form {
+pub enum OutputForm {
     /// One file.
     Module,
     /// Source files for a folder.
@@ -46,39 +46,39 @@ pub enum Form {
 }
 
 /// A language in which models are written.
-pub trait Language: Sync {
+pub trait OutputLanguage: Sync {
     /// What it is called.
     fn name(&self) -> &'static str;
     /// What is made in it, in a few words.
-    fn about(&self) -> &'static str;
+    fn description(&self) -> &'static str;
     /// What its files are.
-    fn form(&self) -> Form;
+    fn output_form(&self) -> OutputForm;
     /// Whether it has reactions and a self-test, if a source asks for them.
-    fn has_all(&self) -> bool {
+    fn has_reactions_and_self_test(&self) -> bool {
         true
     }
     /// The files of a model.
-    fn write(&self, source: &Source<'_>) -> Vec<EmittedFile>;
+    fn emit_files(&self, source: &EmissionRequest<'_>) -> Vec<EmittedFile>;
 }
 
 /// A module of Rust.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::emit) struct RustModule;
 
-impl Language for RustModule {
+impl OutputLanguage for RustModule {
     fn name(&self) -> &'static str {
         "rust"
     }
 
-    fn about(&self) -> &'static str {
+    fn description(&self) -> &'static str {
         "A module for `no_std` and `std`"
     }
 
-    fn form(&self) -> Form {
-        Form::Module
+    fn output_form(&self) -> OutputForm {
+        OutputForm::Module
     }
 
-    fn write(&self, source: &Source<'_>) -> Vec<EmittedFile> {
+    fn emit_files(&self, source: &EmissionRequest<'_>) -> Vec<EmittedFile> {
         let mut emitted = rust::emit(source.derivation);
         if let Some(dynamics) = source.dynamics {
             emitted = emitted.with_dynamics(source.derivation, dynamics);
@@ -98,22 +98,22 @@ impl Language for RustModule {
 
 /// Plain C99, one header and one source.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::emit) struct C99;
+pub(in crate::emit) struct C99Sources;
 
-impl Language for C99 {
+impl OutputLanguage for C99Sources {
     fn name(&self) -> &'static str {
         "c99"
     }
 
-    fn about(&self) -> &'static str {
+    fn description(&self) -> &'static str {
         "A header and a source of plain C99"
     }
 
-    fn form(&self) -> Form {
-        Form::Sources
+    fn output_form(&self) -> OutputForm {
+        OutputForm::Sources
     }
 
-    fn write(&self, source: &Source<'_>) -> Vec<EmittedFile> {
-        c99::write(source)
+    fn emit_files(&self, source: &EmissionRequest<'_>) -> Vec<EmittedFile> {
+        c99::emit_sources(source)
     }
 }

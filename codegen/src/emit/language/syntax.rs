@@ -1,69 +1,69 @@
 //! What languages differ in when they print expressions and statements, and what they share.
 
-use crate::emit::tree::{Binding, Expression};
+use crate::emit::tree::{OperatorPrecedence, CodeExpression};
 use crate::expr::Unary;
 
 /// How a language writes what stands in statements.
-pub(in crate::emit) trait Syntax {
+pub(in crate::emit) trait LanguageSyntax {
     /// A variable.
     fn name(&self, name: &str) -> String;
     /// A number between operators.
     fn number(&self, value: f64) -> String;
     /// A number that stands by itself where a variable is expected.
-    fn alone(&self, value: f64) -> String;
+    fn standalone_number(&self, value: f64) -> String;
     /// A function of one argument; the argument holds together.
     fn call(&self, function: Unary, argument: &str) -> String;
     /// Angle of the point (`x`, `y`); `y` holds together.
     fn atan2(&self, y: &str, x: &str) -> String;
 
     /// An expression, with parentheses where they are needed.
-    fn expression(&self, value: &Expression) -> String {
+    fn expression_text(&self, value: &CodeExpression) -> String {
         match value {
-            Expression::Number(value) => self.number(*value),
-            Expression::Name(name) => self.name(name),
-            Expression::Add(a, b) => self.binary(a, "+", b, Binding::Sum),
-            Expression::Sub(a, b) => self.binary(a, "-", b, Binding::Sum),
-            Expression::Mul(a, b) => self.binary(a, "*", b, Binding::Product),
-            Expression::Div(a, b) => self.binary(a, "/", b, Binding::Product),
-            Expression::Neg(a) => format!("-{}", self.whole(a)),
-            Expression::Call(function, a) => self.call(*function, &self.whole(a)),
-            Expression::Atan2(y, x) => self.atan2(&self.whole(y), &self.term(x)),
+            CodeExpression::Number(value) => self.number(*value),
+            CodeExpression::Name(name) => self.name(name),
+            CodeExpression::Add(a, b) => self.binary_text(a, "+", b, OperatorPrecedence::Sum),
+            CodeExpression::Sub(a, b) => self.binary_text(a, "-", b, OperatorPrecedence::Sum),
+            CodeExpression::Mul(a, b) => self.binary_text(a, "*", b, OperatorPrecedence::Product),
+            CodeExpression::Div(a, b) => self.binary_text(a, "/", b, OperatorPrecedence::Product),
+            CodeExpression::Neg(a) => format!("-{}", self.grouped_text(a)),
+            CodeExpression::Call(function, a) => self.call(*function, &self.grouped_text(a)),
+            CodeExpression::Atan2(y, x) => self.atan2(&self.grouped_text(y), &self.operand_text(x)),
         }
     }
 
     /// An expression where a variable is expected.
-    fn term(&self, value: &Expression) -> String {
+    fn operand_text(&self, value: &CodeExpression) -> String {
         match value {
-            Expression::Number(value) => self.alone(*value),
-            value => self.expression(value),
+            CodeExpression::Number(value) => self.standalone_number(*value),
+            value => self.expression_text(value),
         }
     }
 
     /// A term that holds together.
-    fn whole(&self, value: &Expression) -> String {
-        bound(self.term(value), value, Binding::Whole)
+    fn grouped_text(&self, value: &CodeExpression) -> String {
+        parenthesize(self.operand_text(value), value, OperatorPrecedence::Whole)
     }
 
     /// One operator on two operands; numbers may stand on one side only.
-    fn binary(&self, a: &Expression, operator: &str, b: &Expression, binding: Binding) -> String {
-        let both = matches!((a, b), (Expression::Number(_), Expression::Number(_)));
+    fn binary_text(&self, a: &CodeExpression, operator: &str, b: &CodeExpression, binding: OperatorPrecedence) -> String {
+        let both = matches!((a, b), (CodeExpression::Number(_), CodeExpression::Number(_)));
         let left = if both {
-            self.term(a)
+            self.operand_text(a)
         } else {
-            self.expression(a)
+            self.expression_text(a)
         };
         let next = match binding {
-            Binding::Sum => Binding::Product,
-            _ => Binding::Negation,
+            OperatorPrecedence::Sum => OperatorPrecedence::Product,
+            _ => OperatorPrecedence::Negation,
         };
-        let (left, right) = (bound(left, a, binding), bound(self.expression(b), b, next));
+        let (left, right) = (parenthesize(left, a, binding), parenthesize(self.expression_text(b), b, next));
         format!("{left} {operator} {right}")
     }
 }
 
 /// Text in parentheses if it does not hold together as tightly as asked.
-fn bound(text: String, value: &Expression, binding: Binding) -> String {
-    if value.binding() < binding {
+fn parenthesize(text: String, value: &CodeExpression, binding: OperatorPrecedence) -> String {
+    if value.precedence() < binding {
         format!("({text})")
     } else {
         text

@@ -1,18 +1,18 @@
 //! The angles of a program that come before everything else.
 
-use crate::lower::{Op, Program, Stage};
+use crate::lower::{ProgramOp, StraightLineProgram, ProgramStage};
 
 /// Sines with their cosines whose angles need no other function, if there are several: they take much of the time of one
 /// state, and less if they are computed at once.
-pub(super) struct AnglesFirst {
+pub(super) struct LeadingAngles {
     /// The sines; the cosine of each stands right before it.
     pub(super) sines: Vec<usize>,
     /// Which operations are written before all others: what the angles are made of.
     pub(super) done: Vec<bool>,
 }
 
-impl AnglesFirst {
-    pub(super) fn of(program: &Program) -> Self {
+impl LeadingAngles {
+    pub(super) fn from_program(program: &StraightLineProgram) -> Self {
         let n = program.ops.len();
         // What needs inputs and arithmetic alone.
         let mut plain = vec![false; n];
@@ -21,15 +21,15 @@ impl AnglesFirst {
         for (i, op) in program.ops.iter().enumerate() {
             let mut of_plain = true;
             op.for_each_operand(|v| of_plain &= plain[v.index()]);
-            let fixed = program.stages[i] == Stage::Fixed;
+            let fixed = program.stages[i] == ProgramStage::Fixed;
             let simple = matches!(
                 op,
-                Op::Number(_) | Op::Input(_) | Op::Add(..) | Op::Sub(..) | Op::Mul(..) | Op::Neg(_)
+                ProgramOp::Number(_) | ProgramOp::Input(_) | ProgramOp::Add(..) | ProgramOp::Sub(..) | ProgramOp::Mul(..) | ProgramOp::Neg(_)
             );
             plain[i] = fixed || simple && of_plain;
-            if let Op::Sin(a) = op
+            if let ProgramOp::Sin(a) = op
                 && i > 0
-                && program.ops[i - 1] == Op::Cos(*a)
+                && program.ops[i - 1] == ProgramOp::Cos(*a)
                 && of_plain
                 && !fixed
             {
@@ -52,7 +52,7 @@ impl AnglesFirst {
     }
 
     /// The same where operations stand in another order.
-    pub(super) fn in_order(self, order: &[usize]) -> Self {
+    pub(super) fn reorder(self, order: &[usize]) -> Self {
         let mut place = vec![0; self.done.len()];
         for (k, i) in order.iter().enumerate() {
             place[*i] = k;

@@ -1,36 +1,36 @@
 //! Expressions of the statement tree, and how wide they are when written.
 
-use crate::expr::print::{Formula, Function};
+use crate::expr::print::{PrintedFormula, FormulaFunction};
 use crate::expr::{Rational, Unary};
 
 /// A formula in one line.
 #[derive(Clone, Debug, PartialEq)]
-pub(in crate::emit) enum Expression {
+pub(in crate::emit) enum CodeExpression {
     /// A number.
     Number(f64),
     /// A variable.
     Name(String),
-    Add(Box<Expression>, Box<Expression>),
-    Sub(Box<Expression>, Box<Expression>),
-    Mul(Box<Expression>, Box<Expression>),
-    Div(Box<Expression>, Box<Expression>),
-    Neg(Box<Expression>),
+    Add(Box<CodeExpression>, Box<CodeExpression>),
+    Sub(Box<CodeExpression>, Box<CodeExpression>),
+    Mul(Box<CodeExpression>, Box<CodeExpression>),
+    Div(Box<CodeExpression>, Box<CodeExpression>),
+    Neg(Box<CodeExpression>),
     /// A function of one argument.
-    Call(Unary, Box<Expression>),
+    Call(Unary, Box<CodeExpression>),
     /// Angle of the point (`x`, `y`): y, then x.
-    Atan2(Box<Expression>, Box<Expression>),
+    Atan2(Box<CodeExpression>, Box<CodeExpression>),
 }
 
 /// How tightly an expression holds together, from sums to names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(in crate::emit) enum Binding {
+pub(in crate::emit) enum OperatorPrecedence {
     Sum,
     Product,
     Negation,
     Whole,
 }
 
-impl Expression {
+impl CodeExpression {
     pub(in crate::emit) fn name(name: impl Into<String>) -> Self {
         Self::Name(name.into())
     }
@@ -44,7 +44,7 @@ impl Expression {
         match (a, b) {
             (a, Self::Neg(b)) => Self::sub(a, *b),
             (Self::Neg(a), b) => Self::sub(b, *a),
-            (a, b) if b.binding() == Binding::Sum && a.binding() > Binding::Sum => {
+            (a, b) if b.precedence() == OperatorPrecedence::Sum && a.precedence() > OperatorPrecedence::Sum => {
                 Self::Add(Box::new(b), Box::new(a))
             }
             (a, b) => Self::Add(Box::new(a), Box::new(b)),
@@ -69,8 +69,8 @@ impl Expression {
     }
 
     fn product(a: Self, b: Self) -> Self {
-        let nested = b.binding() == Binding::Product && a.binding() != Binding::Product;
-        let number = matches!(b, Self::Number(_)) && a.binding() != Binding::Product;
+        let nested = b.precedence() == OperatorPrecedence::Product && a.precedence() != OperatorPrecedence::Product;
+        let number = matches!(b, Self::Number(_)) && a.precedence() != OperatorPrecedence::Product;
         let (a, b) = if nested || number { (b, a) } else { (a, b) };
         Self::Mul(Box::new(a), Box::new(b))
     }
@@ -92,34 +92,34 @@ impl Expression {
     }
 
     /// The negative where it takes no operation more: it is the same number.
-    fn turned(&self) -> Option<Self> {
+    fn negated_without_cost(&self) -> Option<Self> {
         match self {
             Self::Number(a) => Some(Self::Number(-a)),
             Self::Neg(a) => Some((**a).clone()),
             Self::Sub(a, b) => Some(Self::Sub(b.clone(), a.clone())),
             Self::Add(a, b) => {
-                let (turned, rest) = match a.turned() {
+                let (turned, rest) = match a.negated_without_cost() {
                     Some(turned) => (turned, b),
-                    None => (b.turned()?, a),
+                    None => (b.negated_without_cost()?, a),
                 };
                 Some(Self::Sub(Box::new(turned), rest.clone()))
             }
-            Self::Mul(a, b) => match a.turned() {
+            Self::Mul(a, b) => match a.negated_without_cost() {
                 Some(a) => Some(Self::mul(a, (**b).clone())),
-                None => Some(Self::mul((**a).clone(), b.turned()?)),
+                None => Some(Self::mul((**a).clone(), b.negated_without_cost()?)),
             },
-            Self::Div(a, b) => match a.turned() {
+            Self::Div(a, b) => match a.negated_without_cost() {
                 Some(a) => Some(Self::div(a, (**b).clone())),
-                None => Some(Self::div((**a).clone(), b.turned()?)),
+                None => Some(Self::div((**a).clone(), b.negated_without_cost()?)),
             },
             Self::Name(_) | Self::Call(..) | Self::Atan2(..) => None,
         }
     }
 
     /// The same number with a sign in front only where that saves nothing.
-    pub(in crate::emit) fn settled(self) -> Self {
+    pub(in crate::emit) fn normalize_sign(self) -> Self {
         match self {
-            Self::Neg(a) => a.turned().unwrap_or(Self::Neg(a)),
+            Self::Neg(a) => a.negated_without_cost().unwrap_or(Self::Neg(a)),
             other => other,
         }
     }
@@ -132,13 +132,13 @@ impl Expression {
         Self::Atan2(Box::new(y), Box::new(x))
     }
 
-    pub(in crate::emit) fn binding(&self) -> Binding {
+    pub(in crate::emit) fn precedence(&self) -> OperatorPrecedence {
         match self {
-            Self::Add(..) | Self::Sub(..) => Binding::Sum,
-            Self::Mul(..) | Self::Div(..) => Binding::Product,
-            Self::Neg(_) => Binding::Negation,
-            Self::Number(x) if x.is_sign_negative() => Binding::Negation,
-            Self::Number(_) | Self::Name(_) | Self::Call(..) | Self::Atan2(..) => Binding::Whole,
+            Self::Add(..) | Self::Sub(..) => OperatorPrecedence::Sum,
+            Self::Mul(..) | Self::Div(..) => OperatorPrecedence::Product,
+            Self::Neg(_) => OperatorPrecedence::Negation,
+            Self::Number(x) if x.is_sign_negative() => OperatorPrecedence::Negation,
+            Self::Number(_) | Self::Name(_) | Self::Call(..) | Self::Atan2(..) => OperatorPrecedence::Whole,
         }
     }
 
@@ -177,18 +177,18 @@ impl Expression {
     }
 
     /// A printed formula as an expression; `rename` says how its names are called.
-    pub(in crate::emit) fn of_formula(formula: &Formula, rename: &dyn Fn(&str) -> String) -> Self {
-        let of = |f: &Formula| Self::of_formula(f, rename);
+    pub(in crate::emit) fn from_formula(formula: &PrintedFormula, rename: &dyn Fn(&str) -> String) -> Self {
+        let of = |f: &PrintedFormula| Self::from_formula(f, rename);
         match formula {
-            Formula::Number(value) => Self::number(value),
-            Formula::Symbol(symbol) | Formula::Indexed(symbol, _) => {
+            PrintedFormula::Number(value) => Self::number(value),
+            PrintedFormula::Symbol(symbol) | PrintedFormula::Indexed(symbol, _) => {
                 Self::Name(rename(&symbol.text()))
             }
-            Formula::Sum(terms) => {
+            PrintedFormula::Sum(terms) => {
                 let mut sum: Option<Self> = None;
                 for term in terms {
                     let (negative, term) = if term.is_negative() {
-                        (true, of(&term.clone().negated()))
+                        (true, of(&term.clone().negate()))
                     } else {
                         (false, of(term))
                     };
@@ -201,7 +201,7 @@ impl Expression {
                 }
                 sum.unwrap_or(Self::Number(0.0))
             }
-            Formula::Term {
+            PrintedFormula::Term {
                 factor,
                 above,
                 below,
@@ -228,14 +228,14 @@ impl Expression {
                     value
                 }
             }
-            Formula::Power(base, n) => {
+            PrintedFormula::Power(base, n) => {
                 let base = of(base);
                 (1..*n).fold(base.clone(), |power, _| {
                     Self::Mul(Box::new(power), Box::new(base.clone()))
                 })
             }
-            Formula::Apply(function, operands) => match (function, operands.as_slice()) {
-                (Function::Atan2, [y, x]) => Self::atan2(of(y), of(x)),
+            PrintedFormula::Apply(function, operands) => match (function, operands.as_slice()) {
+                (FormulaFunction::Atan2, [y, x]) => Self::atan2(of(y), of(x)),
                 (function, [a, ..]) => Self::call(unary(*function), of(a)),
                 (_, []) => Self::Number(0.0),
             },
@@ -243,14 +243,14 @@ impl Expression {
     }
 }
 
-fn unary(function: Function) -> Unary {
+fn unary(function: FormulaFunction) -> Unary {
     match function {
-        Function::Sin => Unary::Sin,
-        Function::Cos => Unary::Cos,
-        Function::Sqrt => Unary::Sqrt,
-        Function::Sign => Unary::Sign,
-        Function::Abs | Function::Atan2 => Unary::Abs,
-        Function::Tanh => Unary::Tanh,
-        Function::Exp => Unary::Exp,
+        FormulaFunction::Sin => Unary::Sin,
+        FormulaFunction::Cos => Unary::Cos,
+        FormulaFunction::Sqrt => Unary::Sqrt,
+        FormulaFunction::Sign => Unary::Sign,
+        FormulaFunction::Abs | FormulaFunction::Atan2 => Unary::Abs,
+        FormulaFunction::Tanh => Unary::Tanh,
+        FormulaFunction::Exp => Unary::Exp,
     }
 }

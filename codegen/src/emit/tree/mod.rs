@@ -14,119 +14,119 @@ mod pose;
 mod scope;
 mod sections;
 
-pub(in crate::emit) use expression::{Binding, Expression};
-pub(in crate::emit) use once::Once;
+pub(in crate::emit) use expression::{OperatorPrecedence, CodeExpression};
+pub(in crate::emit) use once::PrecomputedValues;
 pub(in crate::emit) use order::order as in_order;
-pub(in crate::emit) use pose::Pose;
-pub(in crate::emit) use scope::Scope;
+pub(in crate::emit) use pose::SharedPose;
+pub(in crate::emit) use scope::NameScope;
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::Derivation;
 use crate::expr::Atom;
-use crate::expr::print::Formula;
-use crate::lower::{Op, Program};
+use crate::expr::print::PrintedFormula;
+use crate::lower::{ProgramOp, StraightLineProgram};
 use crate::programs::PassivePosition;
 use crate::reduce::base;
 
 /// A program as statements.
 #[derive(Clone, Debug)]
-pub(in crate::emit) struct Routine {
+pub(in crate::emit) struct StatementRoutine {
     /// What is computed once for a geometry and its parameters.
-    pub(in crate::emit) once: Vec<Statement>,
+    pub(in crate::emit) once: Vec<CodeStatement>,
     /// Names of the values that are kept of it.
     pub(in crate::emit) kept: Vec<String>,
     /// What is computed at every state; outputs that are zero throughout are never put.
-    pub(in crate::emit) state: Vec<Statement>,
+    pub(in crate::emit) state: Vec<CodeStatement>,
     /// Inputs that are read once.
     pub(in crate::emit) read_once: BTreeSet<Atom>,
     /// Inputs that are read at every state.
     pub(in crate::emit) read: BTreeSet<Atom>,
     /// What the outputs are called after all statements, for programs without a state.
-    pub(in crate::emit) results: Vec<Expression>,
+    pub(in crate::emit) results: Vec<CodeExpression>,
     /// How many outputs there are.
     pub(in crate::emit) n_outputs: usize,
 }
 
-impl Routine {
+impl StatementRoutine {
     /// Whether there are poses without an answer.
     pub(in crate::emit) fn can_fail(&self) -> bool {
-        self.any(&|statement| matches!(statement, Statement::Guard(_)))
+        self.has_statement(&|statement| matches!(statement, CodeStatement::Guard(_)))
     }
 
     /// Outputs that are zero throughout.
-    pub(in crate::emit) fn zeros(&self) -> Vec<usize> {
+    pub(in crate::emit) fn zero_outputs(&self) -> Vec<usize> {
         let is_put = |k: usize| {
-            self.any(
-                &|statement| matches!(statement, Statement::Put { output, .. } if *output == k),
+            self.has_statement(
+                &|statement| matches!(statement, CodeStatement::Put { output, .. } if *output == k),
             )
         };
         (0..self.n_outputs).filter(|k| !is_put(*k)).collect()
     }
 
     /// Whether a statement of a state is such.
-    fn any(&self, is_such: &dyn Fn(&Statement) -> bool) -> bool {
-        fn among(statements: &[Statement], is_such: &dyn Fn(&Statement) -> bool) -> bool {
+    fn has_statement(&self, is_such: &dyn Fn(&CodeStatement) -> bool) -> bool {
+        fn has_statement_in(statements: &[CodeStatement], is_such: &dyn Fn(&CodeStatement) -> bool) -> bool {
             statements.iter().any(|statement| match statement {
-                Statement::Group { statements, .. } => among(statements, is_such),
+                CodeStatement::Group { statements, .. } => has_statement_in(statements, is_such),
                 statement => is_such(statement),
             })
         }
-        among(&self.state, is_such)
+        has_statement_in(&self.state, is_such)
     }
 }
 
 /// One statement.
 #[derive(Clone, Debug)]
-pub(in crate::emit) enum Statement {
+pub(in crate::emit) enum CodeStatement {
     /// What follows, for the reader.
     Section(String),
     /// A value by its name.
     Let {
         name: String,
-        value: Expression,
+        value: CodeExpression,
         /// What it is, for the reader.
         note: Option<String>,
     },
     /// Angles whose sines and cosines are asked for later, by names.
-    Angles(Vec<Asked>),
+    Angles(Vec<RequestedAngle>),
     /// Sine and cosine of an angle, or of one of [`Self::Angles`]; what is not needed has no name.
     SinCos {
         sine: Option<String>,
         cosine: Option<String>,
-        angle: Expression,
+        angle: CodeExpression,
         /// Which of [`Self::Angles`] it is.
-        asked: Option<usize>,
+        requested: Option<usize>,
     },
     /// What must hold for the model to have an answer.
-    Guard(Check),
+    Guard(PoseCheck),
     /// A result.
-    Put { output: usize, value: Expression },
+    Put { output: usize, value: CodeExpression },
     /// A part of a long program that hands on what later parts need.
     Group {
-        statements: Vec<Statement>,
-        handed: Vec<String>,
+        statements: Vec<CodeStatement>,
+        exported: Vec<String>,
     },
 }
 
 /// An angle whose sine and cosine are asked for later.
 #[derive(Clone, Debug)]
-pub(in crate::emit) struct Asked {
+pub(in crate::emit) struct RequestedAngle {
     /// The angle.
-    pub(in crate::emit) value: Expression,
+    pub(in crate::emit) value: CodeExpression,
     /// Whether it is an input as it stands.
     pub(in crate::emit) plain: bool,
 }
 
 /// What must hold at a pose.
 #[derive(Clone, Debug)]
-pub(in crate::emit) enum Check {
+pub(in crate::emit) enum PoseCheck {
     /// The value is not negative, or the pose is out of reach.
-    Reachable(Expression),
+    Reachable(CodeExpression),
     /// The value does not vanish beside the second one, or the pose is singular.
-    Regular(Expression, Expression),
+    Regular(CodeExpression, CodeExpression),
     /// The value is a finite number, or a term of the model is undefined.
-    Finite(Expression),
+    Finite(CodeExpression),
 }
 
 /// Whether forces depend on what drives carry, so that a state says it.
@@ -137,7 +137,7 @@ pub(in crate::emit) fn uses_load(derivation: &Derivation) -> bool {
         .any(|p| {
             p.ops
                 .iter()
-                .any(|op| matches!(op, Op::Input(Atom::Load(_))))
+                .any(|op| matches!(op, ProgramOp::Input(Atom::Load(_))))
         })
 }
 
@@ -157,7 +157,7 @@ pub(in crate::emit) fn inputs_of_state(derivation: &Derivation, with_passive: bo
 }
 
 /// Whether a program needs passive coordinates that Newton's method finds.
-pub(in crate::emit) fn reads_passive(derivation: &Derivation, program: &Program) -> bool {
+pub(in crate::emit) fn reads_passive(derivation: &Derivation, program: &StraightLineProgram) -> bool {
     let (_, passive) = derivation.coordinates();
     matches!(
         derivation.programs.passive_position,
@@ -165,28 +165,28 @@ pub(in crate::emit) fn reads_passive(derivation: &Derivation, program: &Program)
     ) && program
         .ops
         .iter()
-        .any(|op| matches!(op, Op::Input(Atom::Coordinate(i)) if passive.contains(i)))
+        .any(|op| matches!(op, ProgramOp::Input(Atom::Coordinate(i)) if passive.contains(i)))
 }
 
 /// Base parameters as eq. (16) gives them, term by term.
-pub(in crate::emit) struct BaseParameters {
+pub(in crate::emit) struct BaseParameterCode {
     /// Sums that they refer to, each after those that it needs.
-    pub(in crate::emit) sums: Vec<(String, Expression)>,
-    pub(in crate::emit) values: Vec<Expression>,
-    pub(in crate::emit) divisors: Vec<Divisor>,
+    pub(in crate::emit) sums: Vec<(String, CodeExpression)>,
+    pub(in crate::emit) values: Vec<CodeExpression>,
+    pub(in crate::emit) divisors: Vec<GuardedDivisor>,
     /// What values and divisors read.
     pub(in crate::emit) read: BTreeSet<Atom>,
 }
 
 /// A denominator that must not vanish beside its size.
-pub(in crate::emit) struct Divisor {
+pub(in crate::emit) struct GuardedDivisor {
     pub(in crate::emit) text: String,
-    pub(in crate::emit) value: Expression,
-    pub(in crate::emit) size: Expression,
+    pub(in crate::emit) value: CodeExpression,
+    pub(in crate::emit) size: CodeExpression,
 }
 
 /// The base parameters of a derivation, by the names of a scope.
-pub(in crate::emit) fn base_parameters(derivation: &Derivation, scope: &Scope) -> BaseParameters {
+pub(in crate::emit) fn base_parameters(derivation: &Derivation, scope: &NameScope) -> BaseParameterCode {
     let mechanism = &derivation.mechanism;
     let constants = mechanism.constants.iter().enumerate();
     let parameters = mechanism.parameters.iter().enumerate();
@@ -195,33 +195,33 @@ pub(in crate::emit) fn base_parameters(derivation: &Derivation, scope: &Scope) -
         .chain(parameters.map(|(i, p)| (p.name.as_str(), Atom::Parameter(i))))
         .chain([("pi", Atom::Pi)])
         .collect();
-    let called: BTreeMap<&str, Atom> = atoms.values().map(|a| (scope.name(*a), *a)).collect();
+    let called: BTreeMap<&str, Atom> = atoms.values().map(|a| (scope.input_name(*a), *a)).collect();
     let mut read = BTreeSet::new();
-    let mut expression = |formula: &Formula| {
-        let value = Expression::of_formula(formula, &|name| match atoms.get(name) {
-            Some(atom) => scope.name(*atom).to_owned(),
+    let mut expression = |formula: &PrintedFormula| {
+        let value = CodeExpression::from_formula(formula, &|name| match atoms.get(name) {
+            Some(atom) => scope.input_name(*atom).to_owned(),
             None => name.to_owned(),
         });
         value.for_each_name(&mut |name| read.extend(called.get(name)));
         value
     };
     let reduction = &derivation.reduction;
-    let sums = base::sums(mechanism, reduction).into_iter();
+    let sums = base::dependent_sums(mechanism, reduction).into_iter();
     let sums = sums
         .map(|(name, formula)| (name, expression(&formula)))
         .collect();
     let values = (0..reduction.retained.len())
-        .map(|k| expression(&base::written_out(mechanism, reduction, k)))
+        .map(|k| expression(&base::expanded_formula(mechanism, reduction, k)))
         .collect();
     let denominators = base::denominators(mechanism, reduction).into_iter();
     let divisors = denominators
-        .map(|denominator| Divisor {
+        .map(|denominator| GuardedDivisor {
             value: expression(&denominator.value),
             size: expression(&denominator.size),
             text: denominator.text,
         })
         .collect();
-    BaseParameters {
+    BaseParameterCode {
         sums,
         values,
         divisors,

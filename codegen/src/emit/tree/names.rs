@@ -5,42 +5,42 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use modelmill_algebra::field::Stream;
+use modelmill_algebra::field::RandomStream;
 use modelmill_spec::{DriveKind, Mechanism};
 
-use crate::expr::print::Symbol;
-use crate::expr::vector::{self, Vector};
-use crate::expr::{Atom, ExprId, F64, Graph, Node, Tape};
-use crate::lower::{Op, Program};
-use crate::newton_euler::{Load, Wrench, joint_wrenches};
-use crate::regressor::form::{Frames, TotalForm};
-use crate::tree::expressions::Monomial;
-use crate::{Derivation, Evaluator, States};
+use crate::expr::print::FormulaSymbol;
+use crate::expr::vector::{self, SymbolicVector};
+use crate::expr::{Atom, ExprId, FloatDomain, Graph, Node, EvaluationTape};
+use crate::lower::{ProgramOp, StraightLineProgram};
+use crate::newton_euler::{JointLoad, SymbolicWrench, joint_wrenches};
+use crate::regressor::form::{RecursionFrames, TotalForm};
+use crate::tree::expressions::ParameterMonomial;
+use crate::{Derivation, ModelEvaluator, MotionStates};
 
 /// A state with all its atoms' values, and the quantities with a meaning there.
 #[derive(Clone, Debug)]
-pub(crate) struct Meanings {
+pub(crate) struct NamedQuantities {
     pub(crate) atoms: BTreeMap<Atom, f64>,
-    known: Vec<(Symbol, f64)>,
+    known: Vec<(FormulaSymbol, f64)>,
 }
 
 /// What a value of a program is: a quantity with a name, or its negative.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Meaning {
-    pub(crate) symbol: Symbol,
+pub(crate) struct QuantityName {
+    pub(crate) symbol: FormulaSymbol,
     pub(crate) negative: bool,
 }
 
 /// Relative agreement that counts as equality.
-const AGREES: f64 = 1e-10;
+const RELATIVE_AGREEMENT: f64 = 1e-10;
 
-impl Meanings {
+impl NamedQuantities {
     /// Evaluates the quantities that have a meaning; none where no state is found.
     pub(crate) fn new(derivation: &Derivation) -> Self {
-        let mut stream = Stream::new(0x6E61_6D65);
+        let mut stream = RandomStream::new(0x6E61_6D65);
         for scale in [0.05, 0.02, 0.005, 0.001, 0.0002] {
             if let Some(atoms) = generic_state(derivation, scale, &mut stream) {
-                let known = known(derivation, &atoms);
+                let known = evaluate_quantities(derivation, &atoms);
                 return Self { atoms, known };
             }
         }
@@ -51,24 +51,24 @@ impl Meanings {
     }
 
     /// What a program's values are, by position; each name is given once.
-    pub(crate) fn of(&self, program: &Program) -> BTreeMap<usize, Meaning> {
+    pub(crate) fn name_values(&self, program: &StraightLineProgram) -> BTreeMap<usize, QuantityName> {
         let mut names = BTreeMap::new();
         if self.known.is_empty() {
             return names;
         }
-        let values = run(program, &self.atoms);
-        let mut free: Vec<&(Symbol, f64)> = self.known.iter().collect();
+        let values = operation_values(program, &self.atoms);
+        let mut free: Vec<&(FormulaSymbol, f64)> = self.known.iter().collect();
         for (i, (op, value)) in program.ops.iter().zip(&values).enumerate() {
-            if matches!(op, Op::Number(_) | Op::Input(_) | Op::Neg(_)) {
+            if matches!(op, ProgramOp::Number(_) | ProgramOp::Input(_) | ProgramOp::Neg(_)) {
                 continue;
             }
             let found = free
                 .iter()
-                .position(|(_, v)| (value.abs() - v.abs()).abs() <= AGREES * v.abs());
+                .position(|(_, v)| (value.abs() - v.abs()).abs() <= RELATIVE_AGREEMENT * v.abs());
             if let Some(k) = found {
                 let (symbol, v) = free.remove(k).clone();
                 let negative = (value < &0.0) != (v < 0.0);
-                names.insert(i, Meaning { symbol, negative });
+                names.insert(i, QuantityName { symbol, negative });
             }
         }
         names
@@ -76,15 +76,15 @@ impl Meanings {
 }
 
 /// Uniform in `[-1, 1)`.
-fn uniform(stream: &mut Stream) -> f64 {
-    stream.bits() as f64 / (1u64 << 63) as f64 - 1.0
+fn uniform(stream: &mut RandomStream) -> f64 {
+    stream.next_bits() as f64 / (1u64 << 63) as f64 - 1.0
 }
 
 /// A state near the nominal pose of a mechanism whose constants differ a little from the file's.
 fn generic_state(
     derivation: &Derivation,
     scale: f64,
-    stream: &mut Stream,
+    stream: &mut RandomStream,
 ) -> Option<BTreeMap<Atom, f64>> {
     let mechanism = &derivation.mechanism;
     let (active, passive) = derivation.coordinates();
@@ -93,7 +93,7 @@ fn generic_state(
         .iter()
         .map(|c| c.value * (1.0 + scale * uniform(stream)))
         .collect();
-    let near = |i: &usize, stream: &mut Stream| {
+    let near = |i: &usize, stream: &mut RandomStream| {
         mechanism.coordinates[*i].nominal + scale * uniform(stream)
     };
     let q: Vec<f64> = active.iter().map(|i| near(i, stream)).collect();
@@ -112,14 +112,14 @@ fn generic_state(
         fn slices(values: &[f64]) -> Vec<&[f64]> {
             values.iter().map(std::slice::from_ref).collect()
         }
-        let states = States {
+        let states = MotionStates {
             q: slices(&q),
             qd: slices(&qd),
             qdd: slices(&qdd),
             load: slices(&load),
         };
-        Evaluator::with_constants(derivation, constants.clone())
-            .passive(&states)
+        ModelEvaluator::with_constants(derivation, constants.clone())
+            .passive_motion(&states)
             .ok()?
     };
     let mut atoms = BTreeMap::new();
@@ -150,25 +150,25 @@ fn generic_state(
 }
 
 /// Values of all operations of a program at a state.
-pub(crate) fn run(program: &Program, atoms: &BTreeMap<Atom, f64>) -> Vec<f64> {
-    use crate::expr::{Domain, Unary};
+pub(crate) fn operation_values(program: &StraightLineProgram, atoms: &BTreeMap<Atom, f64>) -> Vec<f64> {
+    use crate::expr::{EvaluationDomain, Unary};
     let mut values: Vec<f64> = Vec::with_capacity(program.ops.len());
     for op in &program.ops {
         let at = |v: &crate::ValueId| values[v.index()];
         let value = match op {
-            Op::Number(n) => n.to_f64(),
-            Op::Input(Atom::Pi) => std::f64::consts::PI,
-            Op::Input(atom) => atoms.get(atom).copied().unwrap_or(f64::NAN),
-            Op::Add(a, b) => at(a) + at(b),
-            Op::Sub(a, b) => at(a) - at(b),
-            Op::Mul(a, b) => at(a) * at(b),
-            Op::Div(a, b) => at(a) / at(b),
-            Op::Neg(a) => -at(a),
-            Op::Unary(Unary::Sqrt, a) => at(a).sqrt(),
-            Op::Unary(function, a) => F64(|_| 0.0).unary(*function, &at(a)).unwrap_or(f64::NAN),
-            Op::Sin(a) => at(a).sin(),
-            Op::Cos(a) => at(a).cos(),
-            Op::Atan2(y, x) => at(y).atan2(at(x)),
+            ProgramOp::Number(n) => n.to_f64(),
+            ProgramOp::Input(Atom::Pi) => std::f64::consts::PI,
+            ProgramOp::Input(atom) => atoms.get(atom).copied().unwrap_or(f64::NAN),
+            ProgramOp::Add(a, b) => at(a) + at(b),
+            ProgramOp::Sub(a, b) => at(a) - at(b),
+            ProgramOp::Mul(a, b) => at(a) * at(b),
+            ProgramOp::Div(a, b) => at(a) / at(b),
+            ProgramOp::Neg(a) => -at(a),
+            ProgramOp::Unary(Unary::Sqrt, a) => at(a).sqrt(),
+            ProgramOp::Unary(function, a) => FloatDomain(|_| 0.0).unary(*function, &at(a)).unwrap_or(f64::NAN),
+            ProgramOp::Sin(a) => at(a).sin(),
+            ProgramOp::Cos(a) => at(a).cos(),
+            ProgramOp::Atan2(y, x) => at(y).atan2(at(x)),
         };
         values.push(value);
     }
@@ -176,18 +176,18 @@ pub(crate) fn run(program: &Program, atoms: &BTreeMap<Atom, f64>) -> Vec<f64> {
 }
 
 /// Quantities with a meaning and their values; the first of several equal ones gives the name.
-fn known(derivation: &Derivation, atoms: &BTreeMap<Atom, f64>) -> Vec<(Symbol, f64)> {
+fn evaluate_quantities(derivation: &Derivation, atoms: &BTreeMap<Atom, f64>) -> Vec<(FormulaSymbol, f64)> {
     let mut graph = derivation.graph.clone();
-    let mut named = sines(&mut graph, derivation);
-    named.extend(rates(&mut graph, derivation));
-    named.extend(links(&mut graph, derivation));
-    named.extend(points(&mut graph, derivation));
-    named.extend(wrenches(&mut graph, derivation));
+    let mut named = trigonometric_quantities(&mut graph, derivation);
+    named.extend(motion_quantities(&mut graph, derivation));
+    named.extend(link_quantities(&mut graph, derivation));
+    named.extend(point_quantities(&mut graph, derivation));
+    named.extend(wrench_quantities(&mut graph, derivation));
     let atom = |a: Atom| atoms.get(&a).copied().unwrap_or(f64::NAN);
-    let reserved = reserved(&derivation.mechanism);
-    let mut known: Vec<(Symbol, f64)> = Vec::new();
+    let reserved = reserved_names(&derivation.mechanism);
+    let mut known: Vec<(FormulaSymbol, f64)> = Vec::new();
     let ids: Vec<ExprId> = named.iter().map(|(_, id)| *id).collect();
-    let together = Tape::new(&graph, &ids).evaluate(&F64(atom));
+    let together = EvaluationTape::new(&graph, &ids).evaluate(&FloatDomain(atom));
     for (k, (symbol, id)) in named.into_iter().enumerate() {
         // Numbers and inputs have names already; so have the negatives of what is named.
         if matches!(graph.node(id), Node::Rational(_) | Node::Atom(_)) {
@@ -196,14 +196,14 @@ fn known(derivation: &Derivation, atoms: &BTreeMap<Atom, f64>) -> Vec<(Symbol, f
         // One that has no value takes it from all others.
         let value = match &together {
             Some(values) => Some(values[k]),
-            None => Tape::new(&graph, &[id]).evaluate(&F64(atom)).map(|v| v[0]),
+            None => EvaluationTape::new(&graph, &[id]).evaluate(&FloatDomain(atom)).map(|v| v[0]),
         };
         let Some(value) = value else {
             continue;
         };
         let taken = known
             .iter()
-            .any(|(s, v)| *s == symbol || (value.abs() - v.abs()).abs() <= AGREES * v.abs());
+            .any(|(s, v)| *s == symbol || (value.abs() - v.abs()).abs() <= RELATIVE_AGREEMENT * v.abs());
         if value.is_finite() && value != 0.0 && !taken && !reserved.contains(&symbol.text()) {
             known.push((symbol, value));
         }
@@ -212,7 +212,7 @@ fn known(derivation: &Derivation, atoms: &BTreeMap<Atom, f64>) -> Vec<(Symbol, f
 }
 
 /// Names that the model file has taken.
-pub(crate) fn reserved(mechanism: &Mechanism) -> BTreeSet<String> {
+pub(crate) fn reserved_names(mechanism: &Mechanism) -> BTreeSet<String> {
     let mut names: BTreeSet<String> = BTreeSet::new();
     names.extend(mechanism.constants.iter().map(|c| c.name.clone()));
     names.extend(mechanism.parameters.iter().map(|p| p.name.clone()));
@@ -221,7 +221,7 @@ pub(crate) fn reserved(mechanism: &Mechanism) -> BTreeSet<String> {
 }
 
 /// Sines and cosines of sums of angles: `c_theta1_gamma1`.
-fn sines(graph: &mut Graph, derivation: &Derivation) -> Vec<(Symbol, ExprId)> {
+fn trigonometric_quantities(graph: &mut Graph, derivation: &Derivation) -> Vec<(FormulaSymbol, ExprId)> {
     let projection = &derivation.equations.projection;
     let mechanism = &derivation.mechanism;
     let seen = graph.reachable(&projection.loops.residual);
@@ -233,23 +233,23 @@ fn sines(graph: &mut Graph, derivation: &Derivation) -> Vec<(Symbol, ExprId)> {
             Node::Sin(angle) => ("s", angle),
             _ => continue,
         };
-        named.push((trigonometric(mechanism, letter, angle), id));
+        named.push((trigonometric_name(mechanism, letter, angle), id));
     }
     for p in &projection.loops.passive {
-        let angle = crate::expr::AngleSum::new([(Atom::Coordinate(*p), 1)]);
+        let angle = crate::expr::AtomAngleSum::new([(Atom::Coordinate(*p), 1)]);
         let (cosine, sine) = graph.cos_sin(&angle, 0);
-        named.push((trigonometric(mechanism, "c", &angle), cosine));
-        named.push((trigonometric(mechanism, "s", &angle), sine));
+        named.push((trigonometric_name(mechanism, "c", &angle), cosine));
+        named.push((trigonometric_name(mechanism, "s", &angle), sine));
     }
     named
 }
 
 /// Name of a sine or cosine.
-pub(crate) fn trigonometric(
+pub(crate) fn trigonometric_name(
     mechanism: &Mechanism,
     letter: &str,
-    angle: &crate::expr::AngleSum,
-) -> Symbol {
+    angle: &crate::expr::AtomAngleSum,
+) -> FormulaSymbol {
     let mut name = letter.to_owned();
     for (atom, n) in angle.terms() {
         let factor = match n {
@@ -262,19 +262,19 @@ pub(crate) fn trigonometric(
         name.push_str(&factor);
         name.push_str(&crate::expr::print::atom(mechanism, *atom).name);
     }
-    Symbol::new(name)
+    FormulaSymbol::new(name)
 }
 
 /// Motion of passive coordinates and drives.
-fn rates(graph: &mut Graph, derivation: &Derivation) -> Vec<(Symbol, ExprId)> {
+fn motion_quantities(graph: &mut Graph, derivation: &Derivation) -> Vec<(FormulaSymbol, ExprId)> {
     let mechanism = &derivation.mechanism;
     let projection = &derivation.equations.projection;
     let mut named = Vec::new();
     for (k, p) in projection.loops.passive.iter().enumerate() {
         let name = &*mechanism.coordinates[*p].name;
-        named.push((Symbol::derived(name, 1), projection.passive_rates[k]));
+        named.push((FormulaSymbol::time_derivative(name, 1), projection.passive_rates[k]));
         named.push((
-            Symbol::derived(name, 2),
+            FormulaSymbol::time_derivative(name, 2),
             projection.passive_accelerations[k],
         ));
     }
@@ -284,9 +284,9 @@ fn rates(graph: &mut Graph, derivation: &Derivation) -> Vec<(Symbol, ExprId)> {
         }
         let motion = &projection.drives[d];
         let name = format!("l_{}", drive.name);
-        named.push((Symbol::new(&*name), motion.coordinate));
-        named.push((Symbol::derived(&*name, 1), motion.rate));
-        named.push((Symbol::derived(&*name, 2), motion.acceleration));
+        named.push((FormulaSymbol::new(&*name), motion.coordinate));
+        named.push((FormulaSymbol::time_derivative(&*name, 1), motion.rate));
+        named.push((FormulaSymbol::time_derivative(&*name, 2), motion.acceleration));
         for (a, slope) in projection
             .loops
             .active
@@ -295,15 +295,15 @@ fn rates(graph: &mut Graph, derivation: &Derivation) -> Vec<(Symbol, ExprId)> {
         {
             let coordinate = &mechanism.coordinates[*a].name;
             named.push((
-                Symbol::new(format!("J_{}_{coordinate}", drive.name)),
+                FormulaSymbol::new(format!("J_{}_{coordinate}", drive.name)),
                 *slope,
             ));
         }
     }
     for (k, id) in projection.determinants.iter().enumerate() {
-        named.push((Symbol::new(format!("Delta_{}", k + 1)), *id));
+        named.push((FormulaSymbol::new(format!("Delta_{}", k + 1)), *id));
         let inverse = graph.pow(*id, -1);
-        named.push((Symbol::new(format!("Delta_inv_{}", k + 1)), inverse));
+        named.push((FormulaSymbol::new(format!("Delta_inv_{}", k + 1)), inverse));
     }
     named
 }
@@ -311,7 +311,7 @@ fn rates(graph: &mut Graph, derivation: &Derivation) -> Vec<(Symbol, ExprId)> {
 const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// Angular velocity and acceleration of every frame and the acceleration of its origin, gravity taken off.
-fn links(graph: &mut Graph, derivation: &Derivation) -> Vec<(Symbol, ExprId)> {
+fn link_quantities(graph: &mut Graph, derivation: &Derivation) -> Vec<(FormulaSymbol, ExprId)> {
     let mechanism = &derivation.mechanism;
     let tree = &derivation.equations.tree;
     let Ok(gravity) = mechanism
@@ -327,9 +327,9 @@ fn links(graph: &mut Graph, derivation: &Derivation) -> Vec<(Symbol, ExprId)> {
         vector::ZERO,
         std::array::from_fn(|i| graph.neg(gravity[i])),
     );
-    let mut motions: Vec<(Vector, Vector, Vector)> = Vec::new();
+    let mut motions: Vec<(SymbolicVector, SymbolicVector, SymbolicVector)> = Vec::new();
     // Acceleration of the place where the joint acts, along the axes of the parent.
-    let mut before: Vec<Vector> = Vec::new();
+    let mut before: Vec<SymbolicVector> = Vec::new();
     for (i, link) in tree.links.iter().enumerate() {
         let (omega_p, alpha_p, a_p) = link.parent.map_or(still, |p| motions[p]);
         let swing = graph.cross(&omega_p, &link.position);
@@ -373,9 +373,9 @@ fn links(graph: &mut Graph, derivation: &Derivation) -> Vec<(Symbol, ExprId)> {
         let (omega, alpha, a) = &motions[*link];
         for (axis, name) in AXES.iter().enumerate() {
             let of = |letter: &str| format!("{letter}_{}_{name}", frame.name);
-            named.push((Symbol::new(of("omega")), omega[axis]));
-            named.push((Symbol::derived(of("omega"), 1), alpha[axis]));
-            named.push((Symbol::new(of("a")), a[axis]));
+            named.push((FormulaSymbol::new(of("omega")), omega[axis]));
+            named.push((FormulaSymbol::time_derivative(of("omega"), 1), alpha[axis]));
+            named.push((FormulaSymbol::new(of("a")), a[axis]));
         }
         for axis in 0..3 {
             // The matrix that takes a place of the frame to its acceleration: [alpha]x + [omega]x [omega]x.
@@ -383,15 +383,15 @@ fn links(graph: &mut Graph, derivation: &Derivation) -> Vec<(Symbol, ExprId)> {
             let entry = |i: usize, j: usize| format!("U_{}_{}{}", frame.name, AXES[i], AXES[j]);
             let squares = [j, k].map(|x| graph.mul(omega[x], omega[x]));
             let both = graph.add(squares[0], squares[1]);
-            named.push((Symbol::new(entry(axis, axis)), graph.neg(both)));
+            named.push((FormulaSymbol::new(entry(axis, axis)), graph.neg(both)));
             let product = graph.mul(omega[axis], omega[j]);
-            named.push((Symbol::new(entry(axis, j)), graph.sub(product, alpha[k])));
-            named.push((Symbol::new(entry(j, axis)), graph.add(product, alpha[k])));
+            named.push((FormulaSymbol::new(entry(axis, j)), graph.sub(product, alpha[k])));
+            named.push((FormulaSymbol::new(entry(j, axis)), graph.add(product, alpha[k])));
         }
         let parent = &mechanism.frames[frame.parent.0].name;
         for (axis, id) in AXES.iter().zip(before[*link]) {
             let name = format!("a_{}_{parent}_{axis}", frame.name);
-            named.push((Symbol::new(name), id));
+            named.push((FormulaSymbol::new(name), id));
         }
     }
     named
@@ -399,15 +399,15 @@ fn links(graph: &mut Graph, derivation: &Derivation) -> Vec<(Symbol, ExprId)> {
 
 /// What moves every link and all beyond it, with base parameters for the inertia, as its joint transmits it: the force, and
 /// the moment about its origin, along its own axes and those from which it turns; and the generalised forces.
-fn wrenches(graph: &mut Graph, derivation: &Derivation) -> Vec<(Symbol, ExprId)> {
+fn wrench_quantities(graph: &mut Graph, derivation: &Derivation) -> Vec<(FormulaSymbol, ExprId)> {
     let (mechanism, equations) = (&derivation.mechanism, &derivation.equations);
     let tree = &equations.tree;
-    let base = crate::programs::base_atoms(graph, &derivation.reduction);
-    let value = |product: &Monomial| base.get(product).copied().unwrap_or(Graph::ZERO);
+    let base = crate::programs::base_parameter_atoms(graph, &derivation.reduction);
+    let value = |product: &ParameterMonomial| base.get(product).copied().unwrap_or(Graph::ZERO);
     let plain = TotalForm::PLAIN;
-    let frames = Frames::new(graph, tree, &equations.gravity, plain.style, false);
+    let frames = RecursionFrames::new(graph, tree, &equations.gravity, plain.style, false);
     let wrenches = plain.wrenches(graph, &equations.inertia, tree, &frames, &value);
-    let loads = wrenches.into_iter().map(|(link, _, wrench)| Load {
+    let loads = wrenches.into_iter().map(|(link, _, wrench)| JointLoad {
         link,
         wrench,
         until: None,
@@ -416,20 +416,20 @@ fn wrenches(graph: &mut Graph, derivation: &Derivation) -> Vec<(Symbol, ExprId)>
     let mut named = Vec::new();
     for (frame, link) in mechanism.frames.iter().zip(&tree.of_frame) {
         let Some(link) = link else { continue };
-        let Wrench { force, moment } = through[*link];
+        let SymbolicWrench { force, moment } = through[*link];
         let turn = tree.links[*link].absolute.clone();
         let first = tree.links[tree.links[*link].first_parallel].parent;
         let carries = (0..mechanism.frames.len()).rfind(|f| tree.of_frame[*f] == first);
         let carries = carries.map_or("base", |f| mechanism.frames[f].name.as_str());
         for (letter, own) in [("F", force), ("M", moment)] {
-            let turned = graph.turn_out(&turn, &own);
+            let turned = graph.rotate_out(&turn, &own);
             for (k, axis) in AXES.iter().enumerate() {
                 named.push((
-                    Symbol::new(format!("{letter}_{}_{axis}", frame.name)),
+                    FormulaSymbol::new(format!("{letter}_{}_{axis}", frame.name)),
                     own[k],
                 ));
                 let along = format!("{letter}_{}_{carries}_{axis}", frame.name);
-                named.push((Symbol::new(along), turned[k]));
+                named.push((FormulaSymbol::new(along), turned[k]));
             }
         }
     }
@@ -437,28 +437,28 @@ fn wrenches(graph: &mut Graph, derivation: &Derivation) -> Vec<(Symbol, ExprId)>
 }
 
 /// Places of the points in the base frame, from its origin, from that of their frame, and along the linear drives.
-fn points(graph: &mut Graph, derivation: &Derivation) -> Vec<(Symbol, ExprId)> {
+fn point_quantities(graph: &mut Graph, derivation: &Derivation) -> Vec<(FormulaSymbol, ExprId)> {
     let mut mechanism = derivation.mechanism.clone();
     let tree = &derivation.equations.tree;
     let n_points = mechanism.points.len();
     // The origins of the frames are points like others.
     for i in 0..mechanism.frames.len() {
-        mechanism.points.push(modelmill_spec::Point {
+        mechanism.points.push(modelmill_spec::FramePoint {
             name: mechanism.frames[i].name.clone(),
             frame: modelmill_spec::FrameIdx(i),
-            at: std::array::from_fn(|_| modelmill_spec::Exact::zero()),
+            at: std::array::from_fn(|_| modelmill_spec::ExactExpression::zero()),
         });
     }
-    let places: Option<Vec<Vector>> = (0..mechanism.points.len())
+    let places: Option<Vec<SymbolicVector>> = (0..mechanism.points.len())
         .map(|i| crate::loops::stretch::position_in_base(graph, &mechanism, tree, i).ok())
         .collect();
     let Some(places) = places else {
         return Vec::new();
     };
     let mut named = Vec::new();
-    let mut name = |start: String, at: Vector| {
+    let mut name = |start: String, at: SymbolicVector| {
         for (axis, id) in AXES.iter().zip(at) {
-            named.push((Symbol::new(format!("{start}_{axis}")), id));
+            named.push((FormulaSymbol::new(format!("{start}_{axis}")), id));
         }
     };
     for (point, place) in mechanism.points.iter().zip(&places) {

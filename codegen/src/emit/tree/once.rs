@@ -2,15 +2,15 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::build::in_groups;
-use super::scope::{Scope, unique};
-use super::{Check, Routine, Statement};
+use super::build::group_statements;
+use super::scope::{NameScope, unique_name};
+use super::{PoseCheck, StatementRoutine, CodeStatement};
 use crate::expr::Atom;
 
 /// What is computed once for a geometry and its parameters, by all programs of one struct.
 #[derive(Clone, Debug)]
-pub(in crate::emit) struct Once {
-    statements: Vec<Statement>,
+pub(in crate::emit) struct PrecomputedValues {
+    statements: Vec<CodeStatement>,
     /// Names of the values that programs need at every state.
     pub(in crate::emit) kept: Vec<String>,
     /// Inputs that are read.
@@ -19,31 +19,31 @@ pub(in crate::emit) struct Once {
     next: usize,
 }
 
-impl Once {
-    pub(in crate::emit) fn new(scope: &Scope) -> Self {
+impl PrecomputedValues {
+    pub(in crate::emit) fn new(scope: &NameScope) -> Self {
         Self {
             statements: Vec::new(),
             kept: Vec::new(),
             read: BTreeSet::new(),
-            taken: scope.taken().clone(),
+            taken: scope.reserved_names().clone(),
             next: 0,
         }
     }
 
     /// Takes over what a program computes once; values that are there already are not computed again.
-    pub(in crate::emit) fn absorb(&mut self, routine: &mut Routine) {
+    pub(in crate::emit) fn absorb(&mut self, routine: &mut StatementRoutine) {
         let mut renamed: BTreeMap<String, String> = BTreeMap::new();
         for mut statement in std::mem::take(&mut routine.once) {
-            statement.rename(&|name| replace(&renamed, name));
+            statement.rename(&|name| replace_name(&renamed, name));
             match statement {
-                Statement::Let { name, value, note } => {
+                CodeStatement::Let { name, value, note } => {
                     let known = self.statements.iter().find_map(|other| match other {
-                        Statement::Let { name, value: v, .. } if *v == value => Some(name.clone()),
+                        CodeStatement::Let { name, value: v, .. } if *v == value => Some(name.clone()),
                         _ => None,
                     });
                     let new = known.unwrap_or_else(|| {
-                        let new = self.called(&name);
-                        self.statements.push(Statement::Let {
+                        let new = self.unique_name(&name);
+                        self.statements.push(CodeStatement::Let {
                             name: new.clone(),
                             value,
                             note,
@@ -52,56 +52,56 @@ impl Once {
                     });
                     renamed.insert(name, new);
                 }
-                Statement::SinCos {
+                CodeStatement::SinCos {
                     sine,
                     cosine,
                     angle,
-                    asked,
+                    requested: asked,
                 } => {
                     let [sine, cosine] = [sine, cosine].map(|name| {
                         name.map(|name| {
-                            let new = self.called(&name);
+                            let new = self.unique_name(&name);
                             renamed.insert(name, new.clone());
                             new
                         })
                     });
-                    self.statements.push(Statement::SinCos {
+                    self.statements.push(CodeStatement::SinCos {
                         sine,
                         cosine,
                         angle,
-                        asked,
+                        requested: asked,
                     });
                 }
                 other => self.statements.push(other),
             }
         }
         for name in &mut routine.kept {
-            replace(&renamed, name);
+            replace_name(&renamed, name);
             if !self.kept.contains(name) {
                 self.kept.push(name.clone());
             }
         }
         routine.kept.dedup();
         for statement in &mut routine.state {
-            statement.rename(&|name| replace(&renamed, name));
+            statement.rename(&|name| replace_name(&renamed, name));
         }
         for result in &mut routine.results {
-            result.rename(&|name| replace(&renamed, name));
+            result.rename(&|name| replace_name(&renamed, name));
         }
         self.read.extend(&routine.read_once);
     }
 
     /// All statements.
-    pub(in crate::emit) fn statements(&self) -> Vec<Statement> {
-        in_groups(self.statements.clone(), &self.kept)
+    pub(in crate::emit) fn statements(&self) -> Vec<CodeStatement> {
+        group_statements(self.statements.clone(), &self.kept)
     }
 
-    fn called(&mut self, name: &str) -> String {
+    fn unique_name(&mut self, name: &str) -> String {
         let numbered = name
             .strip_prefix('k')
             .is_some_and(|rest| rest.chars().all(|c| c.is_ascii_digit()));
         if !numbered {
-            return unique(name, &mut self.taken);
+            return unique_name(name, &mut self.taken);
         }
         loop {
             self.next += 1;
@@ -113,13 +113,13 @@ impl Once {
     }
 }
 
-fn replace(renamed: &BTreeMap<String, String>, name: &mut String) {
+fn replace_name(renamed: &BTreeMap<String, String>, name: &mut String) {
     if let Some(new) = renamed.get(name) {
         new.clone_into(name);
     }
 }
 
-impl Statement {
+impl CodeStatement {
     /// Calls `change` for every name that it reads.
     fn rename(&mut self, change: &dyn Fn(&mut String)) {
         match self {
@@ -132,8 +132,8 @@ impl Statement {
                 }
             }
             Self::Guard(check) => match check {
-                Check::Reachable(a) | Check::Finite(a) => a.rename(change),
-                Check::Regular(a, size) => {
+                PoseCheck::Reachable(a) | PoseCheck::Finite(a) => a.rename(change),
+                PoseCheck::Regular(a, size) => {
                     a.rename(change);
                     size.rename(change);
                 }

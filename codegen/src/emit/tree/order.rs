@@ -7,16 +7,16 @@
 
 use std::cmp::Reverse;
 
-use crate::lower::{Op, Program, Stage};
+use crate::lower::{ProgramOp, StraightLineProgram, ProgramStage};
 
 /// How many values may wait before the ones that free others come first: a quarter of the registers of AVX-512. Constants
 /// need some, and the compiler keeps to this order only roughly. Measured on the Panda between 2 and 28: above 12 blocks of
 /// the regressor wait for memory, below 6 for results.
-const REGISTERS: usize = 8;
+const MOST_WAITING_VALUES: usize = 8;
 
 /// Operations that are written as one: a formula, or a sine with its cosine.
 #[derive(Default)]
-struct Statement {
+struct SchedulerStatement {
     /// In order.
     ops: Vec<usize>,
     /// Statements whose values it needs.
@@ -38,12 +38,12 @@ struct Statement {
 /// in `first` before all others. `fused` says which ones are written inside others, `sections` where each stands; what
 /// stands in an earlier section comes first.
 pub(in crate::emit) fn order(
-    program: &Program,
+    program: &StraightLineProgram,
     fused: &[bool],
     first: &[bool],
     sections: &[usize],
 ) -> Vec<usize> {
-    let of_state = |i: &usize| program.stages[*i] == Stage::State;
+    let of_state = |i: &usize| program.stages[*i] == ProgramStage::State;
     let early = |i: &usize| !of_state(i) || first[*i];
     let n = program.ops.len();
     let mut order: Vec<usize> = (0..n).filter(early).collect();
@@ -52,23 +52,23 @@ pub(in crate::emit) fn order(
         let of = statement.ops.iter().map(|i| sections[*i]);
         statement.section = of.max().unwrap_or(0);
     }
-    for statement in scheduled(&statements) {
+    for statement in schedule_statements(&statements) {
         order.extend(&statements[statement].ops);
     }
     order
 }
 
 /// The statements of those operations that are to be put in order.
-fn statements(program: &Program, fused: &[bool], wanted: &dyn Fn(usize) -> bool) -> Vec<Statement> {
+fn statements(program: &StraightLineProgram, fused: &[bool], wanted: &dyn Fn(usize) -> bool) -> Vec<SchedulerStatement> {
     let n = program.ops.len();
-    let mut statements: Vec<Statement> = Vec::new();
+    let mut statements: Vec<SchedulerStatement> = Vec::new();
     let mut owner = vec![usize::MAX; n];
     for (i, op) in program.ops.iter().enumerate() {
         if !wanted(i) || fused[i] {
             continue;
         }
         let with_cosine = matches!((op, i.checked_sub(1).map(|j| &program.ops[j])),
-            (Op::Sin(a), Some(Op::Cos(b))) if a == b && wanted(i - 1));
+            (ProgramOp::Sin(a), Some(ProgramOp::Cos(b))) if a == b && wanted(i - 1));
         if with_cosine {
             let statement = owner[i - 1];
             statements[statement].ops.push(i);
@@ -77,9 +77,9 @@ fn statements(program: &Program, fused: &[bool], wanted: &dyn Fn(usize) -> bool)
             continue;
         }
         let this = statements.len();
-        let mut statement = Statement {
-            values: usize::from(!matches!(op, Op::Input(_))),
-            ..Statement::default()
+        let mut statement = SchedulerStatement {
+            values: usize::from(!matches!(op, ProgramOp::Input(_))),
+            ..SchedulerStatement::default()
         };
         // Operands of what is written inside a formula are the formula's.
         let mut open = vec![i];
@@ -112,7 +112,7 @@ fn statements(program: &Program, fused: &[bool], wanted: &dyn Fn(usize) -> bool)
     for k in (0..statements.len()).rev() {
         let longest = |users: &[usize]| users.iter().map(|u| statements[*u].height).max();
         let after = longest(&statements[k].users).unwrap_or(0);
-        let own = statements[k].ops.iter().map(|i| latency(&program.ops[*i]));
+        let own = statements[k].ops.iter().map(|i| latency_cycles(&program.ops[*i]));
         // Half of a formula's operations wait for the other half.
         let own = own
             .sum::<usize>()
@@ -123,17 +123,17 @@ fn statements(program: &Program, fused: &[bool], wanted: &dyn Fn(usize) -> bool)
 }
 
 /// Cycles until a result is there, on the machines of the day.
-fn latency(op: &Op) -> usize {
+fn latency_cycles(op: &ProgramOp) -> usize {
     match op {
-        Op::Number(_) | Op::Input(_) => 0,
-        Op::Add(..) | Op::Sub(..) | Op::Mul(..) | Op::Neg(_) => 4,
-        Op::Div(..) => 16,
-        Op::Unary(..) | Op::Sin(_) | Op::Cos(_) | Op::Atan2(..) => 30,
+        ProgramOp::Number(_) | ProgramOp::Input(_) => 0,
+        ProgramOp::Add(..) | ProgramOp::Sub(..) | ProgramOp::Mul(..) | ProgramOp::Neg(_) => 4,
+        ProgramOp::Div(..) => 16,
+        ProgramOp::Unary(..) | ProgramOp::Sin(_) | ProgramOp::Cos(_) | ProgramOp::Atan2(..) => 30,
     }
 }
 
 /// Statements in order.
-fn scheduled(statements: &[Statement]) -> Vec<usize> {
+fn schedule_statements(statements: &[SchedulerStatement]) -> Vec<usize> {
     let n = statements.len();
     let mut order = Vec::with_capacity(n);
     // How many statements each still waits for, and how many still wait for it.
@@ -154,7 +154,7 @@ fn scheduled(statements: &[Statement]) -> Vec<usize> {
         };
         let best = (0..ready.len()).min_by_key(|place| {
             let k = ready[*place];
-            let pressure = if live < REGISTERS { 0 } else { kept(k) };
+            let pressure = if live < MOST_WAITING_VALUES { 0 } else { kept(k) };
             (
                 statements[k].section,
                 pressure,

@@ -5,33 +5,33 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use rustc_hash::FxHashMap;
 
-use super::names::run;
-use super::scope::Scope;
-use super::{Once, Routine};
+use super::names::operation_values;
+use super::scope::NameScope;
+use super::{PrecomputedValues, StatementRoutine};
 use crate::Derivation;
 use crate::expr::Atom;
-use crate::lower::{Guard, Op, Program, Stage, ValueId};
+use crate::lower::{PoseGuard, ProgramOp, StraightLineProgram, ProgramStage, ValueId};
 
 /// The common part, and which values of it programs read.
 #[derive(Clone, Debug)]
-pub(in crate::emit) struct Pose {
+pub(in crate::emit) struct SharedPose {
     /// Operations by what they are: equal ones have equal numbers in all programs.
-    numbers: FxHashMap<Op, ValueId>,
+    numbers: FxHashMap<ProgramOp, ValueId>,
     /// Values that programs read, by number, with their places.
     read: BTreeMap<ValueId, usize>,
     /// What must hold, in numbers.
-    guards: Vec<Guard>,
+    guards: Vec<PoseGuard>,
     /// The coordinates that it reads.
     pub(in crate::emit) inputs: Vec<Atom>,
     /// Its statements; its results are what programs read.
-    pub(in crate::emit) routine: Routine,
+    pub(in crate::emit) routine: StatementRoutine,
     /// What it computes once.
-    pub(in crate::emit) once: Once,
+    pub(in crate::emit) once: PrecomputedValues,
 }
 
-impl Pose {
+impl SharedPose {
     /// What the programs of a derivation share, if they can fail; `scope` learns what its values are called.
-    pub(super) fn new(derivation: &Derivation, scope: &mut Scope) -> Option<Self> {
+    pub(super) fn new(derivation: &Derivation, scope: &mut NameScope) -> Option<Self> {
         let programs = &derivation.programs;
         let programs = [
             &programs.regressor,
@@ -42,12 +42,12 @@ impl Pose {
         let mut numbers = FxHashMap::default();
         let numbered = programs.map(|program| {
             let values = numbers_of(program, &mut numbers);
-            let guards: Vec<Guard> = program.guards.iter().map(|g| g.of(&values)).collect();
+            let guards: Vec<PoseGuard> = program.guards.iter().map(|g| g.map_values(&values)).collect();
             (program, values, guards)
         });
-        let plain = programs.map(of_pose);
+        let plain = programs.map(pose_dependent_values);
         // The begin of the guards that all programs have that have any of it.
-        let common = |a: &[Guard], b: &[Guard]| a.iter().zip(b).take_while(|(a, b)| a == b).count();
+        let common = |a: &[PoseGuard], b: &[PoseGuard]| a.iter().zip(b).take_while(|(a, b)| a == b).count();
         let (_, _, first) = &numbered[0];
         let others = numbered[1..].iter();
         let shared = others.map(|(_, _, guards)| common(first, guards));
@@ -64,8 +64,8 @@ impl Pose {
             // Signs are left to those who read.
             let moving = (0..program.ops.len()).filter(|i| {
                 let op = &program.ops[*i];
-                let is_its = plain[*k][*i] && program.stages[*i] == Stage::State;
-                is_its && !is_leaf(op) && !matches!(op, Op::Neg(_))
+                let is_its = plain[*k][*i] && program.stages[*i] == ProgramStage::State;
+                is_its && !is_leaf(op) && !matches!(op, ProgramOp::Neg(_))
             });
             let distinct: BTreeSet<ValueId> = moving.map(|i| values[i]).collect();
             for value in distinct {
@@ -88,10 +88,10 @@ impl Pose {
         let parts = clients
             .iter()
             .map(|k| (numbered[*k].0, &numbered[*k].1, &plain[*k]));
-        let (program, places) = joined(parts, &shared, &guards, &read);
-        let mut routine = Routine::written(&program, scope, &[], true);
-        let values = run(&program, &scope.meanings.atoms);
-        let mut once = Once::new(scope);
+        let (program, places) = shared_program(parts, &shared, &guards, &read);
+        let mut routine = StatementRoutine::with_result_names(&program, scope, &[], true);
+        let values = operation_values(&program, &scope.meanings.atoms);
+        let mut once = PrecomputedValues::new(scope);
         once.absorb(&mut routine);
         for (k, (value, output)) in routine.results.iter().zip(&program.outputs).enumerate() {
             scope.add_shared(Atom::Shared(k), value, values[output.index()]);
@@ -111,13 +111,13 @@ impl Pose {
     }
 
     /// What is left of a program whose common part is computed before; none if it has another one.
-    pub(in crate::emit) fn rest(&self, program: &Program) -> Option<Program> {
+    pub(in crate::emit) fn remaining_program(&self, program: &StraightLineProgram) -> Option<StraightLineProgram> {
         let mut numbers = self.numbers.clone();
         let values = numbers_of(program, &mut numbers);
-        let guards: Vec<Guard> = program
+        let guards: Vec<PoseGuard> = program
             .guards
             .iter()
-            .map(|guard| guard.of(&values))
+            .map(|guard| guard.map_values(&values))
             .collect();
         if !guards.starts_with(&self.guards) {
             return None;
@@ -125,7 +125,7 @@ impl Pose {
         let mut rest = program.clone();
         for (i, op) in rest.ops.iter_mut().enumerate() {
             if let Some(k) = self.read.get(&values[i]) {
-                *op = Op::Input(Atom::Shared(*k));
+                *op = ProgramOp::Input(Atom::Shared(*k));
             }
         }
         rest.guards.drain(..self.guards.len());
@@ -133,9 +133,9 @@ impl Pose {
     }
 }
 
-impl Guard {
+impl PoseGuard {
     /// The same guard of the values that stand for its own.
-    fn of(self, values: &[ValueId]) -> Self {
+    fn map_values(self, values: &[ValueId]) -> Self {
         let of = |v: ValueId| values[v.index()];
         match self {
             Self::Reachable(v) => Self::Reachable(of(v)),
@@ -146,12 +146,12 @@ impl Guard {
 }
 
 /// The numbers of a program's operations, the same for equal ones.
-fn numbers_of(program: &Program, numbers: &mut FxHashMap<Op, ValueId>) -> Vec<ValueId> {
+fn numbers_of(program: &StraightLineProgram, numbers: &mut FxHashMap<ProgramOp, ValueId>) -> Vec<ValueId> {
     let mut values: Vec<ValueId> = Vec::with_capacity(program.ops.len());
     for op in &program.ops {
         let op = match op.clone().map_operands(|v| values[v.index()]) {
-            Op::Add(a, b) if b < a => Op::Add(b, a),
-            Op::Mul(a, b) if b < a => Op::Mul(b, a),
+            ProgramOp::Add(a, b) if b < a => ProgramOp::Add(b, a),
+            ProgramOp::Mul(a, b) if b < a => ProgramOp::Mul(b, a),
             op => op,
         };
         let next = ValueId(u32::try_from(numbers.len()).expect("programs below 4G operations"));
@@ -160,16 +160,16 @@ fn numbers_of(program: &Program, numbers: &mut FxHashMap<Op, ValueId>) -> Vec<Va
     values
 }
 
-fn is_leaf(op: &Op) -> bool {
-    matches!(op, Op::Number(_) | Op::Input(_))
+fn is_leaf(op: &ProgramOp) -> bool {
+    matches!(op, ProgramOp::Number(_) | ProgramOp::Input(_))
 }
 
 /// Which values follow from constants and coordinates alone.
-fn of_pose(program: &Program) -> Vec<bool> {
+fn pose_dependent_values(program: &StraightLineProgram) -> Vec<bool> {
     let mut plain: Vec<bool> = Vec::with_capacity(program.ops.len());
     for op in &program.ops {
         let mut is_plain = match op {
-            Op::Input(atom) => {
+            ProgramOp::Input(atom) => {
                 matches!(atom, Atom::Pi | Atom::Constant(_) | Atom::Coordinate(_))
             }
             _ => true,
@@ -181,18 +181,18 @@ fn of_pose(program: &Program) -> Vec<bool> {
 }
 
 /// The program of what is shared, with what is read as its outputs, and the places of those.
-fn joined<'a>(
-    parts: impl Iterator<Item = (&'a Program, &'a Vec<ValueId>, &'a Vec<bool>)>,
+fn shared_program<'a>(
+    parts: impl Iterator<Item = (&'a StraightLineProgram, &'a Vec<ValueId>, &'a Vec<bool>)>,
     shared: &dyn Fn(&ValueId) -> bool,
-    guards: &[Guard],
+    guards: &[PoseGuard],
     read: &BTreeSet<ValueId>,
-) -> (Program, BTreeMap<ValueId, usize>) {
-    let mut program = Program::default();
+) -> (StraightLineProgram, BTreeMap<ValueId, usize>) {
+    let mut program = StraightLineProgram::default();
     let mut places: BTreeMap<ValueId, ValueId> = BTreeMap::new();
     for (part, values, plain) in parts {
         for (i, op) in part.ops.iter().enumerate() {
-            let of_known = matches!(op, Op::Neg(v) if places.contains_key(&values[v.index()]));
-            let fixed = part.stages[i] == Stage::Fixed;
+            let of_known = matches!(op, ProgramOp::Neg(v) if places.contains_key(&values[v.index()]));
+            let fixed = part.stages[i] == ProgramStage::Fixed;
             let wanted = fixed || is_leaf(op) || of_known || shared(&values[i]);
             if !wanted || !plain[i] || places.contains_key(&values[i]) {
                 continue;
@@ -210,9 +210,9 @@ fn joined<'a>(
     program.guards = guards
         .iter()
         .map(|guard| match guard {
-            Guard::Reachable(v) => Guard::Reachable(of(*v)),
-            Guard::Regular(v, size) => Guard::Regular(of(*v), of(*size)),
-            Guard::Finite(v) => Guard::Finite(of(*v)),
+            PoseGuard::Reachable(v) => PoseGuard::Reachable(of(*v)),
+            PoseGuard::Regular(v, size) => PoseGuard::Regular(of(*v), of(*size)),
+            PoseGuard::Finite(v) => PoseGuard::Finite(of(*v)),
         })
         .collect();
     program.outputs = outputs.iter().map(|(place, _)| *place).collect();

@@ -4,13 +4,13 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use modelmill_spec::DriveKind;
 
-use super::Expression;
-use super::names::Meanings;
-use super::pose::Pose;
-use super::sections::Sections;
+use super::CodeExpression;
+use super::names::NamedQuantities;
+use super::pose::SharedPose;
+use super::sections::CodeSections;
 use crate::Derivation;
 use crate::expr::{Atom, Graph};
-use crate::lower::{Op, Program};
+use crate::lower::{ProgramOp, StraightLineProgram};
 
 /// Words that stand in every routine, in whatever language, and names of modules that a variable would meet.
 const WORDS: [&str; 42] = [
@@ -60,76 +60,76 @@ const WORDS: [&str; 42] = [
 
 /// What the variables of a model are called.
 #[derive(Clone, Debug)]
-pub(in crate::emit) struct Scope {
+pub(in crate::emit) struct NameScope {
     atoms: BTreeMap<Atom, String>,
     taken: BTreeSet<String>,
     /// What values with names are, where there is something to say.
     notes: BTreeMap<String, String>,
     /// What values of programs mean.
-    pub(in crate::emit) meanings: Meanings,
+    pub(in crate::emit) meanings: NamedQuantities,
     /// Inputs that stand with the other sign under their names.
     turned: BTreeSet<Atom>,
     /// What names belong to, for headings.
-    pub(super) sections: Sections,
+    pub(super) sections: CodeSections,
     /// What the programs share of the pose, if it is written apart.
-    pub(in crate::emit) pose: Option<Box<Pose>>,
+    pub(in crate::emit) pose: Option<Box<SharedPose>>,
 }
 
-impl Scope {
+impl NameScope {
     pub(in crate::emit) fn new(derivation: &Derivation) -> Self {
         let mechanism = &derivation.mechanism;
         let mut scope = Self {
             atoms: BTreeMap::new(),
             taken: WORDS.into_iter().map(str::to_owned).collect(),
-            notes: notes(derivation),
-            meanings: Meanings::new(derivation),
+            notes: value_notes(derivation),
+            meanings: NamedQuantities::new(derivation),
             turned: BTreeSet::new(),
-            sections: Sections::new(derivation),
+            sections: CodeSections::new(derivation),
             pose: None,
         };
         let coordinates = || mechanism.coordinates.iter().enumerate();
         for (i, c) in mechanism.constants.iter().enumerate() {
-            scope.add(Atom::Constant(i), &c.name);
+            scope.add_name(Atom::Constant(i), &c.name);
         }
         for (i, p) in mechanism.parameters.iter().enumerate() {
-            scope.add(Atom::Parameter(i), &p.name);
+            scope.add_name(Atom::Parameter(i), &p.name);
         }
         for (i, c) in coordinates() {
-            scope.add(Atom::Coordinate(i), &c.name);
+            scope.add_name(Atom::Coordinate(i), &c.name);
         }
         for (i, c) in coordinates() {
-            scope.add(Atom::Rate(i), &format!("{}_d", c.name));
-            scope.add(Atom::Acceleration(i), &format!("{}_dd", c.name));
+            scope.add_name(Atom::Rate(i), &format!("{}_d", c.name));
+            scope.add_name(Atom::Acceleration(i), &format!("{}_dd", c.name));
         }
         for k in 0..derivation.reduction.retained.len() {
-            scope.add(Atom::Base(k), &format!("p{}_min", k + 1));
+            scope.add_name(Atom::Base(k), &format!("p{}_min", k + 1));
         }
         for (d, drive) in mechanism.drives.iter().enumerate() {
-            scope.add(Atom::Load(d), &format!("load_{}", drive.name));
+            scope.add_name(Atom::Load(d), &format!("load_{}", drive.name));
         }
         scope.atoms.insert(Atom::Pi, "pi".to_owned());
         scope
     }
 
-    fn add(&mut self, atom: Atom, name: &str) {
-        let name = unique(name, &mut self.taken);
+    fn add_name(&mut self, atom: Atom, name: &str) {
+        let name = unique_name(name, &mut self.taken);
         self.atoms.insert(atom, name);
     }
 
     /// The same with what the programs share of the pose written apart.
     pub(in crate::emit) fn with_pose(derivation: &Derivation) -> Self {
         let mut scope = Self::new(derivation);
-        scope.pose = Pose::new(derivation, &mut scope).map(Box::new);
+        scope.pose = SharedPose::new(derivation, &mut scope).map(Box::new);
         scope
     }
 
     /// Takes a value that stands for an input, with its number at the state of [`Self::meanings`].
-    pub(super) fn add_shared(&mut self, atom: Atom, value: &Expression, number: f64) {
+    pub(super) fn add_shared(&mut self, atom: Atom, value: &CodeExpression, number: f64) {
         let (name, turned) = match value {
-            Expression::Neg(a) => (&**a, true),
+            CodeExpression::Neg(a) => (&**a, true),
             a => (a, false),
         };
-        let Expression::Name(name) = name else {
+        let CodeExpression::Name(name) = name else {
             panic!("what is shared has a name: {value:?}");
         };
         self.atoms.insert(atom, name.clone());
@@ -140,17 +140,17 @@ impl Scope {
     }
 
     /// What stands for an input.
-    pub(super) fn input(&self, atom: Atom) -> Expression {
-        let name = Expression::name(self.name(atom));
+    pub(super) fn input_expression(&self, atom: Atom) -> CodeExpression {
+        let name = CodeExpression::name(self.input_name(atom));
         if self.turned.contains(&atom) {
-            Expression::neg(name)
+            CodeExpression::neg(name)
         } else {
             name
         }
     }
 
     /// What an input is called.
-    pub(in crate::emit) fn name(&self, atom: Atom) -> &str {
+    pub(in crate::emit) fn input_name(&self, atom: Atom) -> &str {
         self.atoms.get(&atom).map_or("", String::as_str)
     }
 
@@ -166,14 +166,14 @@ impl Scope {
     }
 
     /// What a value with a name is, for the reader.
-    pub(super) fn note(&self, name: &str) -> Option<String> {
+    pub(super) fn value_note(&self, name: &str) -> Option<String> {
         self.notes.get(name).cloned()
     }
 
     /// Names that are taken in a program: those of what is shared only where some of that is read.
-    pub(super) fn taken_in(&self, program: &Program) -> BTreeSet<String> {
+    pub(super) fn reserved_names_in(&self, program: &StraightLineProgram) -> BTreeSet<String> {
         let mut taken = self.taken.clone();
-        let is_shared = |op: &Op| matches!(op, Op::Input(Atom::Shared(_)));
+        let is_shared = |op: &ProgramOp| matches!(op, ProgramOp::Input(Atom::Shared(_)));
         if program.ops.iter().any(is_shared) {
             let shared = self.atoms.iter();
             let shared = shared.filter(|(atom, _)| matches!(atom, Atom::Shared(_)));
@@ -183,17 +183,17 @@ impl Scope {
     }
 
     /// Names that are taken everywhere.
-    pub(super) fn taken(&self) -> &BTreeSet<String> {
+    pub(super) fn reserved_names(&self) -> &BTreeSet<String> {
         &self.taken
     }
 }
 
 /// Notes on values with a name: their numbered equations on the page of the model, and the links that they belong to.
-fn notes(derivation: &Derivation) -> BTreeMap<String, String> {
+fn value_notes(derivation: &Derivation) -> BTreeMap<String, String> {
     let mechanism = &derivation.mechanism;
     let projection = &derivation.equations.projection;
     let mut notes = BTreeMap::new();
-    let n_gaps = projection.loops.n_gaps(mechanism);
+    let n_gaps = projection.loops.n_gap_equations(mechanism);
     for k in 0..projection.determinants.len() {
         let tag = format!("eq. (L{})", n_gaps + k + 1);
         notes.insert(format!("Delta_{}", k + 1), tag);
@@ -220,7 +220,7 @@ fn notes(derivation: &Derivation) -> BTreeMap<String, String> {
 }
 
 /// A name near the wanted one that nothing else has.
-pub(super) fn unique(wanted: &str, taken: &mut BTreeSet<String>) -> String {
+pub(super) fn unique_name(wanted: &str, taken: &mut BTreeSet<String>) -> String {
     let mut name = wanted.to_owned();
     while !taken.insert(name.clone()) {
         name.push('_');

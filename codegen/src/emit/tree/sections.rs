@@ -4,16 +4,16 @@ use std::collections::BTreeMap;
 
 use modelmill_spec::DriveKind;
 
-use super::build::Named;
+use super::build::NamedValue;
 use crate::Derivation;
-use crate::lower::{Guard, Op, Program, Stage};
+use crate::lower::{PoseGuard, ProgramOp, StraightLineProgram, ProgramStage};
 
 /// Programs of more statements are put in the order that suits machines; their parts of the mechanism are mixed.
 const MOST_STATEMENTS: usize = 150;
 
 /// Which name belongs where; what stands nowhere stands where it is needed first.
 #[derive(Clone, Debug)]
-pub(in crate::emit) struct Sections {
+pub(in crate::emit) struct CodeSections {
     headings: Vec<String>,
     names: BTreeMap<String, usize>,
 }
@@ -23,21 +23,21 @@ const LOOPS: usize = 1;
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 
-impl Sections {
+impl CodeSections {
     pub(super) fn new(derivation: &Derivation) -> Self {
         let mechanism = &derivation.mechanism;
         let mut sections = Self {
             headings: vec![String::new()],
             names: BTreeMap::new(),
         };
-        let closes = sections.add(closing(derivation));
+        let closes = sections.add(closure_heading(derivation));
         for k in 0..derivation.equations.projection.determinants.len() {
             sections.names.insert(format!("Delta_{}", k + 1), closes);
         }
         for point in &mechanism.points {
             let frame = &mechanism.frames[point.frame.0].name;
             for of in [point.name.clone(), format!("{frame}_{}", point.name)] {
-                sections.put("r", &of, "", closes);
+                sections.assign_section("r", &of, "", closes);
             }
         }
         let mut tag = 0;
@@ -56,10 +56,10 @@ impl Sections {
                 let point = &mechanism.points[point.0];
                 let frame = &mechanism.frames[point.frame.0].name;
                 for of in [point.name.clone(), format!("{frame}_{}", point.name)] {
-                    sections.put("r", &of, "", along);
+                    sections.assign_section("r", &of, "", along);
                 }
             }
-            sections.put("e", &drive.name, "", along);
+            sections.assign_section("e", &drive.name, "", along);
             for suffix in ["", "_d"] {
                 sections
                     .names
@@ -73,13 +73,13 @@ impl Sections {
         let rates = sections.add("Rates of the links.".to_owned());
         let accelerations = sections.add("Accelerations of the links, less gravity.".to_owned());
         for frame in &mechanism.frames {
-            sections.put("omega", &frame.name, "", rates);
-            sections.put("omega", &frame.name, "_sq", rates);
-            sections.put("omega", &frame.name, "_d", accelerations);
-            sections.put("a", &frame.name, "", accelerations);
+            sections.assign_section("omega", &frame.name, "", rates);
+            sections.assign_section("omega", &frame.name, "_sq", rates);
+            sections.assign_section("omega", &frame.name, "_d", accelerations);
+            sections.assign_section("a", &frame.name, "", accelerations);
             let parent = &mechanism.frames[frame.parent.0].name;
             let along = format!("{}_{parent}", frame.name);
-            sections.put("a", &along, "", accelerations);
+            sections.assign_section("a", &along, "", accelerations);
         }
         for coordinate in &mechanism.coordinates {
             for name in ["", "c_", "s_"].map(|letter| format!("{letter}{}", coordinate.name)) {
@@ -101,9 +101,9 @@ impl Sections {
             let wrench = sections.add(text);
             for other in &mechanism.frames {
                 for letter in ["F", "M"] {
-                    sections.put(letter, &frame.name, "", wrench);
+                    sections.assign_section(letter, &frame.name, "", wrench);
                     let along = format!("{}_{}", frame.name, other.name);
-                    sections.put(letter, &along, "", wrench);
+                    sections.assign_section(letter, &along, "", wrench);
                 }
             }
         }
@@ -116,7 +116,7 @@ impl Sections {
         self.headings.len() - 1
     }
 
-    fn put(&mut self, letter: &str, of: &str, suffix: &str, section: usize) {
+    fn assign_section(&mut self, letter: &str, of: &str, suffix: &str, section: usize) {
         for axis in AXES {
             self.names
                 .insert(format!("{letter}_{of}_{axis}{suffix}"), section);
@@ -124,7 +124,7 @@ impl Sections {
     }
 
     /// The section of the forces, which is the last.
-    pub(super) fn forces(&self) -> usize {
+    pub(super) fn force_section(&self) -> usize {
         self.headings.len() - 1
     }
 
@@ -135,15 +135,15 @@ impl Sections {
     }
 
     /// The section of each value of a program, with results in `last`; none where it is long.
-    pub(super) fn of(
+    pub(super) fn value_sections(
         &self,
-        program: &Program,
+        program: &StraightLineProgram,
         inside: &[bool],
-        named: &BTreeMap<usize, Named>,
+        named: &BTreeMap<usize, NamedValue>,
         last: Option<usize>,
     ) -> Option<Vec<usize>> {
         let n = program.ops.len();
-        let moving = |i: &usize| program.stages[*i] == Stage::State;
+        let moving = |i: &usize| program.stages[*i] == ProgramStage::State;
         if (0..n).filter(moving).filter(|i| !inside[*i]).count() > MOST_STATEMENTS {
             return None;
         }
@@ -153,7 +153,7 @@ impl Sections {
             sections[value.index()] = last;
         }
         for guard in &program.guards {
-            if let Guard::Reachable(value) = guard {
+            if let PoseGuard::Reachable(value) = guard {
                 sections[value.index()] = Some(LOOPS);
             }
         }
@@ -161,7 +161,7 @@ impl Sections {
         for i in (0..n).rev() {
             let own = named.get(&i).and_then(|named| self.names.get(&named.name));
             // Quotients take long: they begin as soon as they can.
-            let quotient = matches!(program.ops[i], Op::Div(..)) && !named.contains_key(&i);
+            let quotient = matches!(program.ops[i], ProgramOp::Div(..)) && !named.contains_key(&i);
             let own = own.copied().or(quotient.then_some(0));
             sections[i] = earlier(sections[i], own);
             program.ops[i].for_each_operand(|v| {
@@ -173,7 +173,7 @@ impl Sections {
             .map(Option::unwrap_or_default)
             .collect();
         for (i, op) in program.ops.iter().enumerate() {
-            if matches!(op, Op::Number(_) | Op::Input(_)) || !moving(&i) {
+            if matches!(op, ProgramOp::Number(_) | ProgramOp::Input(_)) || !moving(&i) {
                 sections[i] = 0;
                 continue;
             }
@@ -186,10 +186,10 @@ impl Sections {
 }
 
 /// What is said of the loops.
-fn closing(derivation: &Derivation) -> String {
+fn closure_heading(derivation: &Derivation) -> String {
     let loops = &derivation.equations.projection.loops;
     let mechanism = &derivation.mechanism;
-    let n_gaps = loops.n_gaps(mechanism);
+    let n_gaps = loops.n_gap_equations(mechanism);
     let names: Vec<String> = mechanism
         .loops
         .iter()

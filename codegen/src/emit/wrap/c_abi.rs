@@ -4,10 +4,10 @@ use proc_macro2::TokenStream;
 use quote::{format_ident, quote};
 
 use super::c_header::header;
-use super::functions::{Function, functions};
-use super::{Face, source};
+use super::functions::{WrappedFunction, wrapped_functions};
+use super::{LanguageBinding, source_file};
 use crate::emit::language::c99::RESERVED;
-use crate::emit::language::{EmittedFile, Source};
+use crate::emit::language::{EmittedFile, EmissionRequest};
 
 /// What a function returns, with its name in the header after the prefix, and its meaning.
 pub(super) const STATUS: [(&str, &str); 9] = [
@@ -36,14 +36,14 @@ pub(super) const STATUS: [(&str, &str); 9] = [
 
 /// The files of the crate, without reactions and self-test. It needs `modelmill-runtime` in the folder `modelmill-runtime`
 /// beside its manifest.
-pub(in crate::emit) fn emit_c(from: &Source<'_>) -> Vec<EmittedFile> {
-    let face = Face::new(from, &RESERVED);
+pub(in crate::emit) fn emit_c(from: &EmissionRequest<'_>) -> Vec<EmittedFile> {
+    let face = LanguageBinding::new(from, &RESERVED);
     let doc = "The model for C: see the header in `include`. All `unsafe` code is here, and all of it reads and writes what the \
                caller's pointers point to.";
     vec![
         manifest(&face),
-        source("src/lib.rs", doc, &items(&face)),
-        face.module(),
+        source_file("src/lib.rs", doc, &items(&face)),
+        face.emitted_module(),
         EmittedFile {
             path: format!("include/{}.h", face.name),
             text: header(&face),
@@ -51,7 +51,7 @@ pub(in crate::emit) fn emit_c(from: &Source<'_>) -> Vec<EmittedFile> {
     ]
 }
 
-fn manifest(face: &Face<'_>) -> EmittedFile {
+fn manifest(face: &LanguageBinding<'_>) -> EmittedFile {
     let name = &face.name;
     let package = name.trim_start_matches('_');
     let text = format!(
@@ -91,7 +91,7 @@ codegen-units = 1
 }
 
 /// 64-bit words that surely hold a prepared model: every fixed value, and what errors and passive coordinates take.
-pub(super) fn words(face: &Face<'_>) -> usize {
+pub(super) fn storage_words(face: &LanguageBinding<'_>) -> usize {
     let programs = &face.derivation.programs;
     let mut all = vec![
         &programs.regressor,
@@ -112,23 +112,23 @@ pub(super) fn words(face: &Face<'_>) -> usize {
     parts * (fixed + face.n_passive() + geometry + face.n_base() + 16)
 }
 
-fn fixed_values(program: &crate::Program) -> usize {
+fn fixed_values(program: &crate::StraightLineProgram) -> usize {
     let fixed = program.stages.iter();
-    fixed.filter(|stage| **stage == crate::Stage::Fixed).count()
+    fixed.filter(|stage| **stage == crate::ProgramStage::Fixed).count()
 }
 
 #[allow(clippy::too_many_lines, reason = "one text from top to bottom")]
-fn items(face: &Face<'_>) -> TokenStream {
+fn items(face: &LanguageBinding<'_>) -> TokenStream {
     let function = |name: &str| format_ident!("{}_{name}", face.name);
-    let (dynamics, words) = (function("dynamics"), words(face));
+    let (dynamics, words) = (function("dynamics"), storage_words(face));
     let (n_base, n_drives) = (face.n_base(), face.n_drives());
     let (constants, parameters) = (face.constants(), face.parameters());
     let (n_constants, n_parameters) = (constants.len(), parameters.len());
     let records = [
-        Face::record("geometry", "Geometry", &constants),
-        Face::record("parameters", "Parameters", &parameters),
+        LanguageBinding::record_functions("geometry", "Geometry", &constants),
+        LanguageBinding::record_functions("parameters", "Parameters", &parameters),
     ];
-    let parts = face.state();
+    let parts = face.state_parts();
     let names: Vec<_> = parts.iter().map(|(name, _)| name).collect();
     let state_arguments = quote! { #(#names: *const f64),* };
     let many = {
@@ -145,11 +145,11 @@ fn items(face: &Face<'_>) -> TokenStream {
             return NOT_PREPARED;
         };
     };
-    let singles: Vec<TokenStream> = functions(face)
+    let singles: Vec<TokenStream> = wrapped_functions(face)
         .iter()
         .flat_map(|one| {
-            let near = one.follows.then(|| single(face, one, true));
-            [Some(single(face, one, false)), near]
+            let near = one.follows.then(|| single_state_function(face, one, true));
+            [Some(single_state_function(face, one, false)), near]
         })
         .flatten()
         .collect();
@@ -394,7 +394,7 @@ fn items(face: &Face<'_>) -> TokenStream {
 }
 
 /// A function of one state; one that is `near` takes passive coordinates of a pose near by.
-fn single(face: &Face<'_>, one: &Function, near: bool) -> TokenStream {
+fn single_state_function(face: &LanguageBinding<'_>, one: &WrappedFunction, near: bool) -> TokenStream {
     let suffix = if near { "_near" } else { "" };
     let name = format_ident!("{}_{}{suffix}", face.name, one.name);
     let dynamics = format_ident!("{}_dynamics", face.name);
@@ -402,7 +402,7 @@ fn single(face: &Face<'_>, one: &Function, near: bool) -> TokenStream {
         format_ident!("{}", one.owner),
         format_ident!("{}{suffix}", one.method),
     );
-    let state = face.state();
+    let state = face.state_parts();
     let given = one
         .takes_forces
         .then(|| (format_ident!("forces"), face.n_drives()));
@@ -426,7 +426,7 @@ fn single(face: &Face<'_>, one: &Function, near: bool) -> TokenStream {
     };
     let mut at = 0;
     let writes = one.parts.iter().map(|part| {
-        let value = one.part(part);
+        let value = one.part_tokens(part);
         let kind = part
             .shape
             .iter()
@@ -436,7 +436,7 @@ fn single(face: &Face<'_>, one: &Function, near: bool) -> TokenStream {
                 quote! { [#inner; #n] }
             });
         let place = at;
-        at += part.n();
+        at += part.n_entries();
         quote! { output.add(#place).cast::<#kind>().write(#value); }
     });
     let writes: Vec<TokenStream> = writes.collect();

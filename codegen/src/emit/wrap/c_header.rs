@@ -4,18 +4,18 @@ use std::fmt::Write as _;
 
 use modelmill_boundary::text::comment;
 
-use super::Face;
-use super::c_abi::{STATUS, words};
-use super::functions::{Count, Function, functions};
-use crate::emit::identifier::of_field;
+use super::LanguageBinding;
+use super::c_abi::{STATUS, storage_words};
+use super::functions::{ArrayDimension, WrappedFunction, wrapped_functions};
+use crate::emit::identifier::field_identifier;
 
 #[allow(clippy::too_many_lines, reason = "one text from top to bottom")]
-pub(super) fn header(face: &Face<'_>) -> String {
+pub(super) fn header(face: &LanguageBinding<'_>) -> String {
     let name = &face.name;
     let upper = name.to_uppercase();
     let mechanism = &face.derivation.mechanism;
     let title = comment(mechanism.title.as_deref().unwrap_or(&mechanism.name));
-    let count = |name, n| Count { name, n };
+    let count = |name, n| ArrayDimension { name, n };
     let [active, passive, drives, base, constants, parameters] = [
         count("ACTIVE", face.n_active()),
         count("PASSIVE", face.n_passive()),
@@ -24,7 +24,7 @@ pub(super) fn header(face: &Face<'_>) -> String {
         count("CONSTANTS", face.constants().len()),
         count("PARAMETERS", face.parameters().len()),
     ];
-    let room = |count: &Count| match count.n {
+    let room = |count: &ArrayDimension| match count.n {
         0 => "1".to_owned(),
         _ => format!("{upper}_N_{}", count.name),
     };
@@ -82,7 +82,7 @@ pub(super) fn header(face: &Face<'_>) -> String {
         }
         _ = writeln!(text, "\n/* {what}, in order. */");
         for (k, place) in names.iter().enumerate() {
-            let place = of_field(place).to_string();
+            let place = field_identifier(place).to_string();
             let place = place.trim_start_matches("r#");
             _ = writeln!(text, "#define {upper}_{prefix}_{place} {k}");
         }
@@ -93,7 +93,7 @@ pub(super) fn header(face: &Face<'_>) -> String {
         _ = writeln!(text, " * {}", comment(&line));
     }
     // An array of nothing is no C.
-    let array = |what: &str, count: &Count| match count.n {
+    let array = |what: &str, count: &ArrayDimension| match count.n {
         0 => format!("*{what}"),
         _ => format!("{what}[{upper}_N_{}]", count.name),
     };
@@ -121,11 +121,11 @@ int32_t {name}_base_parameters(const double *geometry, const double *parameters,
 
 /* Computes what depends on geometry and base parameters alone. */
 int32_t {name}_prepare({name}_dynamics *dynamics, const double *geometry, const double {base});",
-        words(face),
+        storage_words(face),
         array("geometry", &constants),
         array("parameters", &parameters)
     );
-    let functions = functions(face);
+    let functions = wrapped_functions(face);
     if functions.iter().any(|one| one.follows) {
         text.push_str(
             "\n/* Passive coordinates are followed from the nominal pose to that of a state. Functions that end in `_near` take those
@@ -139,9 +139,9 @@ int32_t {name}_prepare({name}_dynamics *dynamics, const double *geometry, const 
             " Accelerations of the state are not read."
         };
         _ = writeln!(text, "\n/* {}.{unread} */", one.doc);
-        _ = writeln!(text, "{}", declared(face, one, false));
+        _ = writeln!(text, "{}", declaration(face, one, false));
         if one.follows {
-            _ = writeln!(text, "{}", declared(face, one, true));
+            _ = writeln!(text, "{}", declaration(face, one, true));
         }
     }
     if face.newton {
@@ -154,7 +154,7 @@ int32_t {name}_prepare({name}_dynamics *dynamics, const double *geometry, const 
             );
         }
     }
-    let states = face.state().iter().fold(String::new(), |mut s, (part, _)| {
+    let states = face.state_parts().iter().fold(String::new(), |mut s, (part, _)| {
         _ = write!(s, "const double *{part}, ");
         s
     });
@@ -177,11 +177,11 @@ int32_t {name}_regressor_many(const {name}_dynamics *dynamics, size_t n, {states
 }
 
 /// How a function of one state is declared.
-fn declared(face: &Face<'_>, one: &Function, near: bool) -> String {
+fn declaration(face: &LanguageBinding<'_>, one: &WrappedFunction, near: bool) -> String {
     let name = &face.name;
     let upper = name.to_uppercase();
     let mut arguments = vec![format!("const {name}_dynamics *dynamics")];
-    for (part, n) in face.state() {
+    for (part, n) in face.state_parts() {
         arguments.push(format!("const double {part}[{n}]"));
     }
     if one.takes_forces {
@@ -202,7 +202,7 @@ fn declared(face: &Face<'_>, one: &Function, near: bool) -> String {
         [part] => part.name,
         _ => "motion",
     };
-    arguments.push(match one.n() {
+    arguments.push(match one.n_results() {
         0 => format!("double *{result}"),
         _ => format!("double {result}[{sizes}]"),
     });

@@ -3,11 +3,11 @@
 use proc_macro2::TokenStream;
 use quote::{format_ident, quote};
 
-use super::Face;
+use super::LanguageBinding;
 use crate::emit::tree::reads_passive;
 
 /// A function of a state: what it is called, which method of the emitted module it stands for, and what it returns.
-pub(super) struct Function {
+pub(super) struct WrappedFunction {
     pub(super) name: &'static str,
     /// Which emitted struct has it: `model`, `dynamics` for inverse dynamics, or `equation` of motion.
     pub(super) owner: &'static str,
@@ -19,31 +19,31 @@ pub(super) struct Function {
     pub(super) takes_forces: bool,
     /// Whether Newton's method finds the passive coordinates for it.
     pub(super) follows: bool,
-    pub(super) parts: Vec<Part>,
+    pub(super) parts: Vec<ResultPart>,
 }
 
 /// A part of a result: an array, and the field of the emitted module's result in which it stands if there are several.
-pub(super) struct Part {
+pub(super) struct ResultPart {
     pub(super) name: &'static str,
-    pub(super) shape: Vec<Count>,
+    pub(super) shape: Vec<ArrayDimension>,
 }
 
 /// How many numbers there are of something.
 #[derive(Clone, Copy)]
-pub(super) struct Count {
+pub(super) struct ArrayDimension {
     /// The end of its name in a header.
     pub(super) name: &'static str,
     pub(super) n: usize,
 }
 
-impl Function {
+impl WrappedFunction {
     /// How many numbers it returns.
-    pub(super) fn n(&self) -> usize {
-        self.parts.iter().map(Part::n).sum()
+    pub(super) fn n_results(&self) -> usize {
+        self.parts.iter().map(ResultPart::n_entries).sum()
     }
 
     /// What a part is of the result that is called `found`.
-    pub(super) fn part(&self, part: &Part) -> TokenStream {
+    pub(super) fn part_tokens(&self, part: &ResultPart) -> TokenStream {
         if self.parts.len() == 1 {
             return quote! { found };
         }
@@ -52,8 +52,8 @@ impl Function {
     }
 }
 
-impl Part {
-    fn new(name: &'static str, shape: &[Count]) -> Self {
+impl ResultPart {
+    fn new(name: &'static str, shape: &[ArrayDimension]) -> Self {
         Self {
             name,
             shape: shape.to_vec(),
@@ -61,7 +61,7 @@ impl Part {
     }
 
     /// How many numbers it has.
-    pub(super) fn n(&self) -> usize {
+    pub(super) fn n_entries(&self) -> usize {
         self.shape.iter().map(|count| count.n).product()
     }
 }
@@ -71,8 +71,8 @@ impl Part {
     clippy::too_many_lines,
     reason = "a list of functions, one after the other"
 )]
-pub(super) fn functions(face: &Face<'_>) -> Vec<Function> {
-    let count = |name, n| Count { name, n };
+pub(super) fn wrapped_functions(face: &LanguageBinding<'_>) -> Vec<WrappedFunction> {
+    let count = |name, n| ArrayDimension { name, n };
     let active = count("ACTIVE", face.n_active());
     let passive = count("PASSIVE", face.n_passive());
     let drives = count("DRIVES", face.n_drives());
@@ -80,7 +80,7 @@ pub(super) fn functions(face: &Face<'_>) -> Vec<Function> {
     let programs = &face.derivation.programs;
     let follows = |program| reads_passive(face.derivation, program);
     let mut all = vec![
-        Function {
+        WrappedFunction {
             name: "inverse_dynamics",
             owner: "dynamics",
             method: "forces",
@@ -88,9 +88,9 @@ pub(super) fn functions(face: &Face<'_>) -> Vec<Function> {
             reads_accelerations: true,
             takes_forces: false,
             follows: follows(&programs.inverse_dynamics),
-            parts: vec![Part::new("forces", &[drives])],
+            parts: vec![ResultPart::new("forces", &[drives])],
         },
-        Function {
+        WrappedFunction {
             name: "regressor",
             owner: "model",
             method: "regressor",
@@ -98,9 +98,9 @@ pub(super) fn functions(face: &Face<'_>) -> Vec<Function> {
             reads_accelerations: true,
             takes_forces: false,
             follows: follows(&programs.regressor),
-            parts: vec![Part::new("regressor", &[drives, base])],
+            parts: vec![ResultPart::new("regressor", &[drives, base])],
         },
-        Function {
+        WrappedFunction {
             name: "drives",
             owner: "model",
             method: "drives",
@@ -110,14 +110,14 @@ pub(super) fn functions(face: &Face<'_>) -> Vec<Function> {
             takes_forces: false,
             follows: follows(&programs.drives),
             parts: vec![
-                Part::new("coordinate", &[drives]),
-                Part::new("rate", &[drives]),
-                Part::new("jacobian", &[drives, active]),
+                ResultPart::new("coordinate", &[drives]),
+                ResultPart::new("rate", &[drives]),
+                ResultPart::new("jacobian", &[drives, active]),
             ],
         },
     ];
     if passive.n > 0 {
-        all.push(Function {
+        all.push(WrappedFunction {
             name: "passive",
             owner: "model",
             method: "passive",
@@ -126,15 +126,15 @@ pub(super) fn functions(face: &Face<'_>) -> Vec<Function> {
             takes_forces: false,
             follows: follows(&programs.passive),
             parts: ["q", "qd", "qdd"]
-                .map(|name| Part::new(name, &[passive]))
+                .map(|name| ResultPart::new(name, &[passive]))
                 .into(),
         });
     }
     let Some(dynamics) = face.dynamics else {
         return all;
     };
-    let matrix = || vec![Part::new("matrix", &[active, active])];
-    let forces = || vec![Part::new("forces", &[active])];
+    let matrix = || vec![ResultPart::new("matrix", &[active, active])];
+    let forces = || vec![ResultPart::new("forces", &[active])];
     let equation = [
         (
             "mass_matrix",
@@ -167,7 +167,7 @@ pub(super) fn functions(face: &Face<'_>) -> Vec<Function> {
             forces(),
         ),
     ];
-    all.extend(equation.map(|(name, doc, program, parts)| Function {
+    all.extend(equation.map(|(name, doc, program, parts)| WrappedFunction {
         name,
         owner: "equation",
         method: name,
@@ -177,7 +177,7 @@ pub(super) fn functions(face: &Face<'_>) -> Vec<Function> {
         follows: follows(program),
         parts,
     }));
-    all.push(Function {
+    all.push(WrappedFunction {
         name: "forward",
         owner: "equation",
         method: "forward",
@@ -185,7 +185,7 @@ pub(super) fn functions(face: &Face<'_>) -> Vec<Function> {
         reads_accelerations: false,
         takes_forces: true,
         follows: follows(&dynamics.mass_matrix) || follows(&dynamics.bias),
-        parts: vec![Part::new("accelerations", &[active])],
+        parts: vec![ResultPart::new("accelerations", &[active])],
     });
     all
 }

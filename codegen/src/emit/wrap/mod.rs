@@ -13,18 +13,18 @@ pub(super) use python::emit_python;
 use proc_macro2::{Ident, TokenStream};
 use quote::{format_ident, quote};
 
-use crate::emit::identifier::{of_field, of_module};
-use crate::emit::language::rust::{doc_lines, emit, print};
-use crate::emit::language::{EmittedFile, Source};
+use crate::emit::identifier::{field_identifier, module_identifier};
+use crate::emit::language::rust::{doc_lines, emit, print_source};
+use crate::emit::language::{EmittedFile, EmissionRequest};
 use crate::emit::tree::uses_load;
 use crate::programs::PassivePosition;
-use crate::{Derivation, Dynamics};
+use crate::{Derivation, DynamicsPrograms};
 
 /// What faces of all languages need to know of a model.
-pub(super) struct Face<'a> {
+pub(super) struct LanguageBinding<'a> {
     pub(super) derivation: &'a Derivation,
     /// The equation of motion, if that is wanted.
-    pub(super) dynamics: Option<&'a Dynamics>,
+    pub(super) dynamics: Option<&'a DynamicsPrograms>,
     /// Name of the library and prefix of its functions.
     pub(super) name: String,
     pub(super) load: bool,
@@ -32,11 +32,11 @@ pub(super) struct Face<'a> {
     pub(super) newton: bool,
 }
 
-impl<'a> Face<'a> {
+impl<'a> LanguageBinding<'a> {
     /// Names that are `reserved` in the other language get `_model` behind them.
-    pub(super) fn new(source: &Source<'a>, reserved: &[&str]) -> Self {
+    pub(super) fn new(source: &EmissionRequest<'a>, reserved: &[&str]) -> Self {
         let derivation = source.derivation;
-        let module = of_module(&derivation.mechanism.name).to_string();
+        let module = module_identifier(&derivation.mechanism.name).to_string();
         let mut name = module.trim_start_matches("r#").to_owned();
         if reserved.contains(&name.as_str()) {
             name.push_str("_model");
@@ -80,7 +80,7 @@ impl<'a> Face<'a> {
     }
 
     /// The parts of a state, in order, with how many numbers each has.
-    pub(super) fn state(&self) -> Vec<(Ident, usize)> {
+    pub(super) fn state_parts(&self) -> Vec<(Ident, usize)> {
         let n = self.n_active();
         let mut parts = vec![("q", n), ("qd", n), ("qdd", n)];
         if self.load {
@@ -93,7 +93,7 @@ impl<'a> Face<'a> {
     }
 
     /// The emitted module as a file.
-    pub(super) fn module(&self) -> EmittedFile {
+    pub(super) fn emitted_module(&self) -> EmittedFile {
         let mut emitted = emit(self.derivation);
         if let Some(dynamics) = self.dynamics {
             emitted = emitted.with_dynamics(self.derivation, dynamics);
@@ -105,14 +105,14 @@ impl<'a> Face<'a> {
     }
 
     /// A function that makes `Geometry` or `Parameters` of an array, and its inverse.
-    pub(super) fn record(function: &str, record: &str, names: &[&str]) -> TokenStream {
+    pub(super) fn record_functions(function: &str, record: &str, names: &[&str]) -> TokenStream {
         let (from, to) = (
             format_ident!("{function}"),
             format_ident!("{function}_values"),
         );
         let record = format_ident!("{record}");
         let n = names.len();
-        let fields: Vec<Ident> = names.iter().map(|name| of_field(name)).collect();
+        let fields: Vec<Ident> = names.iter().map(|name| field_identifier(name)).collect();
         let places = 0..n;
         quote! {
             fn #from(values: &[f64; #n]) -> model::#record<f64> {
@@ -132,10 +132,10 @@ impl<'a> Face<'a> {
 }
 
 /// Source of a file that begins with a comment for its reader.
-pub(super) fn source(path: &str, doc: &str, items: &TokenStream) -> EmittedFile {
+pub(super) fn source_file(path: &str, doc: &str, items: &TokenStream) -> EmittedFile {
     let doc = doc_lines(doc, true);
     EmittedFile {
         path: path.to_owned(),
-        text: print(&quote! { #doc #items }),
+        text: print_source(&quote! { #doc #items }),
     }
 }

@@ -3,10 +3,10 @@
 use proc_macro2::{Ident, TokenStream};
 use quote::{format_ident, quote};
 
-use super::functions::{Function, functions};
-use super::{Face, source};
+use super::functions::{WrappedFunction, wrapped_functions};
+use super::{LanguageBinding, source_file};
 use crate::emit::language::rust::doc_lines;
-use crate::emit::language::{EmittedFile, Source};
+use crate::emit::language::{EmittedFile, EmissionRequest};
 
 /// Names that a module of Python cannot have, or must leave to the module whose arrays it takes.
 const RESERVED: &[&str] = &[
@@ -19,8 +19,8 @@ const RESERVED: &[&str] = &[
 /// The files of the crate, without reactions and self-test. It needs `modelmill-runtime` in the folder `modelmill-runtime`
 /// beside its manifest.
 #[allow(clippy::too_many_lines, reason = "one text from top to bottom")]
-pub(in crate::emit) fn emit_python(from: &Source<'_>) -> Vec<EmittedFile> {
-    let face = Face::new(from, RESERVED);
+pub(in crate::emit) fn emit_python(from: &EmissionRequest<'_>) -> Vec<EmittedFile> {
+    let face = LanguageBinding::new(from, RESERVED);
     let name = &face.name;
     let package = name.trim_start_matches('_');
     let cargo = format!(
@@ -66,13 +66,13 @@ module-name = \"{name}\"
     vec![
         file("Cargo.toml", cargo),
         file("pyproject.toml", pyproject),
-        source("src/lib.rs", "The model for Python.", &items(&face)),
-        face.module(),
+        source_file("src/lib.rs", "The model for Python.", &items(&face)),
+        face.emitted_module(),
     ]
 }
 
 #[allow(clippy::too_many_lines, reason = "one text from top to bottom")]
-fn items(face: &Face<'_>) -> TokenStream {
+fn items(face: &LanguageBinding<'_>) -> TokenStream {
     let module = &face.name;
     let mechanism = &face.derivation.mechanism;
     let title = format!(
@@ -86,10 +86,10 @@ fn items(face: &Face<'_>) -> TokenStream {
     let (constants, parameters) = (face.constants(), face.parameters());
     let (n_active, n_drives, n_base) = (face.n_active(), face.n_drives(), face.n_base());
     let records = [
-        Face::record("geometry", "Geometry", &constants),
-        Face::record("parameters", "Parameters", &parameters),
+        LanguageBinding::record_functions("geometry", "Geometry", &constants),
+        LanguageBinding::record_functions("parameters", "Parameters", &parameters),
     ];
-    let parts = face.state();
+    let parts = face.state_parts();
     let names: Vec<_> = parts.iter().map(|(name, _)| name).collect();
     let arguments = quote! { #(#names: PyReadonlyArrayDyn<'py, f64>),* };
     let arrays = arrays(&parts);
@@ -99,13 +99,13 @@ fn items(face: &Face<'_>) -> TokenStream {
     };
     // The two that vectors compute for many states at once are written out below.
     let of_blocks = ["inverse_dynamics", "regressor"];
-    let singles = functions(face);
+    let singles = wrapped_functions(face);
     let singles = singles.iter().filter(|one| !of_blocks.contains(&one.name));
     let called: Vec<Ident> = singles
         .clone()
-        .map(|one| format_ident!("{}", name(one)))
+        .map(|one| format_ident!("{}", python_name(one)))
         .collect();
-    let singles: Vec<TokenStream> = singles.map(|one| single(face, one)).collect();
+    let singles: Vec<TokenStream> = singles.map(|one| single_state_function(face, one)).collect();
     let doc_forces = "Forces of the drives, N or N m, for base parameters `p`. `parallel` uses all cores; `geometry` names known \
                       quantities that differ from the model file's.";
     let doc_regressor = "H_min: one row per drive, one column per base parameter. `parallel` and `geometry` as in `inverse_dynamics`.";
@@ -317,7 +317,7 @@ fn items(face: &Face<'_>) -> TokenStream {
 }
 
 /// What a function is called in Python.
-fn name(one: &Function) -> &'static str {
+fn python_name(one: &WrappedFunction) -> &'static str {
     match one.name {
         "forward" => "forward_dynamics",
         name => name,
@@ -336,12 +336,12 @@ fn arrays(parts: &[(Ident, usize)]) -> TokenStream {
 }
 
 /// A function that looks at one state after the other.
-fn single(face: &Face<'_>, one: &Function) -> TokenStream {
+fn single_state_function(face: &LanguageBinding<'_>, one: &WrappedFunction) -> TokenStream {
     let (name, method) = (
-        format_ident!("{}", name(one)),
+        format_ident!("{}", python_name(one)),
         format_ident!("{}", one.method),
     );
-    let state = face.state();
+    let state = face.state_parts();
     let is_given = |part: &&(Ident, usize)| one.reads_accelerations || part.0 != "qdd";
     let forces = one
         .takes_forces
@@ -373,17 +373,17 @@ fn single(face: &Face<'_>, one: &Function) -> TokenStream {
         (Some(argument), Some(quote! { p, }), owner)
     };
     let values = one.parts.iter().map(|part| {
-        let value = one.part(part);
+        let value = one.part_tokens(part);
         match part.shape.len() {
             1 => quote! { &#value[..] },
             _ => quote! { #value.as_flattened() },
         }
     });
-    let entries = one.n();
+    let entries = one.n_results();
     let mut at = 0;
     let results = one.parts.iter().map(|part| {
         let (from, shape) = (at, part.shape.iter().map(|count| count.n));
-        at += part.n();
+        at += part.n_entries();
         quote! { shaped(py, &many, &values[#from * n..#at * n], &[#(#shape),*])? }
     });
     let results: Vec<TokenStream> = results.collect();

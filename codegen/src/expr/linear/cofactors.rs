@@ -8,14 +8,14 @@ use crate::expr::{ExprId, Graph, Rational};
 pub(super) const LARGEST_BLOCK: usize = 10;
 
 /// Solves a small system by cofactors: one row of values per unknown, and the determinant. `None` if that is zero.
-pub(super) fn by_cofactors(
+pub(super) fn solve_by_cofactors(
     graph: &mut Graph,
     block: &[Vec<ExprId>],
     rhs: &[Vec<ExprId>],
 ) -> Option<(Vec<Vec<ExprId>>, ExprId)> {
     let (n, n_rhs) = (block.len(), rhs.first().map_or(0, Vec::len));
     let all = (1u32 << n) - 1;
-    let mut minors = Minors {
+    let mut minors = MinorExpansion {
         matrix: block,
         known: FxHashMap::default(),
     };
@@ -53,7 +53,7 @@ pub(super) fn by_cofactors(
 /// The determinant of a small matrix.
 pub(super) fn determinant(graph: &mut Graph, matrix: &[Vec<ExprId>]) -> ExprId {
     let all = (1u32 << matrix.len()) - 1;
-    let mut minors = Minors {
+    let mut minors = MinorExpansion {
         matrix,
         known: FxHashMap::default(),
     };
@@ -61,12 +61,12 @@ pub(super) fn determinant(graph: &mut Graph, matrix: &[Vec<ExprId>]) -> ExprId {
 }
 
 /// Minors by expansion along their first row, each computed once.
-struct Minors<'a> {
+struct MinorExpansion<'a> {
     matrix: &'a [Vec<ExprId>],
     known: FxHashMap<(u32, u32), ExprId>,
 }
 
-impl Minors<'_> {
+impl MinorExpansion<'_> {
     fn minor(&mut self, graph: &mut Graph, rows: u32, columns: u32) -> ExprId {
         if rows == 0 {
             return Graph::ONE;

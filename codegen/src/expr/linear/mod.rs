@@ -9,13 +9,13 @@ mod torn;
 use petgraph::algo::{maximum_matching, tarjan_scc};
 use petgraph::graph::{DiGraph, NodeIndex, UnGraph};
 
-use cofactors::{LARGEST_BLOCK, by_cofactors};
+use cofactors::{LARGEST_BLOCK, solve_by_cofactors};
 
 use crate::DeriveError;
 use crate::expr::{ExprId, Graph, Rational};
 
 /// The solution of a linear system, and what must not vanish for it to exist.
-pub(crate) struct Solution {
+pub(crate) struct LinearSolution {
     /// One row per unknown, one column per right-hand side.
     pub(crate) values: Vec<Vec<ExprId>>,
     /// Determinants of the blocks.
@@ -28,7 +28,7 @@ pub(crate) fn solve(
     matrix: &[Vec<ExprId>],
     rhs: &[Vec<ExprId>],
     what: &str,
-) -> Result<Solution, DeriveError> {
+) -> Result<LinearSolution, DeriveError> {
     let n = matrix.len();
     let n_rhs = rhs.first().map_or(0, Vec::len);
     let mut values = vec![vec![Graph::ZERO; n_rhs]; n];
@@ -38,7 +38,7 @@ pub(crate) fn solve(
     };
     let mut rhs = rhs.to_vec();
     let mut solved: Vec<usize> = Vec::new();
-    for (rows, columns) in blocks(matrix).ok_or_else(singular)? {
+    for (rows, columns) in triangular_blocks(matrix).ok_or_else(singular)? {
         for r in &rows {
             for k in 0..n_rhs {
                 let mut terms = vec![(rhs[*r][k], Rational::ONE)];
@@ -57,7 +57,7 @@ pub(crate) fn solve(
         let block_rhs: Vec<Vec<ExprId>> = rows.iter().map(|r| rhs[*r].clone()).collect();
         let found = if rows.len() > LARGEST_BLOCK {
             let (found, regular) =
-                torn::solve(graph, &block, &block_rhs).ok_or_else(|| DeriveError::TooLarge {
+                torn::solve_by_tearing(graph, &block, &block_rhs).ok_or_else(|| DeriveError::TooLarge {
                     what: what.to_owned(),
                     size: rows.len(),
                     limit: LARGEST_BLOCK,
@@ -66,7 +66,7 @@ pub(crate) fn solve(
             found
         } else {
             let (found, determinant) =
-                by_cofactors(graph, &block, &block_rhs).ok_or_else(singular)?;
+                solve_by_cofactors(graph, &block, &block_rhs).ok_or_else(singular)?;
             if determinant.index() > 1 {
                 determinants.push(determinant);
             }
@@ -76,7 +76,7 @@ pub(crate) fn solve(
             values[*column] = value;
         }
     }
-    Ok(Solution {
+    Ok(LinearSolution {
         values,
         determinants,
     })
@@ -84,7 +84,7 @@ pub(crate) fn solve(
 
 /// Rows with the columns that they determine, such that a block needs only the columns of blocks before it
 /// (Dulmage and Mendelsohn 1963). `None` if no choice of one entry per row and column avoids zeros.
-fn blocks(matrix: &[Vec<ExprId>]) -> Option<Vec<(Vec<usize>, Vec<usize>)>> {
+fn triangular_blocks(matrix: &[Vec<ExprId>]) -> Option<Vec<(Vec<usize>, Vec<usize>)>> {
     let n = matrix.len();
     let entries = |i: usize| (0..n).filter(move |j| matrix[i][*j] != Graph::ZERO);
     let mut bipartite = UnGraph::<(), ()>::default();

@@ -6,18 +6,18 @@
 //! and every part follows by least squares, which here are exact and divide by a sum of squares: a part is singular only
 //! where its own unknowns are not determined. (Tearing: Kron 1963.)
 
-use super::cofactors::{LARGEST_BLOCK, by_cofactors, determinant};
+use super::cofactors::{LARGEST_BLOCK, solve_by_cofactors, determinant};
 use crate::expr::{ExprId, Graph, Rational};
 
 /// Rows and columns that hang together without the torn columns.
-struct Part {
+struct ConnectedBlock {
     rows: Vec<usize>,
     columns: Vec<usize>,
 }
 
 /// Solves `matrix * x = rhs`: one row of values per unknown, then what must not vanish. `None` where the system does not
 /// fall apart this way, or is singular.
-pub(crate) fn solve(
+pub(crate) fn solve_by_tearing(
     graph: &mut Graph,
     matrix: &[Vec<ExprId>],
     rhs: &[Vec<ExprId>],
@@ -27,7 +27,7 @@ pub(crate) fn solve(
     let mut determinants = Vec::new();
     let (mut small, mut small_rhs) = (Vec::new(), Vec::new());
     for part in &parts {
-        let combinations = cancelling(graph, matrix, part);
+        let combinations = cancelling_rows(graph, matrix, part);
         for factors in combinations {
             let combine = |graph: &mut Graph, of: &[Vec<ExprId>], column: usize| {
                 let terms: Vec<ExprId> = factors
@@ -48,7 +48,7 @@ pub(crate) fn solve(
             );
         }
     }
-    let (of_torn, determinant) = by_cofactors(graph, &small, &small_rhs)?;
+    let (of_torn, determinant) = solve_by_cofactors(graph, &small, &small_rhs)?;
     determinants.push(determinant);
     let mut values = vec![vec![Graph::ZERO; n_rhs]; n];
     for (column, value) in torn.iter().zip(of_torn) {
@@ -84,7 +84,7 @@ pub(crate) fn solve(
                 transposed_times(graph, &own, &rest),
             )
         };
-        let (found, determinant) = by_cofactors(graph, &own, &rest)?;
+        let (found, determinant) = solve_by_cofactors(graph, &own, &rest)?;
         determinants.push(determinant);
         for (column, value) in part.columns.iter().zip(found) {
             values[*column] = value;
@@ -94,14 +94,14 @@ pub(crate) fn solve(
 }
 
 /// The fewest columns, those of most rows first, without which the others fall into parts that can be solved.
-fn tear(matrix: &[Vec<ExprId>]) -> Option<(Vec<usize>, Vec<Part>)> {
+fn tear(matrix: &[Vec<ExprId>]) -> Option<(Vec<usize>, Vec<ConnectedBlock>)> {
     let n = matrix.len();
     let mut order: Vec<usize> = (0..n).collect();
     let rows_of = |c: usize| (0..n).filter(|r| matrix[*r][c] != Graph::ZERO).count();
     order.sort_by_key(|c| std::cmp::Reverse(rows_of(*c)));
     (1..=LARGEST_BLOCK.min(n)).find_map(|k| {
         let (torn, rest) = order.split_at(k);
-        let parts = parts(matrix, rest);
+        let parts = connected_blocks(matrix, rest);
         let is_fine = parts.iter().all(|part| {
             let (r, c) = (part.rows.len(), part.columns.len());
             c <= LARGEST_BLOCK && (r == c || r == c + 1 || c == 0)
@@ -111,24 +111,24 @@ fn tear(matrix: &[Vec<ExprId>]) -> Option<(Vec<usize>, Vec<Part>)> {
 }
 
 /// Connected components of rows and some columns.
-fn parts(matrix: &[Vec<ExprId>], columns: &[usize]) -> Vec<Part> {
-    let mut parts: Vec<Part> = Vec::new();
+fn connected_blocks(matrix: &[Vec<ExprId>], columns: &[usize]) -> Vec<ConnectedBlock> {
+    let mut parts: Vec<ConnectedBlock> = Vec::new();
     for (row, entries) in matrix.iter().enumerate() {
         let own: Vec<usize> = columns
             .iter()
             .copied()
             .filter(|c| entries[*c] != Graph::ZERO)
             .collect();
-        let mut joined = Part {
+        let mut joined = ConnectedBlock {
             rows: vec![row],
             columns: own,
         };
         let (touching, others) = parts
             .into_iter()
-            .partition(|part: &Part| part.columns.iter().any(|c| joined.columns.contains(c)));
+            .partition(|part: &ConnectedBlock| part.columns.iter().any(|c| joined.columns.contains(c)));
         parts = others;
         for part in touching {
-            let part: Part = part;
+            let part: ConnectedBlock = part;
             joined.rows.extend(part.rows);
             joined.columns.extend(part.columns);
         }
@@ -141,7 +141,7 @@ fn parts(matrix: &[Vec<ExprId>], columns: &[usize]) -> Vec<Part> {
 }
 
 /// Combinations of a part's rows, as rows with factors, in which its own columns cancel.
-fn cancelling(graph: &mut Graph, matrix: &[Vec<ExprId>], part: &Part) -> Vec<Vec<(usize, ExprId)>> {
+fn cancelling_rows(graph: &mut Graph, matrix: &[Vec<ExprId>], part: &ConnectedBlock) -> Vec<Vec<(usize, ExprId)>> {
     if part.columns.is_empty() {
         return part
             .rows

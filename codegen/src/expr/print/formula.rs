@@ -3,7 +3,7 @@
 use num_bigint::BigInt;
 
 use super::simplify;
-use super::symbol::Symbol;
+use super::symbol::FormulaSymbol;
 
 /// Terms of a sum beyond which nobody looks for what they have in common.
 const MOST_COMPARED: usize = 100;
@@ -12,7 +12,7 @@ use crate::expr::Rational;
 /// A function by name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[allow(missing_docs)]
-pub enum Function {
+pub enum FormulaFunction {
     Sin,
     Cos,
     Sqrt,
@@ -23,7 +23,7 @@ pub enum Function {
     Atan2,
 }
 
-impl Function {
+impl FormulaFunction {
     /// Its name in text.
     pub fn name(self) -> &'static str {
         match self {
@@ -39,7 +39,7 @@ impl Function {
     }
 }
 
-impl From<crate::expr::Unary> for Function {
+impl From<crate::expr::Unary> for FormulaFunction {
     fn from(unary: crate::expr::Unary) -> Self {
         use crate::expr::Unary;
         match unary {
@@ -56,31 +56,31 @@ impl From<crate::expr::Unary> for Function {
 
 /// A formula to be printed. The constructors keep it tidy: no term of zero, no factor of one, no sum in a sum.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Formula {
+pub enum PrintedFormula {
     /// A rational number.
     Number(Rational),
     /// A name.
-    Symbol(Symbol),
+    Symbol(FormulaSymbol),
     /// A name with a formula as its index: `h` with `m1*dc1`.
-    Indexed(Symbol, Box<Formula>),
+    Indexed(FormulaSymbol, Box<PrintedFormula>),
     /// A sum of two or more.
-    Sum(Vec<Formula>),
+    Sum(Vec<PrintedFormula>),
     /// A number times a product over a product.
     Term {
         /// The number, not zero.
         factor: Rational,
         /// Factors above the line.
-        above: Vec<Formula>,
+        above: Vec<PrintedFormula>,
         /// Factors below the line.
-        below: Vec<Formula>,
+        below: Vec<PrintedFormula>,
     },
     /// A power with an exponent of at least two.
-    Power(Box<Formula>, u32),
+    Power(Box<PrintedFormula>, u32),
     /// A function of one or two operands.
-    Apply(Function, Vec<Formula>),
+    Apply(FormulaFunction, Vec<PrintedFormula>),
 }
 
-impl Formula {
+impl PrintedFormula {
     /// An integer.
     pub fn integer(value: i64) -> Self {
         Self::Number(Rational::integer(value))
@@ -88,7 +88,7 @@ impl Formula {
 
     /// A name.
     pub fn name(name: impl Into<String>) -> Self {
-        Self::Symbol(Symbol::new(name))
+        Self::Symbol(FormulaSymbol::new(name))
     }
 
     /// Whether it is the number 0.
@@ -121,7 +121,7 @@ impl Formula {
             }
         }
         if flat.len() <= MOST_COMPARED {
-            flat = simplify::gathered(flat);
+            flat = simplify::collect_like_terms(flat);
         }
         if let Some(first) = flat.iter().position(|term| !term.is_negative()) {
             flat[..=first].rotate_right(1);
@@ -152,11 +152,11 @@ impl Formula {
         let mut number = factor;
         let (mut up, mut down) = (Vec::new(), Vec::new());
         for one in above {
-            Self::gather(one, &mut number, &mut up, &mut down);
+            Self::gather_factor(one, &mut number, &mut up, &mut down);
         }
         let mut inverse = Rational::ONE;
         for one in below {
-            Self::gather(one, &mut inverse, &mut down, &mut up);
+            Self::gather_factor(one, &mut inverse, &mut down, &mut up);
         }
         number = &number * &inverse.recip();
         number = &number * &simplify::without_squared_roots(&mut up);
@@ -166,7 +166,7 @@ impl Formula {
             if let Self::Sum(terms) = one
                 && terms.iter().all(Self::is_negative)
             {
-                let turned = std::mem::take(terms).into_iter().map(Self::negated);
+                let turned = std::mem::take(terms).into_iter().map(Self::negate);
                 *terms = turned.collect();
                 number = -&number;
             }
@@ -182,7 +182,7 @@ impl Formula {
                 (only, false) if number.is_one() => return only,
                 // The sign of a sum goes to its terms: `b - a` rather than `-(a - b)`.
                 (Self::Sum(terms), true) => {
-                    return Self::sum(terms.into_iter().map(Self::negated));
+                    return Self::sum(terms.into_iter().map(Self::negate));
                 }
                 (only, _) => up.push(only),
             }
@@ -194,7 +194,7 @@ impl Formula {
         }
     }
 
-    fn gather(one: Self, number: &mut Rational, above: &mut Vec<Self>, below: &mut Vec<Self>) {
+    fn gather_factor(one: Self, number: &mut Rational, above: &mut Vec<Self>, below: &mut Vec<Self>) {
         match one {
             Self::Number(n) => *number = &*number * &n,
             Self::Term {
@@ -204,18 +204,18 @@ impl Formula {
             } => {
                 *number = &*number * &factor;
                 for one in up {
-                    Self::multiply(above, one);
+                    Self::multiply_factor(above, one);
                 }
                 for one in down {
-                    Self::multiply(below, one);
+                    Self::multiply_factor(below, one);
                 }
             }
-            other => Self::multiply(above, other),
+            other => Self::multiply_factor(above, other),
         }
     }
 
     /// Appends a factor, as a power where it is there already.
-    fn multiply(factors: &mut Vec<Self>, factor: Self) {
+    fn multiply_factor(factors: &mut Vec<Self>, factor: Self) {
         let (base, n) = factor.into_power();
         let same = |there: &&mut Self| match there {
             Self::Power(inner, _) => **inner == base,
@@ -272,12 +272,12 @@ impl Formula {
 
     /// The formula with its sign changed.
     #[must_use]
-    pub fn negated(self) -> Self {
+    pub fn negate(self) -> Self {
         Self::product(Rational::MINUS_ONE, [self])
     }
 
     /// A function of one operand.
-    pub fn apply(function: Function, operand: Self) -> Self {
+    pub fn apply(function: FormulaFunction, operand: Self) -> Self {
         Self::Apply(function, vec![operand])
     }
 }

@@ -4,26 +4,26 @@ use std::fmt::Write;
 
 use modelmill_boundary::text::html as escape;
 
-use super::formula::{Formula, Function, digits};
-use super::symbol::{Glyphs, Symbol, typeset};
+use super::formula::{PrintedFormula, FormulaFunction, digits};
+use super::symbol::{GlyphRun, FormulaSymbol, typeset};
 
-impl Formula {
+impl PrintedFormula {
     /// As the content of a `math` element.
     pub fn mathml(&self) -> String {
-        let mut out = Out::default();
+        let mut out = MathmlWriter::default();
         write(&mut out, self, false);
         format!("<mrow>{}</mrow>", out.text)
     }
 
     /// As the contents of `math` elements, one after the other, between which a line may end: before each sign of a sum, those
     /// in parentheses too. What cannot be parted otherwise, a long fraction or root, is written on the line.
-    pub fn mathml_stretches(&self) -> Vec<String> {
-        let mut out = Out {
+    pub fn mathml_segments(&self) -> Vec<String> {
+        let mut out = MathmlWriter {
             may_part: true,
-            ..Out::default()
+            ..MathmlWriter::default()
         };
         write(&mut out, self, false);
-        out.part();
+        out.end_segment();
         let stretches = out.done.into_iter();
         stretches
             .map(|stretch| format!("<mrow>{stretch}</mrow>"))
@@ -36,7 +36,7 @@ const LONG: usize = 32;
 
 /// MathML as it grows.
 #[derive(Default)]
-struct Out {
+struct MathmlWriter {
     /// Stretches that ended.
     done: Vec<String>,
     text: String,
@@ -44,32 +44,32 @@ struct Out {
     may_part: bool,
 }
 
-impl Out {
+impl MathmlWriter {
     fn push_str(&mut self, text: &str) {
         self.text.push_str(text);
     }
 
     /// A line may end here.
-    fn part(&mut self) {
+    fn end_segment(&mut self) {
         if self.may_part && !self.text.is_empty() {
             self.done.push(std::mem::take(&mut self.text));
         }
     }
 
     /// Writes what must stay together.
-    fn whole(&mut self, write: impl FnOnce(&mut Self)) {
+    fn write_unbroken(&mut self, write: impl FnOnce(&mut Self)) {
         let may_part = std::mem::replace(&mut self.may_part, false);
         write(self);
         self.may_part = may_part;
     }
 
     /// Whether something is to be written on the line, since it would be too wide in one piece.
-    fn is_too_wide(&self, formula: &Formula) -> bool {
+    fn is_too_wide(&self, formula: &PrintedFormula) -> bool {
         self.may_part && formula.text().chars().count() > LONG
     }
 }
 
-impl Write for Out {
+impl Write for MathmlWriter {
     fn write_str(&mut self, text: &str) -> std::fmt::Result {
         self.text.push_str(text);
         Ok(())
@@ -79,14 +79,14 @@ impl Write for Out {
 /// Space between factors; the sign of the product stays invisible.
 const TIMES: &str = "<mo lspace=\"0\" rspace=\"0.12em\">&#x2062;</mo>";
 
-impl Symbol {
+impl FormulaSymbol {
     /// As a MathML element.
     pub fn mathml(&self) -> String {
-        self.mathml_raised(None)
+        self.mathml_power(None)
     }
 
     /// With an exponent above the index.
-    fn mathml_raised(&self, exponent: Option<u32>) -> String {
+    fn mathml_power(&self, exponent: Option<u32>) -> String {
         let set = typeset(&self.name);
         let mut base = glyphs(&set.base);
         // As accents the dots would touch letters without ascenders.
@@ -116,28 +116,28 @@ impl Symbol {
     }
 }
 
-fn glyphs(one: &Glyphs) -> String {
+fn glyphs(one: &GlyphRun) -> String {
     match one {
-        Glyphs::Greek(_, letter) => format!("<mi>{letter}</mi>"),
-        Glyphs::Italic(text) if text.bytes().all(|b| b.is_ascii_digit()) => {
+        GlyphRun::Greek(_, letter) => format!("<mi>{letter}</mi>"),
+        GlyphRun::Italic(text) if text.bytes().all(|b| b.is_ascii_digit()) => {
             format!("<mn>{text}</mn>")
         }
-        Glyphs::Italic(text) if text.chars().count() == 1 => format!("<mi>{}</mi>", escape(text)),
+        GlyphRun::Italic(text) if text.chars().count() == 1 => format!("<mi>{}</mi>", escape(text)),
         // Several letters stand upright by themselves.
-        Glyphs::Italic(text) | Glyphs::Word(text) => format!("<mi>{}</mi>", escape(text)),
+        GlyphRun::Italic(text) | GlyphRun::Word(text) => format!("<mi>{}</mi>", escape(text)),
     }
 }
 
-fn fenced(out: &mut Out, open: &str, close: &str, body: impl FnOnce(&mut Out)) {
-    fenced_and_raised(out, open, close, None, body);
+fn write_fenced(out: &mut MathmlWriter, open: &str, close: &str, body: impl FnOnce(&mut MathmlWriter)) {
+    write_fenced_power(out, open, close, None, body);
 }
 
-fn fenced_and_raised(
-    out: &mut Out,
+fn write_fenced_power(
+    out: &mut MathmlWriter,
     open: &str,
     close: &str,
     exponent: Option<u32>,
-    body: impl FnOnce(&mut Out),
+    body: impl FnOnce(&mut MathmlWriter),
 ) {
     if out.may_part {
         // Both parentheses may come into stretches of their own.
@@ -161,27 +161,27 @@ fn fenced_and_raised(
     }
 }
 
-fn write(out: &mut Out, formula: &Formula, tight: bool) {
+fn write(out: &mut MathmlWriter, formula: &PrintedFormula, tight: bool) {
     let enclosed = tight
         && match formula {
-            Formula::Sum(_) => true,
-            Formula::Number(n) => n.is_negative(),
-            Formula::Term { factor, .. } => factor.is_negative(),
+            PrintedFormula::Sum(_) => true,
+            PrintedFormula::Number(n) => n.is_negative(),
+            PrintedFormula::Term { factor, .. } => factor.is_negative(),
             _ => false,
         };
     if enclosed {
-        fenced(out, "(", ")", |out| write(out, formula, false));
+        write_fenced(out, "(", ")", |out| write(out, formula, false));
         return;
     }
     match formula {
-        Formula::Symbol(symbol) => out.push_str(&symbol.mathml()),
-        Formula::Indexed(symbol, index) => {
+        PrintedFormula::Symbol(symbol) => out.push_str(&symbol.mathml()),
+        PrintedFormula::Indexed(symbol, index) => {
             _ = write!(out, "<msub>{}{}</msub>", symbol.mathml(), index.mathml());
         }
-        Formula::Sum(terms) => {
+        PrintedFormula::Sum(terms) => {
             for (i, term) in terms.iter().enumerate() {
                 if i > 0 {
-                    out.part();
+                    out.end_segment();
                 }
                 // What begins a line keeps its distance from its sign.
                 let sides = match i {
@@ -197,34 +197,34 @@ fn write(out: &mut Out, formula: &Formula, tight: bool) {
                 magnitude(out, term);
             }
         }
-        Formula::Number(_) | Formula::Term { .. } => {
+        PrintedFormula::Number(_) | PrintedFormula::Term { .. } => {
             if formula.is_negative() {
                 out.push_str("<mo form=\"prefix\">&#x2212;</mo>");
             }
             magnitude(out, formula);
         }
-        Formula::Power(base, n) => power(out, base, *n),
-        Formula::Apply(function, operands) => apply(out, *function, None, operands),
+        PrintedFormula::Power(base, n) => power(out, base, *n),
+        PrintedFormula::Apply(function, operands) => apply(out, *function, None, operands),
     }
 }
 
-fn power(out: &mut Out, base: &Formula, n: u32) {
+fn power(out: &mut MathmlWriter, base: &PrintedFormula, n: u32) {
     match base {
-        Formula::Apply(f @ (Function::Sin | Function::Cos | Function::Tanh), operands) => {
+        PrintedFormula::Apply(f @ (FormulaFunction::Sin | FormulaFunction::Cos | FormulaFunction::Tanh), operands) => {
             apply(out, *f, Some(n), operands);
         }
-        Formula::Symbol(symbol) => out.push_str(&symbol.mathml_raised(Some(n))),
-        Formula::Indexed(..) | Formula::Apply(Function::Abs, _) => out.whole(|out| {
+        PrintedFormula::Symbol(symbol) => out.push_str(&symbol.mathml_power(Some(n))),
+        PrintedFormula::Indexed(..) | PrintedFormula::Apply(FormulaFunction::Abs, _) => out.write_unbroken(|out| {
             out.push_str("<msup><mrow>");
             write(out, base, true);
             _ = write!(out, "</mrow><mn>{n}</mn></msup>");
         }),
-        other => fenced_and_raised(out, "(", ")", Some(n), |out| write(out, other, false)),
+        other => write_fenced_power(out, "(", ")", Some(n), |out| write(out, other, false)),
     }
 }
 
-fn apply(out: &mut Out, function: Function, exponent: Option<u32>, operands: &[Formula]) {
-    let arguments = |out: &mut Out| {
+fn apply(out: &mut MathmlWriter, function: FormulaFunction, exponent: Option<u32>, operands: &[PrintedFormula]) {
+    let arguments = |out: &mut MathmlWriter| {
         for (i, operand) in operands.iter().enumerate() {
             if i > 0 {
                 out.push_str("<mo>,</mo>");
@@ -233,21 +233,21 @@ fn apply(out: &mut Out, function: Function, exponent: Option<u32>, operands: &[F
         }
     };
     match function {
-        Function::Sqrt if operands.iter().any(|one| out.is_too_wide(one)) => {
+        FormulaFunction::Sqrt if operands.iter().any(|one| out.is_too_wide(one)) => {
             out.push_str("<mo form=\"prefix\" stretchy=\"false\">&#x221A;</mo>");
-            fenced(out, "(", ")", arguments);
+            write_fenced(out, "(", ")", arguments);
             return;
         }
-        Function::Sqrt => {
-            out.whole(|out| {
+        FormulaFunction::Sqrt => {
+            out.write_unbroken(|out| {
                 out.push_str("<msqrt><mrow>");
                 arguments(out);
                 out.push_str("</mrow></msqrt>");
             });
             return;
         }
-        Function::Abs => {
-            fenced(out, "|", "|", arguments);
+        FormulaFunction::Abs => {
+            write_fenced(out, "|", "|", arguments);
             return;
         }
         _ => {}
@@ -258,48 +258,48 @@ fn apply(out: &mut Out, function: Function, exponent: Option<u32>, operands: &[F
         None => out.push_str(&name),
     }
     match operands {
-        [Formula::Symbol(_)] if matches!(function, Function::Sin | Function::Cos) => {
+        [PrintedFormula::Symbol(_)] if matches!(function, FormulaFunction::Sin | FormulaFunction::Cos) => {
             out.push_str("<mo lspace=\"0\" rspace=\"0.17em\">&#x2061;</mo>");
             arguments(out);
         }
         _ => {
             out.push_str("<mo>&#x2061;</mo>");
-            fenced(out, "(", ")", arguments);
+            write_fenced(out, "(", ")", arguments);
         }
     }
 }
 
-fn magnitude(out: &mut Out, formula: &Formula) {
+fn magnitude(out: &mut MathmlWriter, formula: &PrintedFormula) {
     match formula {
-        Formula::Number(n) => match digits(n) {
+        PrintedFormula::Number(n) => match digits(n) {
             (n, Some(d)) => _ = write!(out, "<mfrac><mn>{n}</mn><mn>{d}</mn></mfrac>"),
             (n, None) => _ = write!(out, "<mn>{n}</mn>"),
         },
-        Formula::Term {
+        PrintedFormula::Term {
             factor,
             above,
             below,
         } => {
             let (n, d) = digits(factor);
             if d.is_none() && below.is_empty() {
-                line(out, &n, above, true);
+                write_product_line(out, &n, above, true);
             } else if out.is_too_wide(formula) {
-                line(out, &n, above, true);
-                out.part();
+                write_product_line(out, &n, above, true);
+                out.end_segment();
                 out.push_str("<mo form=\"infix\" stretchy=\"false\">/</mo>");
                 let d = d.as_deref().unwrap_or("1");
                 let is_one = below.len() + usize::from(d != "1") == 1;
                 if is_one {
-                    line(out, d, below, true);
+                    write_product_line(out, d, below, true);
                 } else {
-                    fenced(out, "(", ")", |out| line(out, d, below, true));
+                    write_fenced(out, "(", ")", |out| write_product_line(out, d, below, true));
                 }
             } else {
-                out.whole(|out| {
+                out.write_unbroken(|out| {
                     out.push_str("<mfrac><mrow>");
-                    line(out, &n, above, false);
+                    write_product_line(out, &n, above, false);
                     out.push_str("</mrow><mrow>");
-                    line(out, d.as_deref().unwrap_or("1"), below, false);
+                    write_product_line(out, d.as_deref().unwrap_or("1"), below, false);
                     out.push_str("</mrow></mfrac>");
                 });
             }
@@ -309,7 +309,7 @@ fn magnitude(out: &mut Out, formula: &Formula) {
 }
 
 /// A product on one line; a fraction's line encloses what stands alone on it, other products are `tight`.
-fn line(out: &mut Out, number: &str, factors: &[Formula], tight: bool) {
+fn write_product_line(out: &mut MathmlWriter, number: &str, factors: &[PrintedFormula], tight: bool) {
     let with_number = number != "1" || factors.is_empty();
     if with_number {
         _ = write!(out, "<mn>{number}</mn>");

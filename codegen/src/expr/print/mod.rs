@@ -19,8 +19,8 @@ mod text;
 #[cfg(test)]
 pub(crate) mod tests;
 
-pub use formula::{Formula, Function};
-pub use from_exact::{angle, exact, exact_at, length};
-pub(crate) use from_graph::angle_sum;
+pub use formula::{PrintedFormula, FormulaFunction};
+pub use from_exact::{angle_formula, exact_formula, exact_formula_at, length_formula};
+pub(crate) use from_graph::angle_sum_formula;
 pub use from_graph::{atom, formula, tree_size};
-pub use symbol::Symbol;
+pub use symbol::FormulaSymbol;

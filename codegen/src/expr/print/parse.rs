@@ -2,25 +2,25 @@
 
 use std::collections::BTreeMap;
 
-use crate::expr::{AngleSum, Atom, Domain, Rational, Unary};
+use crate::expr::{AtomAngleSum, Atom, EvaluationDomain, Rational, Unary};
 
 /// What was read.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Read {
+pub(crate) enum ParsedFormula {
     Number(Rational),
     Name(String),
-    Add(Box<Read>, Box<Read>),
-    Sub(Box<Read>, Box<Read>),
-    Mul(Box<Read>, Box<Read>),
-    Div(Box<Read>, Box<Read>),
-    Negative(Box<Read>),
-    Power(Box<Read>, i32),
-    Apply(String, Vec<Read>),
+    Add(Box<ParsedFormula>, Box<ParsedFormula>),
+    Sub(Box<ParsedFormula>, Box<ParsedFormula>),
+    Mul(Box<ParsedFormula>, Box<ParsedFormula>),
+    Div(Box<ParsedFormula>, Box<ParsedFormula>),
+    Negative(Box<ParsedFormula>),
+    Power(Box<ParsedFormula>, i32),
+    Apply(String, Vec<ParsedFormula>),
 }
 
 /// Reads a whole text; panics with the text where it cannot.
-pub(crate) fn parse(text: &str) -> Read {
-    let mut reader = Reader {
+pub(crate) fn parse(text: &str) -> ParsedFormula {
+    let mut reader = FormulaReader {
         text,
         rest: text.trim(),
     };
@@ -33,12 +33,12 @@ pub(crate) fn parse(text: &str) -> Read {
     read
 }
 
-struct Reader<'a> {
+struct FormulaReader<'a> {
     text: &'a str,
     rest: &'a str,
 }
 
-impl Reader<'_> {
+impl FormulaReader<'_> {
     fn take(&mut self, wanted: char) -> bool {
         let found = self.rest.starts_with(wanted);
         if found {
@@ -64,46 +64,46 @@ impl Reader<'_> {
         word
     }
 
-    fn sum(&mut self) -> Read {
+    fn sum(&mut self) -> ParsedFormula {
         let mut total = if self.take('-') {
-            Read::Negative(Box::new(self.product()))
+            ParsedFormula::Negative(Box::new(self.product()))
         } else {
             self.product()
         };
         loop {
             if self.take('+') {
-                total = Read::Add(Box::new(total), Box::new(self.product()));
+                total = ParsedFormula::Add(Box::new(total), Box::new(self.product()));
             } else if self.take('-') {
-                total = Read::Sub(Box::new(total), Box::new(self.product()));
+                total = ParsedFormula::Sub(Box::new(total), Box::new(self.product()));
             } else {
                 return total;
             }
         }
     }
 
-    fn product(&mut self) -> Read {
+    fn product(&mut self) -> ParsedFormula {
         let mut total = self.power();
         loop {
             if self.take('*') {
-                total = Read::Mul(Box::new(total), Box::new(self.power()));
+                total = ParsedFormula::Mul(Box::new(total), Box::new(self.power()));
             } else if self.take('/') {
-                total = Read::Div(Box::new(total), Box::new(self.power()));
+                total = ParsedFormula::Div(Box::new(total), Box::new(self.power()));
             } else {
                 return total;
             }
         }
     }
 
-    fn power(&mut self) -> Read {
-        let base = self.single();
+    fn power(&mut self) -> ParsedFormula {
+        let base = self.operand();
         if self.take('^') {
             let n = self.word(|c| c.is_ascii_digit());
-            return Read::Power(Box::new(base), n.parse().expect("an exponent"));
+            return ParsedFormula::Power(Box::new(base), n.parse().expect("an exponent"));
         }
         base
     }
 
-    fn single(&mut self) -> Read {
+    fn operand(&mut self) -> ParsedFormula {
         if self.take('(') {
             let inner = self.sum();
             self.expect(')');
@@ -116,7 +116,7 @@ impl Reader<'_> {
             let all: num_bigint::BigInt = format!("{whole}{fraction}").parse().expect("digits");
             let scale = num_bigint::BigInt::from(10).pow(places);
             let value = num_rational::BigRational::new(all, scale);
-            return Read::Number(Rational::from(value));
+            return ParsedFormula::Number(Rational::from(value));
         }
         let name = self.word(|c| c.is_alphanumeric() || c == '_');
         assert!(
@@ -126,18 +126,18 @@ impl Reader<'_> {
             self.rest
         );
         if !self.take('(') {
-            return Read::Name(name);
+            return ParsedFormula::Name(name);
         }
         let mut operands = vec![self.sum()];
         while self.take(',') {
             operands.push(self.sum());
         }
         self.expect(')');
-        Read::Apply(name, operands)
+        ParsedFormula::Apply(name, operands)
     }
 }
 
-impl Read {
+impl ParsedFormula {
     /// Its value in floating point; unknown names panic.
     pub(crate) fn value_f64(&self, names: &BTreeMap<String, f64>) -> f64 {
         let of = |r: &Self| r.value_f64(names);
@@ -171,7 +171,7 @@ impl Read {
     }
 
     /// Its value in any domain; `None` where it has none.
-    pub(crate) fn value<D: Domain>(
+    pub(crate) fn value<D: EvaluationDomain>(
         &self,
         domain: &D,
         names: &BTreeMap<String, Atom>,
@@ -193,7 +193,7 @@ impl Read {
                     "sin" | "cos" => {
                         let mut terms = Vec::new();
                         operands[0].angle(1, names, &mut terms);
-                        let (c, s) = domain.cos_sin(&AngleSum::new(terms))?;
+                        let (c, s) = domain.cos_sin(&AtomAngleSum::new(terms))?;
                         return Some(if function == "sin" { s } else { c });
                     }
                     "sqrt" => Unary::Sqrt,

@@ -1,21 +1,21 @@
 //! What a person sees at once in a sum or product that is printed: like terms, squares of a sine and a cosine that make one,
 //! squares of roots.
 
-use super::{Formula, Function};
+use super::{PrintedFormula, FormulaFunction};
 use crate::expr::Rational;
 
 /// A term as a number times factors over factors.
-struct Split {
+struct SplitTerm {
     factor: Rational,
-    above: Vec<Formula>,
-    below: Vec<Formula>,
+    above: Vec<PrintedFormula>,
+    below: Vec<PrintedFormula>,
 }
 
-impl Split {
-    fn new(formula: Formula) -> Self {
+impl SplitTerm {
+    fn new(formula: PrintedFormula) -> Self {
         let (factor, above, below) = match formula {
-            Formula::Number(n) => (n, Vec::new(), Vec::new()),
-            Formula::Term {
+            PrintedFormula::Number(n) => (n, Vec::new(), Vec::new()),
+            PrintedFormula::Term {
                 factor,
                 above,
                 below,
@@ -30,12 +30,12 @@ impl Split {
     }
 
     /// The same without the square of a sine or cosine, with whose it is.
-    fn without_squares(&self) -> impl Iterator<Item = (Function, &Formula, Vec<Formula>)> {
+    fn without_squares(&self) -> impl Iterator<Item = (FormulaFunction, &PrintedFormula, Vec<PrintedFormula>)> {
         self.above.iter().enumerate().filter_map(|(i, factor)| {
-            let Formula::Power(base, 2) = factor else {
+            let PrintedFormula::Power(base, 2) = factor else {
                 return None;
             };
-            let Formula::Apply(function @ (Function::Sin | Function::Cos), operands) = &**base
+            let PrintedFormula::Apply(function @ (FormulaFunction::Sin | FormulaFunction::Cos), operands) = &**base
             else {
                 return None;
             };
@@ -46,11 +46,11 @@ impl Split {
     }
 
     /// What a sine's and a cosine's square leave together, if all else is equal.
-    fn joined(&self, other: &Self) -> Option<Vec<Formula>> {
+    fn pythagorean_sum(&self, other: &Self) -> Option<Vec<PrintedFormula>> {
         if self.factor != other.factor || self.below != other.below {
             return None;
         }
-        let joins = |(f, angle, rest): (Function, &Formula, Vec<Formula>)| {
+        let joins = |(f, angle, rest): (FormulaFunction, &PrintedFormula, Vec<PrintedFormula>)| {
             let is_met = other
                 .without_squares()
                 .any(|(g, with, left)| g != f && with == angle && is_same(&left, &rest));
@@ -61,24 +61,24 @@ impl Split {
 }
 
 /// Whether two products are the same in any order.
-fn is_same(a: &[Formula], b: &[Formula]) -> bool {
+fn is_same(a: &[PrintedFormula], b: &[PrintedFormula]) -> bool {
     a.len() == b.len() && a.iter().all(|x| b.contains(x))
 }
 
 /// The terms of a sum with like ones added up, in the order in which they first stand.
-pub(super) fn gathered(terms: Vec<Formula>) -> Vec<Formula> {
-    let mut found: Vec<Split> = Vec::with_capacity(terms.len());
-    for term in terms.into_iter().map(Split::new) {
-        insert(&mut found, term);
+pub(super) fn collect_like_terms(terms: Vec<PrintedFormula>) -> Vec<PrintedFormula> {
+    let mut found: Vec<SplitTerm> = Vec::with_capacity(terms.len());
+    for term in terms.into_iter().map(SplitTerm::new) {
+        insert_term(&mut found, term);
     }
     let terms = found.into_iter().filter(|term| !term.factor.is_zero());
     terms
-        .map(|term| Formula::term(term.factor, term.above, term.below))
+        .map(|term| PrintedFormula::term(term.factor, term.above, term.below))
         .collect()
 }
 
 /// Adds a term to those that are there.
-fn insert(found: &mut Vec<Split>, term: Split) {
+fn insert_term(found: &mut Vec<SplitTerm>, term: SplitTerm) {
     let like = found
         .iter_mut()
         .find(|other| is_same(&other.above, &term.above) && is_same(&other.below, &term.below));
@@ -89,13 +89,13 @@ fn insert(found: &mut Vec<Split>, term: Split) {
     let joined = found
         .iter()
         .enumerate()
-        .find_map(|(i, other)| Some((i, other.joined(&term)?)));
+        .find_map(|(i, other)| Some((i, other.pythagorean_sum(&term)?)));
     match joined {
         Some((i, above)) => {
-            let Split { factor, below, .. } = found.remove(i);
-            insert(
+            let SplitTerm { factor, below, .. } = found.remove(i);
+            insert_term(
                 found,
-                Split {
+                SplitTerm {
                     factor,
                     above,
                     below,
@@ -107,22 +107,22 @@ fn insert(found: &mut Vec<Split>, term: Split) {
 }
 
 /// Takes even powers of roots of numbers out of a product, and returns what they are.
-pub(super) fn without_squared_roots(factors: &mut Vec<Formula>) -> Rational {
+pub(super) fn without_squared_roots(factors: &mut Vec<PrintedFormula>) -> Rational {
     let mut number = Rational::ONE;
     for factor in factors.iter_mut() {
-        let Formula::Power(base, n) = factor else {
+        let PrintedFormula::Power(base, n) = factor else {
             continue;
         };
-        let Formula::Apply(Function::Sqrt, operands) = &**base else {
+        let PrintedFormula::Apply(FormulaFunction::Sqrt, operands) = &**base else {
             continue;
         };
-        let [Formula::Number(inner)] = operands.as_slice() else {
+        let [PrintedFormula::Number(inner)] = operands.as_slice() else {
             continue;
         };
         let halves = i32::try_from(*n / 2).unwrap_or(0);
         number = &number * &inner.pow(halves);
         *factor = if *n % 2 == 0 {
-            Formula::integer(1)
+            PrintedFormula::integer(1)
         } else {
             (**base).clone()
         };
@@ -135,25 +135,25 @@ pub(super) fn without_squared_roots(factors: &mut Vec<Formula>) -> Rational {
 mod tests {
     use super::*;
 
-    fn name(text: &str) -> Formula {
-        Formula::name(text)
+    fn name(text: &str) -> PrintedFormula {
+        PrintedFormula::name(text)
     }
 
     #[test]
     fn what_a_person_sees_is_done() {
-        let root = || Formula::apply(Function::Sqrt, Formula::integer(3));
-        let product = |factors: Vec<Formula>| Formula::product(Rational::ONE, factors);
-        let sum = Formula::sum([name("R"), product(vec![name("R"), root(), root()])]);
-        let quarter = Formula::product(Rational::new(1, 4), [sum]);
+        let root = || PrintedFormula::apply(FormulaFunction::Sqrt, PrintedFormula::integer(3));
+        let product = |factors: Vec<PrintedFormula>| PrintedFormula::product(Rational::ONE, factors);
+        let sum = PrintedFormula::sum([name("R"), product(vec![name("R"), root(), root()])]);
+        let quarter = PrintedFormula::product(Rational::new(1, 4), [sum]);
         assert_eq!(quarter, name("R"));
 
-        let square = |f| Formula::apply(f, name("x")).power(2);
-        let stroke = |f| Formula::product(Rational::MINUS_ONE, [name("stroke"), square(f)]);
-        let sum = Formula::sum([stroke(Function::Sin), name("a"), stroke(Function::Cos)]);
-        assert_eq!(sum, Formula::sum([name("a"), name("stroke").negated()]));
+        let square = |f| PrintedFormula::apply(f, name("x")).power(2);
+        let stroke = |f| PrintedFormula::product(Rational::MINUS_ONE, [name("stroke"), square(f)]);
+        let sum = PrintedFormula::sum([stroke(FormulaFunction::Sin), name("a"), stroke(FormulaFunction::Cos)]);
+        assert_eq!(sum, PrintedFormula::sum([name("a"), name("stroke").negate()]));
 
-        let difference = Formula::sum([square(Function::Cos), square(Function::Sin).negated()]);
-        assert!(matches!(difference, Formula::Sum(terms) if terms.len() == 2));
-        assert!(Formula::sum([name("a"), name("a").negated()]).is_zero());
+        let difference = PrintedFormula::sum([square(FormulaFunction::Cos), square(FormulaFunction::Sin).negate()]);
+        assert!(matches!(difference, PrintedFormula::Sum(terms) if terms.len() == 2));
+        assert!(PrintedFormula::sum([name("a"), name("a").negate()]).is_zero());
     }
 }

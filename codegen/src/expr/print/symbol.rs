@@ -2,14 +2,14 @@
 
 /// A name with the number of its time derivatives.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct Symbol {
+pub struct FormulaSymbol {
     /// Identifier, as in the model file.
     pub name: String,
     /// How often it is derived by time: 0, 1 or 2.
     pub order: u8,
 }
 
-impl Symbol {
+impl FormulaSymbol {
     /// A name without derivatives.
     pub fn new(name: impl Into<String>) -> Self {
         Self {
@@ -19,7 +19,7 @@ impl Symbol {
     }
 
     /// A time derivative of a name.
-    pub fn derived(name: impl Into<String>, order: u8) -> Self {
+    pub fn time_derivative(name: impl Into<String>, order: u8) -> Self {
         Self {
             name: name.into(),
             order,
@@ -38,7 +38,7 @@ impl Symbol {
 
 /// A stretch of a typeset name.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) enum Glyphs {
+pub(crate) enum GlyphRun {
     /// A Greek letter: LaTeX command and character.
     Greek(&'static str, char),
     /// A letter, or letters and digits of an index.
@@ -49,9 +49,9 @@ pub(crate) enum Glyphs {
 
 /// A letter or word with an index of several parts.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Typeset {
-    pub(crate) base: Glyphs,
-    pub(crate) index: Vec<Vec<Glyphs>>,
+pub(crate) struct TypesetName {
+    pub(crate) base: GlyphRun,
+    pub(crate) index: Vec<Vec<GlyphRun>>,
 }
 
 const GREEK: [(&str, char); 29] = [
@@ -86,11 +86,11 @@ const GREEK: [(&str, char); 29] = [
     ("Omega", 'Ω'),
 ];
 
-fn greek(word: &str) -> Option<Glyphs> {
+fn greek(word: &str) -> Option<GlyphRun> {
     GREEK
         .iter()
         .find(|(name, _)| *name == word)
-        .map(|(name, letter)| Glyphs::Greek(name, *letter))
+        .map(|(name, letter)| GlyphRun::Greek(name, *letter))
 }
 
 /// Letters in a row up to this number are a letter with an index; more are a word, and so are as many small ones, such
@@ -98,33 +98,33 @@ fn greek(word: &str) -> Option<Glyphs> {
 const LONGEST_SYMBOL: usize = 3;
 
 /// Splits an identifier into its letter and its index.
-pub(crate) fn typeset(name: &str) -> Typeset {
+pub(crate) fn typeset(name: &str) -> TypesetName {
     let (head, tail) = name.split_once('_').unwrap_or((name, ""));
     let letters_end = head
         .find(|c: char| !c.is_alphabetic())
         .unwrap_or(head.len());
     let (letters, digits) = head.split_at(letters_end);
-    let mut index: Vec<Vec<Glyphs>> = Vec::new();
+    let mut index: Vec<Vec<GlyphRun>> = Vec::new();
     let upper = letters.len() > 1 && letters.chars().all(char::is_uppercase);
     let (base, rest) = if let Some(letter) = greek(letters) {
         (letter, "")
     } else if upper || is_word(letters) {
-        (Glyphs::Word(letters.to_owned()), "")
+        (GlyphRun::Word(letters.to_owned()), "")
     } else {
         let first = letters.chars().next().map_or(0, char::len_utf8);
         let (first, rest) = letters.split_at(first);
-        (Glyphs::Italic(first.to_owned()), rest)
+        (GlyphRun::Italic(first.to_owned()), rest)
     };
     let first_part = format!("{rest}{digits}");
     if !first_part.is_empty() {
-        index.push(vec![Glyphs::Italic(first_part)]);
+        index.push(vec![GlyphRun::Italic(first_part)]);
     }
     index.extend(
         tail.split('_')
             .filter(|part| !part.is_empty())
             .map(index_part),
     );
-    Typeset { base, index }
+    TypesetName { base, index }
 }
 
 fn is_word(letters: &str) -> bool {
@@ -134,7 +134,7 @@ fn is_word(letters: &str) -> bool {
     }
 }
 
-fn index_part(part: &str) -> Vec<Glyphs> {
+fn index_part(part: &str) -> Vec<GlyphRun> {
     let end = part
         .find(|c: char| !c.is_alphabetic())
         .unwrap_or(part.len());
@@ -142,12 +142,12 @@ fn index_part(part: &str) -> Vec<Glyphs> {
     if let Some(letter) = greek(letters) {
         let mut glyphs = vec![letter];
         if !digits.is_empty() {
-            glyphs.push(Glyphs::Italic(digits.to_owned()));
+            glyphs.push(GlyphRun::Italic(digits.to_owned()));
         }
         return glyphs;
     }
     if letters.chars().count() >= LONGEST_SYMBOL {
-        return vec![Glyphs::Word(part.to_owned())];
+        return vec![GlyphRun::Word(part.to_owned())];
     }
-    vec![Glyphs::Italic(part.to_owned())]
+    vec![GlyphRun::Italic(part.to_owned())]
 }

@@ -2,56 +2,56 @@
 
 use std::fmt::{self, Write};
 
-use super::formula::{Formula, digits};
+use super::formula::{PrintedFormula, digits};
 use crate::expr::Rational;
 
 /// How tightly the surroundings bind.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Level {
+enum TextPrecedence {
     Sum,
     Factor,
     Power,
 }
 
-impl Formula {
+impl PrintedFormula {
     /// As infix text: `m1*dc1 + d1*m2 + 1/2*d1*m4*dc3/d3`.
     pub fn text(&self) -> String {
         self.to_string()
     }
 }
 
-impl fmt::Display for Formula {
+impl fmt::Display for PrintedFormula {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write_at(f, self, Level::Sum)
+        write_at(f, self, TextPrecedence::Sum)
     }
 }
 
-fn write_at(f: &mut dyn Write, formula: &Formula, level: Level) -> fmt::Result {
+fn write_at(f: &mut dyn Write, formula: &PrintedFormula, level: TextPrecedence) -> fmt::Result {
     let enclosed = match formula {
-        Formula::Sum(_) => level > Level::Sum,
-        Formula::Number(n) => level > Level::Sum && (n.is_negative() || !n.is_integer()),
-        Formula::Term { factor, .. } => {
-            level > Level::Factor || (level > Level::Sum && factor.is_negative())
+        PrintedFormula::Sum(_) => level > TextPrecedence::Sum,
+        PrintedFormula::Number(n) => level > TextPrecedence::Sum && (n.is_negative() || !n.is_integer()),
+        PrintedFormula::Term { factor, .. } => {
+            level > TextPrecedence::Factor || (level > TextPrecedence::Sum && factor.is_negative())
         }
-        Formula::Power(..) => level > Level::Factor,
-        Formula::Symbol(_) | Formula::Indexed(..) | Formula::Apply(..) => false,
+        PrintedFormula::Power(..) => level > TextPrecedence::Factor,
+        PrintedFormula::Symbol(_) | PrintedFormula::Indexed(..) | PrintedFormula::Apply(..) => false,
     };
     if enclosed {
         f.write_char('(')?;
     }
     match formula {
-        Formula::Number(n) => {
+        PrintedFormula::Number(n) => {
             if n.is_negative() {
                 f.write_char('-')?;
             }
             number(f, n)?;
         }
-        Formula::Symbol(symbol) => f.write_str(&symbol.text())?,
-        Formula::Indexed(symbol, index) => match index.as_ref() {
-            Formula::Symbol(inner) => write!(f, "{}_{}", symbol.text(), inner.text())?,
+        PrintedFormula::Symbol(symbol) => f.write_str(&symbol.text())?,
+        PrintedFormula::Indexed(symbol, index) => match index.as_ref() {
+            PrintedFormula::Symbol(inner) => write!(f, "{}_{}", symbol.text(), inner.text())?,
             index => write!(f, "{}[{index}]", symbol.text())?,
         },
-        Formula::Sum(terms) => {
+        PrintedFormula::Sum(terms) => {
             for (i, term) in terms.iter().enumerate() {
                 match (i, term.is_negative()) {
                     (0, true) => f.write_str("-")?,
@@ -62,23 +62,23 @@ fn write_at(f: &mut dyn Write, formula: &Formula, level: Level) -> fmt::Result {
                 magnitude(f, term)?;
             }
         }
-        Formula::Term { .. } => {
+        PrintedFormula::Term { .. } => {
             if formula.is_negative() {
                 f.write_char('-')?;
             }
             magnitude(f, formula)?;
         }
-        Formula::Power(base, n) => {
-            write_at(f, base, Level::Power)?;
+        PrintedFormula::Power(base, n) => {
+            write_at(f, base, TextPrecedence::Power)?;
             write!(f, "^{n}")?;
         }
-        Formula::Apply(function, operands) => {
+        PrintedFormula::Apply(function, operands) => {
             write!(f, "{}(", function.name())?;
             for (i, operand) in operands.iter().enumerate() {
                 if i > 0 {
                     f.write_str(", ")?;
                 }
-                write_at(f, operand, Level::Sum)?;
+                write_at(f, operand, TextPrecedence::Sum)?;
             }
             f.write_char(')')?;
         }
@@ -98,19 +98,19 @@ fn number(f: &mut dyn Write, value: &Rational) -> fmt::Result {
 }
 
 /// Writes a term of a sum without its sign.
-fn magnitude(f: &mut dyn Write, formula: &Formula) -> fmt::Result {
+fn magnitude(f: &mut dyn Write, formula: &PrintedFormula) -> fmt::Result {
     match formula {
-        Formula::Number(n) => number(f, n),
-        Formula::Term {
+        PrintedFormula::Number(n) => number(f, n),
+        PrintedFormula::Term {
             factor,
             above,
             below,
         } => term(f, factor, above, below),
-        other => write_at(f, other, Level::Sum),
+        other => write_at(f, other, TextPrecedence::Sum),
     }
 }
 
-fn term(f: &mut dyn Write, factor: &Rational, above: &[Formula], below: &[Formula]) -> fmt::Result {
+fn term(f: &mut dyn Write, factor: &Rational, above: &[PrintedFormula], below: &[PrintedFormula]) -> fmt::Result {
     let (n, d) = digits(factor);
     let mut divisors = Vec::new();
     if above.is_empty() {
@@ -127,13 +127,13 @@ fn term(f: &mut dyn Write, factor: &Rational, above: &[Formula], below: &[Formul
             if i > 0 {
                 f.write_char('*')?;
             }
-            write_at(f, one, Level::Factor)?;
+            write_at(f, one, TextPrecedence::Factor)?;
         }
     }
     let several = divisors.len() + below.len() > 1;
     for one in below {
         let mut text = String::new();
-        write_at(&mut text, one, Level::Factor)?;
+        write_at(&mut text, one, TextPrecedence::Factor)?;
         divisors.push(text);
     }
     match (divisors.is_empty(), several) {

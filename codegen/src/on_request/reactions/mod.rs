@@ -13,32 +13,32 @@ mod loads;
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use modelmill_spec::{Axis, Mechanism, Place};
+use modelmill_spec::{FrameAxis, Mechanism, EffectPlace};
 use nalgebra::DMatrix;
 
-use crate::expr::vector::Vector;
+use crate::expr::vector::SymbolicVector;
 use crate::expr::{Atom, ExprId, Graph, nominal_value};
-use crate::loops::independent::most_different_rows;
-use crate::lower::Program;
-use crate::newton_euler::{self, Load, Style, Wrench, joint_wrenches};
-use crate::programs::closing::Closing;
+use crate::loops::independent::best_conditioned_rows;
+use crate::lower::StraightLineProgram;
+use crate::newton_euler::{self, JointLoad, RecursionStyle, SymbolicWrench, joint_wrenches};
+use crate::programs::closing::PassiveClosure;
 use crate::reduce::base;
-use crate::regressor::Equations;
-use crate::tree::Tree;
-use crate::tree::expressions::Monomial;
+use crate::regressor::UnreducedEquations;
+use crate::tree::KinematicTree;
+use crate::tree::expressions::ParameterMonomial;
 use crate::{Derivation, DeriveError};
 
-use loads::Cut;
+use loads::CutLoop;
 
 /// Reactions of a mechanism: where they act, and the program that computes those that are determined.
 #[derive(Clone, Debug)]
-pub struct Reactions {
+pub struct ReactionPrograms {
     /// Joints of the tree, from the base outwards.
     pub joints: Vec<JointReaction>,
     /// Closed loops, in the order of the model file.
     pub loops: Vec<LoopReaction>,
     /// All components that are determined; inputs are the parameters of the model file, not base parameters.
-    pub program: Program,
+    pub program: StraightLineProgram,
 }
 
 /// What a joint transmits to the side away from the base, drive and friction in it included.
@@ -52,7 +52,7 @@ pub struct JointReaction {
     /// Coordinates that move the joint.
     pub coordinates: Vec<String>,
     /// The axis about or along which it moves.
-    pub axis: Axis,
+    pub axis: FrameAxis,
     /// Place of each component in the program's outputs; `None` for what equations of motion do not determine.
     pub force: [Option<usize>; 3],
     /// The same of the moment.
@@ -76,7 +76,7 @@ impl Derivation {
     ///
     /// # Errors
     /// Loops that are too large to be solved for their forces.
-    pub fn reactions(&self) -> Result<Reactions, DeriveError> {
+    pub fn reactions(&self) -> Result<ReactionPrograms, DeriveError> {
         let mut graph = self.graph.clone();
         reactions(&mut graph, &self.mechanism, &self.equations, &self.closing)
     }
@@ -85,25 +85,25 @@ impl Derivation {
 fn reactions(
     graph: &mut Graph,
     mechanism: &Mechanism,
-    equations: &Equations,
-    closing: &Closing,
-) -> Result<Reactions, DeriveError> {
+    equations: &UnreducedEquations,
+    closing: &PassiveClosure,
+) -> Result<ReactionPrograms, DeriveError> {
     let tree = &equations.tree;
     let free = free_links(mechanism, equations);
-    let cuts = loads::cuts(graph, mechanism, equations, &free)?;
-    let value = values(graph, equations);
-    let value = |m: &Monomial| value.get(m).copied().unwrap_or(Graph::ZERO);
-    let mut all = bodies(graph, equations, &value);
-    let on_tree = needed(graph, mechanism, equations, &value, &all)?;
+    let cuts = loads::cut_loops(graph, mechanism, equations, &free)?;
+    let value = product_values(graph, equations);
+    let value = |m: &ParameterMonomial| value.get(m).copied().unwrap_or(Graph::ZERO);
+    let mut all = body_wrenches(graph, equations, &value);
+    let on_tree = required_forces(graph, mechanism, equations, &value, &all)?;
     let drives = equations.projection.drive_forces(graph, &on_tree)?;
-    let closing_forces = closing_forces(graph, mechanism, equations, &cuts, &on_tree, &drives)?;
-    all.extend(loads::drives(graph, mechanism, equations, &drives)?);
-    all.extend(loads::of_mechanics(graph, mechanism, equations, &value)?);
+    let closing_forces = loop_closure_forces(graph, mechanism, equations, &cuts, &on_tree, &drives)?;
+    all.extend(loads::drive_loads(graph, mechanism, equations, &drives)?);
+    all.extend(loads::effect_loads(graph, mechanism, equations, &value)?);
     for cut in &cuts {
-        all.extend(cut.loads(graph, tree));
+        all.extend(cut.joint_loads(graph, tree));
     }
 
-    let places = places(mechanism, equations, &free);
+    let places = reaction_joints(mechanism, equations, &free);
     let mut components: Vec<[ExprId; 3]> = Vec::new();
     let wrenches = joint_wrenches(graph, tree, all);
     for place in &places {
@@ -112,13 +112,13 @@ fn reactions(
         components.push(link.to_named_axes(graph, &wrench.moment));
     }
     for cut in &cuts {
-        components.push(cut.force_to_show(graph, tree));
+        components.push(cut.reported_force(graph, tree));
     }
     let components: Vec<ExprId> = components.concat();
-    let determined = determined::determined(graph, mechanism, equations, &cuts, &components);
+    let determined = determined::determined_components(graph, mechanism, equations, &cuts, &components);
 
     // What is not determined may be anything, so it may be nothing.
-    let known = loads::known(graph, &cuts, &closing_forces.of_gap);
+    let known = loads::known_values(graph, &cuts, &closing_forces.of_gap);
     let outputs: Vec<ExprId> = components
         .iter()
         .zip(&determined)
@@ -126,7 +126,7 @@ fn reactions(
         .collect();
     let outputs = graph.substitute(&outputs, &known);
     let mut closing = closing.clone();
-    closing.guard(graph, mechanism, &closing_forces.determinants);
+    closing.add_guards(graph, mechanism, &closing_forces.determinants);
     let program = closing.program(graph, equations, &outputs);
 
     let mut next = 0;
@@ -140,19 +140,19 @@ fn reactions(
     let joints = places.iter().map(|place| JointReaction {
         name: place.name.clone(),
         coordinates: place.coordinates.clone(),
-        axis: tree.links[place.link].named,
+        axis: tree.links[place.link].named_axis,
         force: three(),
         moment: three(),
     });
     let joints: Vec<JointReaction> = joints.collect();
-    let names = all_names(mechanism, tree);
+    let names = link_names(mechanism, tree);
     let loops = cuts.iter().map(|cut| LoopReaction {
         name: cut.name.clone(),
         axes: names[cut.shown_in].clone(),
         force: three(),
     });
     let loops = loops.collect();
-    Ok(Reactions {
+    Ok(ReactionPrograms {
         joints,
         loops,
         program,
@@ -160,44 +160,44 @@ fn reactions(
 }
 
 /// Every product of parameters as an expression.
-fn values(graph: &mut Graph, equations: &Equations) -> BTreeMap<Monomial, ExprId> {
+fn product_values(graph: &mut Graph, equations: &UnreducedEquations) -> BTreeMap<ParameterMonomial, ExprId> {
     let products = equations.products.iter();
     products
-        .map(|m| (m.clone(), base::product(graph, m)))
+        .map(|m| (m.clone(), base::product_expression(graph, m)))
         .collect()
 }
 
 /// What moves the bodies, link by link.
-fn bodies(
+fn body_wrenches(
     graph: &mut Graph,
-    equations: &Equations,
-    value: &dyn Fn(&Monomial) -> ExprId,
-) -> Vec<Load> {
+    equations: &UnreducedEquations,
+    value: &dyn Fn(&ParameterMonomial) -> ExprId,
+) -> Vec<JointLoad> {
     let tree = &equations.tree;
-    let motion = newton_euler::forward(graph, tree, &equations.gravity, Style::PLAIN);
-    let inertia = equations.inertia.total(graph, value);
-    let loads = inertia.into_iter().map(|(link, inertia)| Load {
+    let motion = newton_euler::forward_recursion(graph, tree, &equations.gravity, RecursionStyle::PLAIN);
+    let inertia = equations.inertia.total_inertias(graph, value);
+    let loads = inertia.into_iter().map(|(link, inertia)| JointLoad {
         link,
-        wrench: motion.wrench(graph, link, &newton_euler::Body::new(&inertia)),
+        wrench: motion.wrench(graph, link, &newton_euler::BodyInertia::new(&inertia)),
         until: None,
     });
     loads.collect()
 }
 
 /// Generalised forces that the open tree needs on its coordinates, effects included.
-fn needed(
+fn required_forces(
     graph: &mut Graph,
     mechanism: &Mechanism,
-    equations: &Equations,
-    value: &dyn Fn(&Monomial) -> ExprId,
-    bodies: &[Load],
+    equations: &UnreducedEquations,
+    value: &dyn Fn(&ParameterMonomial) -> ExprId,
+    bodies: &[JointLoad],
 ) -> Result<Vec<ExprId>, DeriveError> {
     let n = mechanism.coordinates.len();
     let wrenches: Vec<_> = bodies
         .iter()
-        .map(|load| (load.link, newton_euler::Side::Moving, load.wrench))
+        .map(|load| (load.link, newton_euler::JointSide::Moving, load.wrench))
         .collect();
-    let on_tree = newton_euler::backward(graph, &equations.tree, Style::PLAIN, n, wrenches);
+    let on_tree = newton_euler::backward_recursion(graph, &equations.tree, RecursionStyle::PLAIN, n, wrenches);
     let effects = equations.effect_forces(graph, mechanism, value)?;
     Ok(on_tree
         .iter()
@@ -207,7 +207,7 @@ fn needed(
 }
 
 /// Forces along the gaps of loops.
-struct ClosingForces {
+struct LoopClosureForces {
     /// By the closing equation; those of all others are taken as nothing.
     of_gap: BTreeMap<ExprId, ExprId>,
     /// What must not vanish for them to exist.
@@ -215,17 +215,17 @@ struct ClosingForces {
 }
 
 /// Forces that close the loops, where the drives act with the given forces.
-fn closing_forces(
+fn loop_closure_forces(
     graph: &mut Graph,
     mechanism: &Mechanism,
-    equations: &Equations,
-    cuts: &[Cut],
+    equations: &UnreducedEquations,
+    cuts: &[CutLoop],
     on_tree: &[ExprId],
     drives: &[ExprId],
-) -> Result<ClosingForces, DeriveError> {
+) -> Result<LoopClosureForces, DeriveError> {
     let projection = &equations.projection;
     if projection.loops.passive.is_empty() {
-        return Ok(ClosingForces {
+        return Ok(LoopClosureForces {
             of_gap: BTreeMap::new(),
             determinants: Vec::new(),
         });
@@ -251,7 +251,7 @@ fn closing_forces(
     }
     let solution = projection.multipliers(graph, &gaps, &left)?;
     let forces = solution.values.into_iter().map(|row| row[0]);
-    Ok(ClosingForces {
+    Ok(LoopClosureForces {
         of_gap: gaps.into_iter().zip(forces).collect(),
         determinants: solution.determinants,
     })
@@ -262,8 +262,8 @@ fn closing_forces(
 fn closing_gaps(
     graph: &mut Graph,
     mechanism: &Mechanism,
-    equations: &Equations,
-    cuts: &[Cut],
+    equations: &UnreducedEquations,
+    cuts: &[CutLoop],
 ) -> Vec<ExprId> {
     let projection = &equations.projection;
     // Couplings are no cuts, and carry what no other gap does.
@@ -294,19 +294,19 @@ fn closing_gaps(
     });
     let n = projection.loops.passive.len();
     let jacobian = DMatrix::from_iterator(all.len(), n, values);
-    let rows = most_different_rows(&jacobian, n);
+    let rows = best_conditioned_rows(&jacobian, n);
     rows.into_iter().map(|row| all[row]).collect()
 }
 
 /// A joint whose reaction is told.
-struct JointPlace {
+struct ReactionJoint {
     link: usize,
     name: String,
     coordinates: Vec<String>,
 }
 
 /// The frame that each link belongs to.
-fn frames(tree: &Tree) -> Vec<usize> {
+fn link_frames(tree: &KinematicTree) -> Vec<usize> {
     let mut frames = Vec::with_capacity(tree.links.len());
     for (frame, last) in tree.of_frame.iter().enumerate() {
         if let Some(last) = last {
@@ -316,7 +316,7 @@ fn frames(tree: &Tree) -> Vec<usize> {
     frames
 }
 
-fn coordinates_of(mechanism: &Mechanism, tree: &Tree, link: usize) -> Vec<String> {
+fn coordinates_of(mechanism: &Mechanism, tree: &KinematicTree, link: usize) -> Vec<String> {
     let link = &tree.links[link];
     let turns = link.turns.iter().map(|(c, _)| *c);
     let all: BTreeSet<usize> = turns.chain(link.slides.iter().map(|(c, _)| *c)).collect();
@@ -325,8 +325,8 @@ fn coordinates_of(mechanism: &Mechanism, tree: &Tree, link: usize) -> Vec<String
 }
 
 /// Names of all links by their frames, with their coordinates where a frame has several joints.
-fn all_names(mechanism: &Mechanism, tree: &Tree) -> Vec<String> {
-    let frames = frames(tree);
+fn link_names(mechanism: &Mechanism, tree: &KinematicTree) -> Vec<String> {
+    let frames = link_frames(tree);
     let moving = |i: &usize| tree.links[*i].is_moving();
     (0..tree.links.len())
         .map(|i| {
@@ -341,12 +341,12 @@ fn all_names(mechanism: &Mechanism, tree: &Tree) -> Vec<String> {
 }
 
 /// All joints but those of free bodies, which only count coordinates and transmit nothing.
-fn places(mechanism: &Mechanism, equations: &Equations, free: &BTreeSet<usize>) -> Vec<JointPlace> {
+fn reaction_joints(mechanism: &Mechanism, equations: &UnreducedEquations, free: &BTreeSet<usize>) -> Vec<ReactionJoint> {
     let tree = &equations.tree;
-    let names = all_names(mechanism, tree);
+    let names = link_names(mechanism, tree);
     let joints = (0..tree.links.len()).filter(|i| tree.links[*i].is_moving() && !free.contains(i));
     joints
-        .map(|link| JointPlace {
+        .map(|link| ReactionJoint {
             link,
             name: names[link].clone(),
             coordinates: coordinates_of(mechanism, tree, link),
@@ -355,16 +355,16 @@ fn places(mechanism: &Mechanism, equations: &Equations, free: &BTreeSet<usize>) 
 }
 
 /// Links of frames that move in six coordinates of their own on which nothing acts.
-fn free_links(mechanism: &Mechanism, equations: &Equations) -> BTreeSet<usize> {
+fn free_links(mechanism: &Mechanism, equations: &UnreducedEquations) -> BTreeSet<usize> {
     let tree = &equations.tree;
-    let frames = frames(tree);
+    let frames = link_frames(tree);
     let driven = |i: usize| {
         let by_drive = mechanism
             .drives
             .iter()
             .any(|d| matches!(d.kind, modelmill_spec::DriveKind::Joint(c) if c.0 == i));
         let mut places = mechanism.effects.iter().flat_map(|e| &e.places);
-        by_drive || places.any(|p| matches!(p, Place::Coordinate(c) if c.0 == i))
+        by_drive || places.any(|p| matches!(p, EffectPlace::Coordinate(c) if c.0 == i))
     };
     let mut free = BTreeSet::new();
     for frame in 1..mechanism.frames.len() {
@@ -388,7 +388,7 @@ fn free_links(mechanism: &Mechanism, equations: &Equations) -> BTreeSet<usize> {
 }
 
 /// A force through a point: its moment about the origin goes with it.
-fn through(graph: &mut Graph, at: &Vector, force: Vector) -> Wrench {
+fn force_through_point(graph: &mut Graph, at: &SymbolicVector, force: SymbolicVector) -> SymbolicWrench {
     let moment = graph.cross(at, &force);
-    Wrench { force, moment }
+    SymbolicWrench { force, moment }
 }

@@ -3,28 +3,28 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::super::rational_function::{Polynomial, Powers, Variable};
-use super::{content, ordered};
+use super::super::rational_function::{TrigonometricPolynomial, PowerProduct, FactorVariable};
+use super::{content, ordered_terms};
 use crate::expr::Rational;
 
 /// A product that equals a polynomial.
-pub(super) struct Factored {
+pub(super) struct FactoredPolynomial {
     pub(super) number: Rational,
-    pub(super) monomial: Powers,
+    pub(super) monomial: PowerProduct,
     /// Polynomials of several terms with their exponents.
-    pub(super) factors: Vec<(Polynomial, u32)>,
+    pub(super) factors: Vec<(TrigonometricPolynomial, u32)>,
 }
 
 /// Beyond these the search is not cheap and the result is not readable anyway.
 const MOST_TERMS: usize = 60;
 const MOST_VARIABLES: usize = 7;
 
-pub(super) fn factor(p: &Polynomial) -> Factored {
+pub(super) fn factor_polynomial(p: &TrigonometricPolynomial) -> FactoredPolynomial {
     let mut number = content(p);
-    let Some((_, leading)) = ordered(p).into_iter().next() else {
-        return Factored {
+    let Some((_, leading)) = ordered_terms(p).into_iter().next() else {
+        return FactoredPolynomial {
             number: Rational::ZERO,
-            monomial: Powers::new(),
+            monomial: PowerProduct::new(),
             factors: Vec::new(),
         };
     };
@@ -33,20 +33,20 @@ pub(super) fn factor(p: &Polynomial) -> Factored {
     }
     let monomial = common_powers(p);
     let inverse = number.recip();
-    let mut rest: Polynomial = p
+    let mut rest: TrigonometricPolynomial = p
         .iter()
         .map(|(powers, k)| {
             let left = divide_powers(powers, &monomial).expect("a common power divides");
             (left, k * &inverse)
         })
         .collect();
-    let mut factors: Vec<(Polynomial, u32)> = Vec::new();
-    let names: BTreeSet<Variable> = rest.keys().flatten().map(|(v, _)| *v).collect();
+    let mut factors: Vec<(TrigonometricPolynomial, u32)> = Vec::new();
+    let names: BTreeSet<FactorVariable> = rest.keys().flatten().map(|(v, _)| *v).collect();
     if rest.len() <= MOST_TERMS && names.len() <= MOST_VARIABLES {
-        for divisor in candidates(&names.into_iter().collect::<Vec<_>>()) {
+        for divisor in linear_form_candidates(&names.into_iter().collect::<Vec<_>>()) {
             let mut n = 0;
             while rest.len() > 1 {
-                let Some(quotient) = divide(&rest, &divisor) else {
+                let Some(quotient) = exact_quotient(&rest, &divisor) else {
                     break;
                 };
                 rest = quotient;
@@ -58,18 +58,18 @@ pub(super) fn factor(p: &Polynomial) -> Factored {
         }
     }
     // Division by primitive factors leaves a primitive rest: 1, -1 or a sum.
-    match (rest.len(), rest.get(&Powers::new())) {
+    match (rest.len(), rest.get(&PowerProduct::new())) {
         (1, Some(unit)) => number = &number * unit,
         _ => factors.push((rest, 1)),
     }
-    Factored {
+    FactoredPolynomial {
         number,
         monomial,
         factors,
     }
 }
 
-fn common_powers(p: &Polynomial) -> Powers {
+fn common_powers(p: &TrigonometricPolynomial) -> PowerProduct {
     p.keys()
         .map(|powers| powers.iter().copied().collect::<BTreeMap<_, _>>())
         .reduce(|a, b| {
@@ -82,8 +82,8 @@ fn common_powers(p: &Polynomial) -> Powers {
         .collect()
 }
 
-fn divide_powers(powers: &Powers, by: &Powers) -> Option<Powers> {
-    let mut left: BTreeMap<Variable, u32> = powers.iter().copied().collect();
+fn divide_powers(powers: &PowerProduct, by: &PowerProduct) -> Option<PowerProduct> {
+    let mut left: BTreeMap<FactorVariable, u32> = powers.iter().copied().collect();
     for (v, n) in by {
         let there = left.get_mut(v)?;
         *there = there.checked_sub(*n)?;
@@ -91,8 +91,8 @@ fn divide_powers(powers: &Powers, by: &Powers) -> Option<Powers> {
     Some(left.into_iter().filter(|(_, n)| *n > 0).collect())
 }
 
-fn multiply_powers(a: &Powers, b: &Powers) -> Powers {
-    let mut total: BTreeMap<Variable, u32> = a.iter().copied().collect();
+fn multiply_powers(a: &PowerProduct, b: &PowerProduct) -> PowerProduct {
+    let mut total: BTreeMap<FactorVariable, u32> = a.iter().copied().collect();
     for (v, n) in b {
         *total.entry(*v).or_insert(0) += n;
     }
@@ -100,8 +100,8 @@ fn multiply_powers(a: &Powers, b: &Powers) -> Powers {
 }
 
 /// Linear forms worth trying: `a u + b v` with coefficients up to 2, and `u + v + w` with any signs.
-fn candidates(variables: &[Variable]) -> Vec<Polynomial> {
-    let linear = |terms: &[(Variable, i64)]| -> Polynomial {
+fn linear_form_candidates(variables: &[FactorVariable]) -> Vec<TrigonometricPolynomial> {
+    let linear = |terms: &[(FactorVariable, i64)]| -> TrigonometricPolynomial {
         terms
             .iter()
             .map(|(v, k)| (vec![(*v, 1)], Rational::integer(*k)))
@@ -124,18 +124,18 @@ fn candidates(variables: &[Variable]) -> Vec<Polynomial> {
 }
 
 /// The leading term in the lexicographic order of variables, an order that products respect.
-fn leading(p: &Polynomial) -> Option<(&Powers, &Rational)> {
+fn leading_term(p: &TrigonometricPolynomial) -> Option<(&PowerProduct, &Rational)> {
     p.iter()
         .max_by(|(a, _), (b, _)| super::compare_powers(b, a))
 }
 
 /// The exact quotient, if there is one.
-fn divide(p: &Polynomial, by: &Polynomial) -> Option<Polynomial> {
-    let (lead, k) = leading(by)?;
+fn exact_quotient(p: &TrigonometricPolynomial, by: &TrigonometricPolynomial) -> Option<TrigonometricPolynomial> {
+    let (lead, k) = leading_term(by)?;
     let inverse = k.recip();
     let mut rest = p.clone();
-    let mut quotient = Polynomial::new();
-    while let Some((powers, value)) = leading(&rest) {
+    let mut quotient = TrigonometricPolynomial::new();
+    while let Some((powers, value)) = leading_term(&rest) {
         let step = divide_powers(powers, lead)?;
         let value = value * &inverse;
         for (other, k) in by {
@@ -152,17 +152,17 @@ fn divide(p: &Polynomial, by: &Polynomial) -> Option<Polynomial> {
 }
 
 /// `number * (sum of linear)^2`, which consists of `terms` of a polynomial.
-pub(super) struct Square {
+pub(super) struct SumSquare {
     pub(super) number: Rational,
-    pub(super) linear: Vec<(Variable, Rational)>,
-    pub(super) terms: Vec<Powers>,
+    pub(super) linear: Vec<(FactorVariable, Rational)>,
+    pub(super) terms: Vec<PowerProduct>,
 }
 
 /// Squares of sums of several variables that a polynomial contains term by term.
-pub(super) fn squares(p: &Polynomial) -> Vec<Square> {
-    let coefficient = |powers: &Powers| p.get(powers).cloned().unwrap_or(Rational::ZERO);
-    let cross = |u: Variable, v: Variable| coefficient(&vec![(u.min(v), 1), (u.max(v), 1)]);
-    let mut variables: Vec<Variable> = p
+pub(super) fn find_squares(p: &TrigonometricPolynomial) -> Vec<SumSquare> {
+    let coefficient = |powers: &PowerProduct| p.get(powers).cloned().unwrap_or(Rational::ZERO);
+    let cross = |u: FactorVariable, v: FactorVariable| coefficient(&vec![(u.min(v), 1), (u.max(v), 1)]);
+    let mut variables: Vec<FactorVariable> = p
         .keys()
         .filter_map(|powers| match powers.as_slice() {
             [(v, 2)] => Some(*v),
@@ -199,7 +199,7 @@ pub(super) fn squares(p: &Polynomial) -> Vec<Square> {
                 terms.push(vec![(*u.min(v), 1), (*u.max(v), 1)]);
             }
         }
-        found.push(Square {
+        found.push(SumSquare {
             number,
             linear,
             terms,

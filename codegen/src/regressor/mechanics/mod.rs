@@ -3,23 +3,23 @@
 mod rod;
 mod strut;
 
-use modelmill_spec::{Effect, Mechanics, Mechanism, PointIdx};
+use modelmill_spec::{ModelEffect, Mechanics, Mechanism, PointIdx};
 
 use crate::DeriveError;
-use crate::expr::vector::Vector;
+use crate::expr::vector::SymbolicVector;
 use crate::expr::{ExprId, Graph};
-use crate::regressor::projection::Projection;
-use crate::tree::Tree;
+use crate::regressor::projection::LoopProjection;
+use crate::tree::KinematicTree;
 
 /// Generalised forces on all coordinates of the open tree that an effect needs, `[i][t][c]`: for each time `i` that it
 /// acts, for its term `t` with a parameter of one, on the coordinate `c`. Empty if it needs none.
 pub(crate) fn generalised_forces(
     graph: &mut Graph,
     mechanism: &Mechanism,
-    tree: &Tree,
-    projection: &Projection,
-    gravity: &Vector,
-    effect: &Effect,
+    tree: &KinematicTree,
+    projection: &LoopProjection,
+    gravity: &SymbolicVector,
+    effect: &ModelEffect,
 ) -> Result<Vec<Vec<Vec<ExprId>>>, DeriveError> {
     match effect.mechanics {
         Some(Mechanics::Rod) => {
@@ -37,12 +37,12 @@ pub(crate) fn generalised_forces(
 pub(crate) fn point_forces(
     graph: &mut Graph,
     mechanism: &Mechanism,
-    tree: &Tree,
-    projection: &Projection,
-    gravity: &Vector,
-    effect: &Effect,
+    tree: &KinematicTree,
+    projection: &LoopProjection,
+    gravity: &SymbolicVector,
+    effect: &ModelEffect,
     values: &[ExprId],
-) -> Result<Vec<(PointIdx, Vector)>, DeriveError> {
+) -> Result<Vec<(PointIdx, SymbolicVector)>, DeriveError> {
     match effect.mechanics {
         Some(Mechanics::Rod) => {
             rod::point_forces(graph, mechanism, tree, projection, gravity, effect, values)

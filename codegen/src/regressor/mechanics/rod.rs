@@ -6,20 +6,20 @@
 //! `du'(Jr u'' + Sr (a'' - g)) + da'(Sr u'' + mr (a'' - g))` with the moments `Jr`, `Sr` and `mr` of second, first and
 //! no order of the mass along the rod.
 
-use modelmill_spec::{DriveIdx, DriveKind, Effect, Mechanism, Place, PointIdx};
+use modelmill_spec::{DriveIdx, DriveKind, ModelEffect, Mechanism, EffectPlace, PointIdx};
 
 use crate::DeriveError;
-use crate::expr::vector::Vector;
+use crate::expr::vector::SymbolicVector;
 use crate::expr::{Atom, ExprId, Graph};
 use crate::loops::stretch::position_in_base;
-use crate::regressor::projection::Projection;
-use crate::tree::Tree;
+use crate::regressor::projection::LoopProjection;
+use crate::tree::KinematicTree;
 
 /// The linear drives of an effect, with their points. Model files are checked for other places; a mechanism made by a
 /// program has no rod there.
-fn lines(mechanism: &Mechanism, effect: &Effect) -> Vec<(DriveIdx, [PointIdx; 2])> {
-    let line = |place: &Place| match place {
-        Place::Drive(d) => match mechanism.drives[d.0].kind {
+fn drive_lines(mechanism: &Mechanism, effect: &ModelEffect) -> Vec<(DriveIdx, [PointIdx; 2])> {
+    let line = |place: &EffectPlace| match place {
+        EffectPlace::Drive(d) => match mechanism.drives[d.0].kind {
             DriveKind::Linear { from, to } => Some((*d, [from, to])),
             DriveKind::Joint(_) => None,
         },
@@ -32,35 +32,35 @@ fn lines(mechanism: &Mechanism, effect: &Effect) -> Vec<(DriveIdx, [PointIdx; 2]
 pub(super) fn generalised_forces(
     graph: &mut Graph,
     mechanism: &Mechanism,
-    tree: &Tree,
-    projection: &Projection,
-    gravity: &Vector,
-    effect: &Effect,
+    tree: &KinematicTree,
+    projection: &LoopProjection,
+    gravity: &SymbolicVector,
+    effect: &ModelEffect,
 ) -> Result<Vec<Vec<Vec<ExprId>>>, DeriveError> {
     let n = mechanism.coordinates.len();
     let mut all = Vec::new();
-    for (drive, [from, to]) in lines(mechanism, effect) {
+    for (drive, [from, to]) in drive_lines(mechanism, effect) {
         let a = position_in_base(graph, mechanism, tree, from.0)?;
         let end = position_in_base(graph, mechanism, tree, to.0)?;
         let length = projection.drives[drive.0].coordinate;
-        all.push(along(graph, [a, end], length, gravity, n));
+        all.push(forces_along_rod(graph, [a, end], length, gravity, n));
     }
     Ok(all)
 }
 
 /// Generalised forces on `n` coordinates of a rod from `a` to `end`.
-fn along(
+fn forces_along_rod(
     graph: &mut Graph,
-    [a, end]: [Vector; 2],
+    [a, end]: [SymbolicVector; 2],
     length: ExprId,
-    gravity: &Vector,
+    gravity: &SymbolicVector,
     n: usize,
 ) -> Vec<Vec<ExprId>> {
-    let d: Vector = std::array::from_fn(|i| graph.sub(end[i], a[i]));
+    let d: SymbolicVector = std::array::from_fn(|i| graph.sub(end[i], a[i]));
     let per_length = graph.pow(length, -1);
     let per_square = graph.pow(length, -2);
 
-    let derivative = |graph: &mut Graph, v: &Vector| -> Vector {
+    let derivative = |graph: &mut Graph, v: &SymbolicVector| -> SymbolicVector {
         let of = graph.time_derivative(v);
         [of[0], of[1], of[2]]
     };
@@ -70,7 +70,7 @@ fn along(
     let along = graph.dot(&d, &d1);
     let stretch = graph.mul(along, per_square);
     let slide = graph.scale_vector(stretch, &d);
-    let across: Vector = std::array::from_fn(|i| graph.sub(d1[i], slide[i]));
+    let across: SymbolicVector = std::array::from_fn(|i| graph.sub(d1[i], slide[i]));
     let swing = graph.dot(&across, &across);
     let pull = graph.dot(&d, &d2);
     let pull = graph.add(pull, swing);
@@ -78,7 +78,7 @@ fn along(
     let inward = graph.scale_vector(pull, &d);
     let twice = graph.add(stretch, stretch);
     let sideways = graph.scale_vector(twice, &across);
-    let turning: Vector = std::array::from_fn(|i| {
+    let turning: SymbolicVector = std::array::from_fn(|i| {
         let rest = graph.sub(d2[i], inward[i]);
         graph.sub(rest, sideways[i])
     });
@@ -86,13 +86,13 @@ fn along(
 
     let pivot_speed = derivative(graph, &a);
     let pivot = derivative(graph, &pivot_speed);
-    let lifted: Vector = std::array::from_fn(|i| graph.sub(pivot[i], gravity[i]));
+    let lifted: SymbolicVector = std::array::from_fn(|i| graph.sub(pivot[i], gravity[i]));
     let lifted_along = graph.dot(&d, &lifted);
     let lifted_along = graph.mul(lifted_along, per_square);
 
     let mut forces = vec![Vec::new(); 3];
     for coordinate in 0..n {
-        let by = |graph: &mut Graph, v: &Vector| -> Vector {
+        let by = |graph: &mut Graph, v: &SymbolicVector| -> SymbolicVector {
             let slopes = graph.differentiate(v, Atom::Coordinate(coordinate));
             [slopes[0], slopes[1], slopes[2]]
         };
@@ -124,14 +124,14 @@ fn along(
 pub(super) fn point_forces(
     graph: &mut Graph,
     mechanism: &Mechanism,
-    tree: &Tree,
-    projection: &Projection,
-    gravity: &Vector,
-    effect: &Effect,
+    tree: &KinematicTree,
+    projection: &LoopProjection,
+    gravity: &SymbolicVector,
+    effect: &ModelEffect,
     moments: &[ExprId],
-) -> Result<Vec<(PointIdx, Vector)>, DeriveError> {
+) -> Result<Vec<(PointIdx, SymbolicVector)>, DeriveError> {
     let mut all = Vec::new();
-    for (drive, points) in lines(mechanism, effect) {
+    for (drive, points) in drive_lines(mechanism, effect) {
         let length = projection.drives[drive.0].coordinate;
         let [a, b] = points.map(|point| position_in_base(graph, mechanism, tree, point.0));
         let forces = end_forces(graph, [a?, b?], length, gravity, moments);
@@ -146,14 +146,14 @@ pub(super) fn point_forces(
 /// rod since it slides there; the rest of its weight and inertia hangs on the first.
 fn end_forces(
     graph: &mut Graph,
-    [a, b]: [Vector; 2],
+    [a, b]: [SymbolicVector; 2],
     length: ExprId,
-    gravity: &Vector,
+    gravity: &SymbolicVector,
     moments: &[ExprId],
-) -> [Vector; 2] {
+) -> [SymbolicVector; 2] {
     let [second, first, mass] = [0, 1, 2].map(|k| moments.get(k).copied().unwrap_or(Graph::ZERO));
     let per_length = graph.pow(length, -1);
-    let twice_derived = |graph: &mut Graph, v: &Vector| -> Vector {
+    let twice_derived = |graph: &mut Graph, v: &SymbolicVector| -> SymbolicVector {
         let once = graph.time_derivative(v);
         let twice = graph.time_derivative(&once);
         [twice[0], twice[1], twice[2]]

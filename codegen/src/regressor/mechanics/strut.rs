@@ -3,30 +3,30 @@
 //! With the points `a` and `b`, `d = b - a` and `l = |d|`, the pull `F0 + k l + Fv l'` needs `(F0 + k l + Fv l') dl/dq`
 //! (virtual power), where `l dl/dq = d . dd/dq` and `l l' = d . d'`.
 
-use modelmill_spec::{Effect, Mechanism, Place, PointIdx};
+use modelmill_spec::{ModelEffect, Mechanism, EffectPlace, PointIdx};
 
 use crate::DeriveError;
-use crate::expr::vector::Vector;
+use crate::expr::vector::SymbolicVector;
 use crate::expr::{Atom, ExprId, Graph, Unary};
 use crate::loops::stretch::position_in_base;
-use crate::tree::Tree;
+use crate::tree::KinematicTree;
 
 /// The line between the points of an effect.
-struct Line {
+struct StrutLine {
     ends: [PointIdx; 2],
     /// From the first point to the second.
-    across: Vector,
+    across: SymbolicVector,
     length: ExprId,
 }
 
 /// Model files are checked for other places; a mechanism made by a program has no element there.
-fn line(
+fn strut_line(
     graph: &mut Graph,
     mechanism: &Mechanism,
-    tree: &Tree,
-    effect: &Effect,
-) -> Result<Option<Line>, DeriveError> {
-    let [Place::Point(from), Place::Point(to)] = effect.places[..] else {
+    tree: &KinematicTree,
+    effect: &ModelEffect,
+) -> Result<Option<StrutLine>, DeriveError> {
+    let [EffectPlace::Point(from), EffectPlace::Point(to)] = effect.places[..] else {
         return Ok(None);
     };
     let a = position_in_base(graph, mechanism, tree, from.0)?;
@@ -34,7 +34,7 @@ fn line(
     let across = graph.sub_vectors(&b, &a);
     let square = graph.dot(&across, &across);
     let length = graph.unary(Unary::Sqrt, square);
-    Ok(Some(Line {
+    Ok(Some(StrutLine {
         ends: [from, to],
         across,
         length,
@@ -45,14 +45,14 @@ fn line(
 pub(super) fn generalised_forces(
     graph: &mut Graph,
     mechanism: &Mechanism,
-    tree: &Tree,
-    effect: &Effect,
+    tree: &KinematicTree,
+    effect: &ModelEffect,
 ) -> Result<Vec<Vec<Vec<ExprId>>>, DeriveError> {
-    let Some(line) = line(graph, mechanism, tree, effect)? else {
+    let Some(line) = strut_line(graph, mechanism, tree, effect)? else {
         return Ok(Vec::new());
     };
     let per_length = graph.pow(line.length, -1);
-    let rate = rate(graph, &line);
+    let rate = distance_rate(graph, &line);
     let per_rate = graph.mul(rate, per_length);
     let mut forces = vec![Vec::new(); 3];
     for coordinate in 0..mechanism.coordinates.len() {
@@ -69,16 +69,16 @@ pub(super) fn generalised_forces(
 pub(super) fn point_forces(
     graph: &mut Graph,
     mechanism: &Mechanism,
-    tree: &Tree,
-    effect: &Effect,
+    tree: &KinematicTree,
+    effect: &ModelEffect,
     values: &[ExprId],
-) -> Result<Vec<(PointIdx, Vector)>, DeriveError> {
-    let Some(line) = line(graph, mechanism, tree, effect)? else {
+) -> Result<Vec<(PointIdx, SymbolicVector)>, DeriveError> {
+    let Some(line) = strut_line(graph, mechanism, tree, effect)? else {
         return Ok(Vec::new());
     };
     let [constant, stiffness, damping] =
         [0, 1, 2].map(|k| values.get(k).copied().unwrap_or(Graph::ZERO));
-    let rate = rate(graph, &line);
+    let rate = distance_rate(graph, &line);
     let by_distance = graph.mul(stiffness, line.length);
     let by_rate = graph.mul(damping, rate);
     let pull = graph.add(constant, by_distance);
@@ -91,7 +91,7 @@ pub(super) fn point_forces(
 }
 
 /// The rate of the distance.
-fn rate(graph: &mut Graph, line: &Line) -> ExprId {
+fn distance_rate(graph: &mut Graph, line: &StrutLine) -> ExprId {
     let across = graph.time_derivative(&line.across);
     let along = graph.dot(&line.across, &[across[0], across[1], across[2]]);
     let per_length = graph.pow(line.length, -1);

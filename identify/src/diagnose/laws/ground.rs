@@ -3,18 +3,18 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::features::{Factor, Menu, Product, Site, own, range, with_other};
-use super::shapes::Variable;
-use crate::diagnose::bench::{Bench, Pick};
+use super::features::{LawFactor, FactorCatalog, LawProduct, LawSite, own_factors, range, factors_with_other};
+use super::shapes::LawVariable;
+use crate::diagnose::bench::{EffectSelector, SelectedEffect};
 
 /// A column of which others leave a smaller share of squares than this says nothing new.
-const SAID: f64 = 1e-5;
+const INDEPENDENCE_TOLERANCE: f64 = 1e-5;
 /// Columns of products that are looked at at once.
 const BATCH: usize = 64;
 
 /// Samples of all recordings that are looked at, and what places do along them.
-pub(crate) struct Samples<'a> {
-    pub(crate) sites: &'a [Site],
+pub(crate) struct LawSamples<'a> {
+    pub(crate) sites: &'a [LawSite],
     loads: &'a [Option<Vec<f64>>],
     /// Which samples.
     pub(crate) picked: Vec<usize>,
@@ -26,11 +26,11 @@ pub(crate) struct Samples<'a> {
     forces: Vec<Vec<Option<Vec<f64>>>>,
 }
 
-impl<'a> Samples<'a> {
+impl<'a> LawSamples<'a> {
     /// About `most` samples; `deviations` is the noise of each channel.
     pub(crate) fn new(
-        bench: &Bench<'_>,
-        sites: &'a [Site],
+        bench: &EffectSelector<'_>,
+        sites: &'a [LawSite],
         loads: &'a [Option<Vec<f64>>],
         deviations: &[f64],
         most: usize,
@@ -39,7 +39,7 @@ impl<'a> Samples<'a> {
         let n = layout.samples();
         let picked: Vec<usize> = (0..n).step_by(n.div_ceil(most).max(1)).collect();
         let some = |values: &[f64]| -> Vec<f64> { picked.iter().map(|i| values[*i]).collect() };
-        let track = |(site, load): (&Site, &Option<Vec<f64>>)| {
+        let track = |(site, load): (&LawSite, &Option<Vec<f64>>)| {
             [
                 some(&site.position),
                 some(&site.rate),
@@ -49,16 +49,16 @@ impl<'a> Samples<'a> {
         };
         let tracks = sites.iter().zip(loads).map(track).collect();
         let forces = sites.iter().map(|site| {
-            let channels = site.force.0.iter().enumerate().map(|(d, values)| {
+            let channels = site.drive_forces.0.iter().enumerate().map(|(d, values)| {
                 let mut values = values.clone()?;
-                bench.pool.silence(d, 0, &mut values);
+                bench.pool.zero_excluded(d, 0, &mut values);
                 let scaled = picked.iter().map(|i| values[*i] / deviations[d]);
                 Some(scaled.collect())
             });
             channels.collect()
         });
         let mut start = 0;
-        let starts = layout.stretches.iter().map(|stretch| {
+        let starts = layout.segments.iter().map(|stretch| {
             let this = start;
             start += stretch.samples;
             this
@@ -73,41 +73,41 @@ impl<'a> Samples<'a> {
         }
     }
 
-    fn track(&self, site: usize, other: Option<usize>, variable: Variable) -> &[f64] {
-        let (at, which) = place_of(site, other, variable);
+    fn track(&self, site: usize, other: Option<usize>, variable: LawVariable) -> &[f64] {
+        let (at, which) = variable_place(site, other, variable);
         &self.tracks[at][which]
     }
 
     /// Least and largest value of a factor's variable.
-    pub(crate) fn range(&self, site: usize, product: &Product, factor: usize) -> [f64; 2] {
+    pub(crate) fn range(&self, site: usize, product: &LawProduct, factor: usize) -> [f64; 2] {
         range(self.track(site, product.other, product.factors[factor].variable))
     }
 
     /// A factor along the samples.
-    fn factor(&self, site: usize, other: Option<usize>, factor: &Factor) -> Vec<Vec<f64>> {
-        if !factor.shape.remembers() {
+    fn factor_columns(&self, site: usize, other: Option<usize>, factor: &LawFactor) -> Vec<Vec<f64>> {
+        if !factor.shape.has_memory() {
             let track = self.track(site, other, factor.variable);
             return factor.shape.values(track, &[0]);
         }
         // What remembers must see all of the way.
-        let (at, _) = place_of(site, other, factor.variable);
+        let (at, _) = variable_place(site, other, factor.variable);
         let whole = factor.shape.values(&self.sites[at].position, &self.starts);
         let some = |values: Vec<f64>| self.picked.iter().map(|i| values[*i]).collect();
         whole.into_iter().map(some).collect()
     }
 
     /// The columns of a product: channels on which the place is felt one after the other.
-    pub(crate) fn columns(&self, site: usize, product: &Product) -> Vec<Vec<f64>> {
+    pub(crate) fn columns(&self, site: usize, product: &LawProduct) -> Vec<Vec<f64>> {
         let mut columns = vec![vec![1.0; self.picked.len()]];
         for factor in &product.factors {
-            let shapes = self.factor(site, product.other, factor);
-            columns = pairs(&columns, &shapes);
+            let shapes = self.factor_columns(site, product.other, factor);
+            columns = pairwise_products(&columns, &shapes);
         }
-        columns.iter().map(|one| self.felt(site, one)).collect()
+        columns.iter().map(|one| self.drive_forces(site, one)).collect()
     }
 
     /// What the drives must supply for a force at a place, channel after channel, in units of the noise.
-    fn felt(&self, site: usize, values: &[f64]) -> Vec<f64> {
+    fn drive_forces(&self, site: usize, values: &[f64]) -> Vec<f64> {
         let mut rows = Vec::with_capacity(values.len());
         for force in self.forces[site].iter().flatten() {
             rows.extend(force.iter().zip(values).map(|(f, x)| f * x));
@@ -123,16 +123,16 @@ impl<'a> Samples<'a> {
     }
 
     /// What is tried at a place: by itself, and with each other place that `wanted` names.
-    fn menus(&self, site: usize, wanted: &dyn Fn(usize) -> bool) -> Vec<(Option<usize>, Menu)> {
+    fn factor_catalogs(&self, site: usize, wanted: &dyn Fn(usize) -> bool) -> Vec<(Option<usize>, FactorCatalog)> {
         let [position, rate, _, _] = &self.tracks[site];
         let load = self.loads[site].as_ref().map(|_| &self.tracks[site][3][..]);
-        let mut menus = vec![(None, own(position, rate, load))];
+        let mut menus = vec![(None, own_factors(position, rate, load))];
         for (other, [position, other_rate, _, _]) in self.tracks.iter().enumerate() {
             if other != site && wanted(other) {
                 let is_angle = self.sites[other].is_angle;
                 menus.push((
                     Some(other),
-                    with_other(rate, position, other_rate, is_angle),
+                    factors_with_other(rate, position, other_rate, is_angle),
                 ));
             }
         }
@@ -141,20 +141,20 @@ impl<'a> Samples<'a> {
 }
 
 /// The place whose variable it is, and which of its tracks.
-fn place_of(site: usize, other: Option<usize>, variable: Variable) -> (usize, usize) {
+fn variable_place(site: usize, other: Option<usize>, variable: LawVariable) -> (usize, usize) {
     let away = other.unwrap_or(site);
     match variable {
-        Variable::Position => (site, 0),
-        Variable::Rate => (site, 1),
-        Variable::Acceleration => (site, 2),
-        Variable::Load => (site, 3),
-        Variable::OtherPosition => (away, 0),
-        Variable::OtherRate => (away, 1),
+        LawVariable::Position => (site, 0),
+        LawVariable::Rate => (site, 1),
+        LawVariable::Acceleration => (site, 2),
+        LawVariable::Load => (site, 3),
+        LawVariable::OtherPosition => (away, 0),
+        LawVariable::OtherRate => (away, 1),
     }
 }
 
 /// Every product of two lists of columns.
-fn pairs(some: &[Vec<f64>], others: &[Vec<f64>]) -> Vec<Vec<f64>> {
+fn pairwise_products(some: &[Vec<f64>], others: &[Vec<f64>]) -> Vec<Vec<f64>> {
     let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).collect();
     some.iter()
         .flat_map(|a| others.iter().map(move |b| product(a, b)))
@@ -163,28 +163,28 @@ fn pairs(some: &[Vec<f64>], others: &[Vec<f64>]) -> Vec<Vec<f64>> {
 
 /// A product with what it explains.
 #[derive(Clone, Debug)]
-pub(crate) struct Scored {
+pub(crate) struct ScoredProduct {
     pub(crate) site: usize,
-    pub(crate) product: Product,
+    pub(crate) product: LawProduct,
     /// Squares that it takes off, in units of the noise.
     pub(crate) score: f64,
 }
 
 /// What is projected out, and what is left.
 #[derive(Clone)]
-pub(crate) struct Ground {
+pub(crate) struct LawProjection {
     samples: usize,
     /// Orthonormal columns, channels one after the other.
     basis: DMatrix<f64>,
-    rest: DVector<f64>,
+    residual: DVector<f64>,
 }
 
-impl Ground {
+impl LawProjection {
     /// Beside a set of effects.
     pub(crate) fn new(
-        bench: &Bench<'_>,
-        picks: &[Pick],
-        samples: &Samples<'_>,
+        bench: &EffectSelector<'_>,
+        picks: &[SelectedEffect],
+        samples: &LawSamples<'_>,
         deviations: &[f64],
     ) -> Self {
         let stacked = |column: usize| {
@@ -192,8 +192,8 @@ impl Ground {
             let values = channels.flat_map(|(d, values)| {
                 let mut values = values
                     .clone()
-                    .unwrap_or_else(|| vec![0.0; bench.pool.all().len()]);
-                bench.pool.silence(d, 0, &mut values);
+                    .unwrap_or_else(|| vec![0.0; bench.pool.all_samples().len()]);
+                bench.pool.zero_excluded(d, 0, &mut values);
                 let scaled = samples.picked.iter().map(|i| values[*i] / deviations[d]);
                 scaled.collect::<Vec<f64>>()
             });
@@ -202,15 +202,15 @@ impl Ground {
         let mut ground = Self {
             samples: samples.picked.len(),
             basis: DMatrix::zeros(deviations.len() * samples.picked.len(), 0),
-            rest: stacked(bench.measured),
+            residual: stacked(bench.measured),
         };
         let columns = bench.columns(picks);
-        ground.take_up(columns.into_iter().map(stacked));
+        ground.project_out(columns.into_iter().map(stacked));
         ground
     }
 
     /// Takes further columns up.
-    fn take_up(&mut self, columns: impl Iterator<Item = DVector<f64>>) {
+    fn project_out(&mut self, columns: impl Iterator<Item = DVector<f64>>) {
         let mut basis: Vec<DVector<f64>> = self
             .basis
             .column_iter()
@@ -233,107 +233,107 @@ impl Ground {
             return;
         }
         for direction in &basis {
-            let share = direction.dot(&self.rest);
-            self.rest.axpy(-share, direction, 1.0);
+            let share = direction.dot(&self.residual);
+            self.residual.axpy(-share, direction, 1.0);
         }
         self.basis = DMatrix::from_columns(&basis);
     }
 
     /// The same beside a product at a place.
-    pub(crate) fn beside(&self, samples: &Samples<'_>, site: usize, product: &Product) -> Self {
+    pub(crate) fn conditional_on_product(&self, samples: &LawSamples<'_>, site: usize, product: &LawProduct) -> Self {
         let mut more = self.clone();
         let n = self.samples;
         let channels = samples.channels(site);
         let whole = samples.columns(site, product).into_iter().map(|rows| {
-            let mut whole = DVector::zeros(self.rest.len());
+            let mut whole = DVector::zeros(self.residual.len());
             for (part, d) in rows.chunks(n).zip(&channels) {
                 whole.rows_mut(d * n, n).copy_from_slice(part);
             }
             whole
         });
-        more.take_up(whole.collect::<Vec<_>>().into_iter());
+        more.project_out(whole.collect::<Vec<_>>().into_iter());
         more
     }
 
     /// The part that feels a place.
-    pub(crate) fn at(&self, samples: &Samples<'_>, site: usize) -> Part {
+    pub(crate) fn project_at_site(&self, samples: &LawSamples<'_>, site: usize) -> SiteProjection {
         let n = self.samples;
         let channels = samples.channels(site);
         let rows: Vec<usize> = channels.iter().flat_map(|d| d * n..(d + 1) * n).collect();
         let k = self.basis.ncols();
-        Part {
+        SiteProjection {
             site,
             basis: DMatrix::from_fn(k, rows.len(), |i, j| self.basis[(rows[j], i)]),
-            rest: DVector::from_iterator(rows.len(), rows.iter().map(|i| self.rest[*i])),
+            residual: DVector::from_iterator(rows.len(), rows.iter().map(|i| self.residual[*i])),
         }
     }
 }
 
 /// Rows of the ground on the channels that feel a place.
-pub(crate) struct Part {
+pub(crate) struct SiteProjection {
     site: usize,
     /// Transposed, as products with many columns need it.
     basis: DMatrix<f64>,
-    rest: DVector<f64>,
+    residual: DVector<f64>,
 }
 
-impl Part {
+impl SiteProjection {
     /// What one product takes off.
-    pub(crate) fn score(&self, samples: &Samples<'_>, product: &Product) -> f64 {
+    pub(crate) fn score(&self, samples: &LawSamples<'_>, product: &LawProduct) -> f64 {
         let columns = samples.columns(self.site, product);
         self.scores(&columns, &[columns.len()])[0]
     }
 
     /// What every product of the grammar takes off, beside others that `wanted` names; those that take nothing off are left out.
-    pub(crate) fn screen(
+    pub(crate) fn screen_products(
         &self,
-        samples: &Samples<'_>,
+        samples: &LawSamples<'_>,
         wanted: &dyn Fn(usize) -> bool,
-    ) -> Vec<Scored> {
+    ) -> Vec<ScoredProduct> {
         let site = self.site;
-        let mut batch = Batch::default();
+        let mut batch = ProductBatch::default();
         let mut scored = Vec::new();
-        for (other, menu) in samples.menus(site, wanted) {
-            let list = |factors: &[Factor]| -> Vec<Vec<Vec<f64>>> {
-                let of = |factor| samples.factor(site, other, factor);
+        for (other, menu) in samples.factor_catalogs(site, wanted) {
+            let list = |factors: &[LawFactor]| -> Vec<Vec<Vec<f64>>> {
+                let of = |factor| samples.factor_columns(site, other, factor);
                 factors.iter().map(of).collect()
             };
-            for factor in &menu.alone {
-                let product = Product {
+            for factor in &menu.single_factors {
+                let product = LawProduct {
                     other,
                     factors: vec![*factor],
                 };
-                let columns = samples.factor(site, other, factor);
-                let felt = columns.iter().map(|one| samples.felt(site, one));
+                let columns = samples.factor_columns(site, other, factor);
+                let felt = columns.iter().map(|one| samples.drive_forces(site, one));
                 batch.add(product, felt.collect());
-                batch.work_off(self, BATCH, &mut scored);
+                batch.score_batch(self, BATCH, &mut scored);
             }
             for [some, others] in &menu.pairs {
                 let (a, b) = (list(some), list(others));
                 for (first, a) in some.iter().zip(&a) {
                     for (second, b) in others.iter().zip(&b) {
-                        let product = Product {
+                        let product = LawProduct {
                             other,
                             factors: vec![*first, *second],
                         };
-                        let columns = pairs(a, b);
-                        let felt = columns.iter().map(|one| samples.felt(site, one));
+                        let columns = pairwise_products(a, b);
+                        let felt = columns.iter().map(|one| samples.drive_forces(site, one));
                         batch.add(product, felt.collect());
-                        batch.work_off(self, BATCH, &mut scored);
+                        batch.score_batch(self, BATCH, &mut scored);
                     }
                 }
             }
         }
-        batch.work_off(self, 1, &mut scored);
+        batch.score_batch(self, 1, &mut scored);
         scored
     }
 
     /// Squares that groups of columns take off; each group has one or two.
     fn scores(&self, columns: &[Vec<f64>], counts: &[usize]) -> Vec<f64> {
-        let rows = self.rest.len();
+        let rows = self.residual.len();
         let matrix = DMatrix::from_iterator(rows, columns.len(), columns.iter().flatten().copied());
         let taken = &self.basis * &matrix;
-        let with_rest = matrix.tr_mul(&self.rest);
+        let with_rest = matrix.tr_mul(&self.residual);
         let product = |i: usize, j: usize| {
             matrix.column(i).dot(&matrix.column(j)) - taken.column(i).dot(&taken.column(j))
         };
@@ -343,7 +343,7 @@ impl Part {
             at += count;
             let own = product(i, i);
             let is_said = |own: f64, k: usize| {
-                !own.is_finite() || own <= SAID * matrix.column(k).norm_squared()
+                !own.is_finite() || own <= INDEPENDENCE_TOLERANCE * matrix.column(k).norm_squared()
             };
             if is_said(own, i) {
                 return 0.0;
@@ -366,22 +366,22 @@ impl Part {
 
 /// Products whose columns wait for their inner products.
 #[derive(Default)]
-struct Batch {
-    products: Vec<Product>,
+struct ProductBatch {
+    products: Vec<LawProduct>,
     /// Columns of each.
     counts: Vec<usize>,
     columns: Vec<Vec<f64>>,
 }
 
-impl Batch {
-    fn add(&mut self, product: Product, columns: Vec<Vec<f64>>) {
+impl ProductBatch {
+    fn add(&mut self, product: LawProduct, columns: Vec<Vec<f64>>) {
         self.products.push(product);
         self.counts.push(columns.len());
         self.columns.extend(columns);
     }
 
     /// Scores those that wait if there are so many.
-    fn work_off(&mut self, part: &Part, least: usize, scored: &mut Vec<Scored>) {
+    fn score_batch(&mut self, part: &SiteProjection, least: usize, scored: &mut Vec<ScoredProduct>) {
         if self.columns.len() < least {
             return;
         }
@@ -389,7 +389,7 @@ impl Batch {
         let all = std::mem::take(&mut self.products).into_iter().zip(scores);
         scored.extend(
             all.filter(|(_, score)| *score > 0.0)
-                .map(|(product, score)| Scored {
+                .map(|(product, score)| ScoredProduct {
                     site: part.site,
                     product,
                     score,

@@ -5,18 +5,18 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::Tried;
-use super::features::Product;
-use super::ground::Samples;
-use crate::diagnose::bench::{Bench, Pick};
+use super::LawTrial;
+use super::features::LawProduct;
+use super::ground::LawSamples;
+use crate::diagnose::bench::{EffectSelector, SelectedEffect};
 use crate::diagnose::noise::effective_samples;
-use crate::diagnose::pool::{dot, solve};
+use crate::diagnose::pool::{dot, solve_gram};
 
 /// Blocks of each stretch.
 const BLOCKS: usize = 12;
 
 /// Inner products by blocks of what is known and what is left; the base alone is one of the laws.
-pub(crate) struct HeldOut {
+pub(crate) struct BlockValidation {
     /// Blocks of the samples that are looked at.
     blocks: Vec<Range<usize>>,
     is_check: Vec<bool>,
@@ -28,28 +28,28 @@ pub(crate) struct HeldOut {
 
 /// A law along time that it was not fitted to.
 #[derive(Clone, Debug)]
-pub(crate) struct Judged {
+pub(crate) struct ValidatedLaw {
     /// Squares that it leaves of each block, in units of the noise.
-    pub(crate) left: Vec<f64>,
+    pub(crate) block_squares: Vec<f64>,
     /// Its parameters, from all blocks.
     pub(crate) values: Vec<f64>,
     /// Their deviations, by how they differ where blocks are left out.
-    pub(crate) deviations: Vec<f64>,
+    pub(crate) standard_deviations: Vec<f64>,
     /// Factors of all columns, from all blocks.
     factors: DVector<f64>,
 }
 
-impl Judged {
+impl ValidatedLaw {
     pub(crate) fn total(&self) -> f64 {
-        self.left.iter().sum()
+        self.block_squares.iter().sum()
     }
 
     /// By how much more it leaves than another, and the deviation of that over the blocks.
-    pub(crate) fn worse_than(&self, other: &Self) -> (f64, f64) {
+    pub(crate) fn excess_over(&self, other: &Self) -> (f64, f64) {
         let differences: Vec<f64> = self
-            .left
+            .block_squares
             .iter()
-            .zip(&other.left)
+            .zip(&other.block_squares)
             .map(|(a, b)| a - b)
             .collect();
         let n = differences.len() as f64;
@@ -59,12 +59,12 @@ impl Judged {
     }
 }
 
-impl HeldOut {
+impl BlockValidation {
     pub(crate) fn new(
-        bench: &Bench<'_>,
-        picks: &[Pick],
+        bench: &EffectSelector<'_>,
+        picks: &[SelectedEffect],
         rest: &[Vec<f64>],
-        samples: &Samples<'_>,
+        samples: &LawSamples<'_>,
         deviations: &[f64],
     ) -> Self {
         let layout = &bench.problem.layout;
@@ -82,7 +82,7 @@ impl HeldOut {
                 let mut all: Vec<Vec<f64>> = (bench.columns(picks).iter())
                     .map(|k| match bench.pool.column(*k).0[d].clone() {
                         Some(mut values) => {
-                            bench.pool.silence(d, 0, &mut values);
+                            bench.pool.zero_excluded(d, 0, &mut values);
                             some(d, &values)
                         }
                         None => Vec::new(),
@@ -93,7 +93,7 @@ impl HeldOut {
             })
             .collect();
         Self {
-            grams: grams(&blocks, &columns),
+            grams: block_grams(&blocks, &columns),
             blocks,
             is_check,
             columns,
@@ -101,7 +101,7 @@ impl HeldOut {
     }
 
     /// Puts a law to what is known.
-    pub(crate) fn take_up(&mut self, samples: &Samples<'_>, site: usize, terms: &[Product]) {
+    pub(crate) fn add_law(&mut self, samples: &LawSamples<'_>, site: usize, terms: &[LawProduct]) {
         let channels = samples.channels(site);
         for column in terms.iter().flat_map(|term| samples.columns(site, term)) {
             for (d, columns) in self.columns.iter_mut().enumerate() {
@@ -111,11 +111,11 @@ impl HeldOut {
                 columns.insert(columns.len() - 1, own);
             }
         }
-        self.grams = grams(&self.blocks, &self.columns);
+        self.grams = block_grams(&self.blocks, &self.columns);
     }
 
     /// A law of some products at a place, fitted and held out.
-    pub(crate) fn judge(&self, samples: &Samples<'_>, site: usize, terms: &[Product]) -> Judged {
+    pub(crate) fn validate_law(&self, samples: &LawSamples<'_>, site: usize, terms: &[LawProduct]) -> ValidatedLaw {
         let channels = samples.channels(site);
         let own: Vec<Vec<f64>> = (terms.iter())
             .flat_map(|term| samples.columns(site, term))
@@ -136,12 +136,12 @@ impl HeldOut {
                 for (part, d) in channels.iter().enumerate() {
                     let values = &column[part * k..(part + 1) * k];
                     for (i, other) in self.columns[*d].iter().enumerate() {
-                        let product = on(block, values, other);
+                        let product = product_on_block(block, values, other);
                         whole[(n + a, place(i))] += product;
                         whole[(place(i), n + a)] += product;
                     }
                     for (b, other) in own.iter().enumerate().take(a + 1) {
-                        let product = on(block, values, &other[part * k..(part + 1) * k]);
+                        let product = product_on_block(block, values, &other[part * k..(part + 1) * k]);
                         whole[(n + a, n + b)] += product;
                         if a != b {
                             whole[(n + b, n + a)] += product;
@@ -160,7 +160,7 @@ impl HeldOut {
             .filter(|(_, check)| !**check);
         let of_fit = of_fit.fold(zero(), |sum, (gram, _)| sum + gram);
         let fitted = |gram: &DMatrix<f64>| -> DVector<f64> {
-            let (factors, _) = solve(gram);
+            let (factors, _) = solve_gram(gram);
             factors.push(-1.0)
         };
         let by_fit = fitted(&of_fit);
@@ -184,9 +184,9 @@ impl HeldOut {
             let squares: f64 = others.iter().map(|one| (one[a] - mean).powi(2)).sum();
             ((count - 1.0) / count * squares).sqrt()
         };
-        Judged {
-            left,
-            deviations: (0..m).map(deviation).collect(),
+        ValidatedLaw {
+            block_squares: left,
+            standard_deviations: (0..m).map(deviation).collect(),
             values,
             factors,
         }
@@ -194,7 +194,7 @@ impl HeldOut {
 
     /// Squares of what a law leaves on the channels that feel it, fitted to all blocks, and how many independent samples that is
     /// worth.
-    pub(super) fn left_there(&self, samples: &Samples<'_>, one: &Tried) -> (f64, f64) {
+    pub(super) fn residual_at_site(&self, samples: &LawSamples<'_>, one: &LawTrial) -> (f64, f64) {
         let site = one.site;
         let own: Vec<Vec<f64>> = (one.terms.iter())
             .flat_map(|term| samples.columns(site, term))
@@ -207,7 +207,7 @@ impl HeldOut {
             let mut left = known[n].clone();
             let of_law = own.iter().map(|column| &column[part * k..(part + 1) * k]);
             let all = known[..n].iter().map(Vec::as_slice).chain(of_law);
-            for (column, factor) in all.zip(one.judged.factors.iter()) {
+            for (column, factor) in all.zip(one.validation.factors.iter()) {
                 for (left, x) in left.iter_mut().zip(column) {
                     *left -= factor * x;
                 }
@@ -220,14 +220,14 @@ impl HeldOut {
 }
 
 /// Inner products of columns on each block, over all channels.
-fn grams(blocks: &[Range<usize>], columns: &[Vec<Vec<f64>>]) -> Vec<DMatrix<f64>> {
+fn block_grams(blocks: &[Range<usize>], columns: &[Vec<Vec<f64>>]) -> Vec<DMatrix<f64>> {
     let n = columns.first().map_or(0, Vec::len);
     let gram = |block: &Range<usize>| {
         let mut gram = DMatrix::zeros(n, n);
         for of_channel in columns {
             for i in 0..n {
                 for j in 0..=i {
-                    let product = on(block, &of_channel[i], &of_channel[j]);
+                    let product = product_on_block(block, &of_channel[i], &of_channel[j]);
                     gram[(i, j)] += product;
                     if i != j {
                         gram[(j, i)] += product;
@@ -241,7 +241,7 @@ fn grams(blocks: &[Range<usize>], columns: &[Vec<Vec<f64>>]) -> Vec<DMatrix<f64>
 }
 
 /// Inner product on a block of columns, of which one without numbers is zero.
-fn on(block: &Range<usize>, a: &[f64], b: &[f64]) -> f64 {
+fn product_on_block(block: &Range<usize>, a: &[f64], b: &[f64]) -> f64 {
     if a.is_empty() || b.is_empty() {
         return 0.0;
     }

@@ -7,7 +7,7 @@
 
 /// What a shape is a function of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Variable {
+pub enum LawVariable {
     /// Position of the place on which the law acts, m or rad.
     Position,
     /// Its rate.
@@ -24,7 +24,7 @@ pub enum Variable {
 
 /// A function of one variable `z`; constants are in its unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Shape {
+pub enum LawShape {
     /// `|z|^(halves/2)`, with the sign of `z` if it is odd. Powers that are not whole are of `z/scale`.
     Power {
         /// Twice the exponent.
@@ -42,7 +42,7 @@ pub enum Shape {
         power: i32,
     },
     /// `z - from` beyond `from` on one side, nothing before: what begins at a place, as a stop does.
-    Beyond {
+    Hinge {
         /// Where it begins.
         from: f64,
         /// 1 where it acts above, -1 below.
@@ -99,18 +99,18 @@ pub enum Shape {
 }
 
 /// The sort of a shape, whatever its constants.
-pub(crate) type Sort = (u8, i32, bool);
+pub(crate) type LawShapeKind = (u8, i32, bool);
 
-impl Shape {
+impl LawShape {
     /// `z`
-    pub const LINEAR: Self = Self::whole(1, true);
+    pub const LINEAR: Self = Self::integer_power(1, true);
     /// `sign(z)`
-    pub const SIGN: Self = Self::whole(0, true);
+    pub const SIGN: Self = Self::integer_power(0, true);
     /// `|z|`
-    pub const MAGNITUDE: Self = Self::whole(1, false);
+    pub const MAGNITUDE: Self = Self::integer_power(1, false);
 
     /// A whole power of `z`, with its sign if `is_odd`.
-    pub const fn whole(power: i32, is_odd: bool) -> Self {
+    pub const fn integer_power(power: i32, is_odd: bool) -> Self {
         Self::Power {
             halves: 2 * power,
             is_odd,
@@ -119,11 +119,11 @@ impl Shape {
     }
 
     /// What shapes have in common that differ in their constants alone.
-    pub(crate) fn sort(self) -> Sort {
+    pub(crate) fn shape_kind(self) -> LawShapeKind {
         match self {
             Self::Power { halves, is_odd, .. } => (0, halves, is_odd),
             Self::Shifted { power, .. } => (1, power, true),
-            Self::Beyond { side, power, .. } => (2, power, side > 0.0),
+            Self::Hinge { side, power, .. } => (2, power, side > 0.0),
             Self::Wave { .. } => (3, 0, true),
             Self::Bump { .. } => (4, 0, false),
             Self::Detent { .. } => (5, 0, true),
@@ -135,15 +135,15 @@ impl Shape {
     }
 
     /// Whether it depends on the way there, so that no formula of the present state says it.
-    pub fn remembers(self) -> bool {
+    pub fn has_memory(self) -> bool {
         matches!(self, Self::Memory { .. } | Self::Slip { .. })
     }
 
     /// Power of the variable's unit that it has.
-    pub(crate) fn exponent(self) -> i32 {
+    pub(crate) fn unit_exponent(self) -> i32 {
         match self {
             Self::Power { halves, .. } if halves % 2 == 0 => halves / 2,
-            Self::Shifted { power, .. } | Self::Beyond { power, .. } => power,
+            Self::Shifted { power, .. } | Self::Hinge { power, .. } => power,
             _ => 0,
         }
     }
@@ -183,7 +183,7 @@ impl Shape {
                 }
             }
             Self::Shifted { centre, power } => each(&|z| (z - centre).powi(power)),
-            Self::Beyond { from, side, power } => {
+            Self::Hinge { from, side, power } => {
                 each(&|z| (side * (z - from)).max(0.0).powi(power))
             }
             Self::Wave { pitch } => {
@@ -208,14 +208,14 @@ impl Shape {
                 };
                 sign(z) * (-power).exp()
             }),
-            Self::Memory { length, curve } => vec![memory(z, starts, length, curve)],
-            Self::Slip { width } => vec![slip(z, starts, width)],
+            Self::Memory { length, curve } => vec![hysteresis_state(z, starts, length, curve)],
+            Self::Slip { width } => vec![dragged_spring(z, starts, width)],
         }
     }
 
     /// The same shape with a constant moved, by parts of what is usual for a variable that goes from `low` to `high`. There are
     /// [`Self::freedoms`] constants.
-    pub(crate) fn moved(self, which: usize, step: f64, [low, high]: [f64; 2]) -> Self {
+    pub(crate) fn with_moved_constant(self, which: usize, step: f64, [low, high]: [f64; 2]) -> Self {
         let travel = high - low;
         let along = |x: f64| x + step * travel;
         // What is wider than all of the range is another shape.
@@ -226,7 +226,7 @@ impl Shape {
                 centre: along(centre),
                 power,
             },
-            (Self::Beyond { from, side, power }, _) => Self::Beyond {
+            (Self::Hinge { from, side, power }, _) => Self::Hinge {
                 from: along(from).clamp(low, high),
                 side,
                 power,
@@ -281,7 +281,7 @@ fn sign(z: f64) -> f64 {
 }
 
 /// Steps of a state along a position; it begins anew with each stretch.
-fn along(z: &[f64], starts: &[usize], mut next: impl FnMut(f64, f64) -> f64) -> Vec<f64> {
+fn integrate_along(z: &[f64], starts: &[usize], mut next: impl FnMut(f64, f64) -> f64) -> Vec<f64> {
     let mut state = 0.0;
     let mut begins = starts.iter().copied().peekable();
     let mut before = 0.0;
@@ -299,8 +299,8 @@ fn along(z: &[f64], starts: &[usize], mut next: impl FnMut(f64, f64) -> f64) -> 
 
 /// `dz/dx = (sign(x') - z)/length`, or `(1 - z^2 sign(z x')...)` in the form of Bouc and Wen: while it is driven back it goes
 /// twice as fast as a spring alone, so that loops close.
-fn memory(z: &[f64], starts: &[usize], length: f64, curve: i32) -> Vec<f64> {
-    along(z, starts, |state, moved| {
+fn hysteresis_state(z: &[f64], starts: &[usize], length: f64, curve: i32) -> Vec<f64> {
+    integrate_along(z, starts, |state, moved| {
         let way = sign(moved);
         let gone = moved.abs() / length;
         if curve == 1 {
@@ -320,8 +320,8 @@ fn memory(z: &[f64], starts: &[usize], length: f64, curve: i32) -> Vec<f64> {
     })
 }
 
-fn slip(z: &[f64], starts: &[usize], width: f64) -> Vec<f64> {
-    along(z, starts, |state, moved| {
+fn dragged_spring(z: &[f64], starts: &[usize], width: f64) -> Vec<f64> {
+    integrate_along(z, starts, |state, moved| {
         (state + moved / width).clamp(-1.0, 1.0)
     })
 }
@@ -330,31 +330,31 @@ fn slip(z: &[f64], starts: &[usize], width: f64) -> Vec<f64> {
 mod tests {
     use super::*;
 
-    fn at(shape: Shape, z: f64) -> f64 {
+    fn at(shape: LawShape, z: f64) -> f64 {
         shape.values(&[z], &[0])[0][0]
     }
 
     #[test]
     fn shapes_have_their_values() {
         let close = |a: f64, b: f64| assert!((a - b).abs() < 1e-12, "{a} {b}");
-        close(at(Shape::LINEAR, -1.5), -1.5);
-        close(at(Shape::SIGN, -1.5), -1.0);
-        close(at(Shape::whole(2, true), -3.0), -9.0);
-        close(at(Shape::whole(2, false), -3.0), 9.0);
-        let power = Shape::Power {
+        close(at(LawShape::LINEAR, -1.5), -1.5);
+        close(at(LawShape::SIGN, -1.5), -1.0);
+        close(at(LawShape::integer_power(2, true), -3.0), -9.0);
+        close(at(LawShape::integer_power(2, false), -3.0), 9.0);
+        let power = LawShape::Power {
             halves: 3,
             is_odd: true,
             scale: 2.0,
         };
         close(at(power, -8.0), -8.0);
-        let beyond = Shape::Beyond {
+        let beyond = LawShape::Hinge {
             from: 1.0,
             side: -1.0,
             power: 2,
         };
         close(at(beyond, 0.5), 0.25);
         close(at(beyond, 1.5), 0.0);
-        let fading = Shape::Fading {
+        let fading = LawShape::Fading {
             scale: 2.0,
             halves: 4,
         };
@@ -368,15 +368,15 @@ mod tests {
         let back = (0..400).map(|i| 4.0 - f64::from(i) * 0.01);
         let way: Vec<f64> = there.chain(back).collect();
         let shapes = [
-            Shape::Memory {
+            LawShape::Memory {
                 length: 0.2,
                 curve: 1,
             },
-            Shape::Memory {
+            LawShape::Memory {
                 length: 0.2,
                 curve: 2,
             },
-            Shape::Slip { width: 0.2 },
+            LawShape::Slip { width: 0.2 },
         ];
         for shape in shapes {
             let state = &shape.values(&way, &[0])[0];

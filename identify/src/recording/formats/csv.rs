@@ -8,13 +8,13 @@ use std::rc::Rc;
 
 use modelmill_boundary::text::csv_name;
 
-use crate::recording::column::Field;
-use crate::recording::error::Fault;
-use crate::recording::formats::{Format, Input, TableInfo};
-use crate::recording::intake::{Flow, Intake};
-use crate::recording::notes::Note;
-use crate::recording::tables::{ColumnInfo, likely_time};
-use crate::recording::{ReadOptions, Recording};
+use crate::recording::column::SampleField;
+use crate::recording::error::RecordingFault;
+use crate::recording::formats::{RecordingFormat, RecordingInput, TableInfo};
+use crate::recording::intake::{IntakeFlow, SampleIntake};
+use crate::recording::notes::RecordingNote;
+use crate::recording::tables::{ColumnInfo, likely_time_column};
+use crate::recording::{ReadOptions, SignalRecording};
 
 /// The longest header line that is looked at; beyond it the file is no recording.
 const LONGEST_HEADER: u64 = 1 << 20;
@@ -22,9 +22,9 @@ const LONGEST_HEADER: u64 = 1 << 20;
 const LONGEST_RECORD: usize = 64 << 20;
 
 /// CSV text, which everything is that no other format knows as its own.
-pub(crate) struct Csv;
+pub(crate) struct CsvFormat;
 
-impl Format for Csv {
+impl RecordingFormat for CsvFormat {
     fn extensions(&self) -> &'static [&'static str] {
         &["csv", "tsv"]
     }
@@ -33,40 +33,40 @@ impl Format for Csv {
         false
     }
 
-    fn begins(&self, _first: &[u8]) -> bool {
+    fn has_signature(&self, _first: &[u8]) -> bool {
         true
     }
 
     fn read(
         &self,
-        input: Input<'_>,
+        input: RecordingInput<'_>,
         file: &str,
         options: &ReadOptions,
-    ) -> Result<Recording, Fault> {
+    ) -> Result<SignalRecording, RecordingFault> {
         read(input.stream(), file, options)
     }
 
-    fn names(&self, input: Input<'_>) -> Result<Vec<String>, Fault> {
+    fn names(&self, input: RecordingInput<'_>) -> Result<Vec<String>, RecordingFault> {
         let (mut reader, _, header_line) = open(input.stream(), Rc::default())?;
         names(&mut reader, header_line)
     }
 
-    fn tables(&self, input: Input<'_>) -> Result<Vec<TableInfo>, Fault> {
+    fn tables(&self, input: RecordingInput<'_>) -> Result<Vec<TableInfo>, RecordingFault> {
         let mut stream = input.stream();
         let (mut reader, _, header_line) = open(&mut stream, Rc::default())?;
         let names = names(&mut reader, header_line)?;
-        let time = likely_time(&names).and_then(|time| names.iter().position(|name| name == time));
+        let time = likely_time_column(&names).and_then(|time| names.iter().position(|name| name == time));
         let mut record = csv::ByteRecord::new();
         let (mut samples, mut span) = (0, None);
         let mut kinds = vec!["number"; names.len()];
         while reader.read_byte_record(&mut record).map_err(unreadable)? {
             samples += 1;
             for (kind, field) in kinds.iter_mut().zip(&record) {
-                if samples == 1 && parse(field) == Field::Text {
+                if samples == 1 && parse(field) == SampleField::Text {
                     *kind = "text";
                 }
             }
-            if let Some(Field::Number(t)) = time.and_then(|place| record.get(place)).map(parse) {
+            if let Some(SampleField::Number(t)) = time.and_then(|place| record.get(place)).map(parse) {
                 span = Some((span.map_or(t, |(first, _)| first), t));
             }
         }
@@ -85,18 +85,18 @@ impl Format for Csv {
     }
 }
 
-fn read(stream: impl Read, file: &str, options: &ReadOptions) -> Result<Recording, Fault> {
+fn read(stream: impl Read, file: &str, options: &ReadOptions) -> Result<SignalRecording, RecordingFault> {
     let since = Rc::new(Cell::new(0));
     let (mut reader, separator, header_line) = open(stream, since.clone())?;
     let theirs = names(&mut reader, header_line)?;
-    let mut intake = Intake::new(theirs, options)?;
+    let mut intake = SampleIntake::new(theirs, options)?;
     if separator != b',' {
         let name = if separator == b';' {
             "semicolons"
         } else {
             "tabs"
         };
-        intake.note(Note::info(format!(
+        intake.note(RecordingNote::info(format!(
             "The columns of {file} are separated by {name}."
         )));
     }
@@ -107,11 +107,11 @@ fn read(stream: impl Read, file: &str, options: &ReadOptions) -> Result<Recordin
         // The reader stands behind the line's end here; where it began, blank lines are not
         // passed over yet.
         let line = reader.position().line() - 1;
-        if let Some(line) = quote_left_open(&record, line, &intake) {
-            return Err(Fault::OpenQuote { line });
+        if let Some(line) = open_quote_line(&record, line, &intake) {
+            return Err(RecordingFault::OpenQuote { line });
         }
         if record.len() != intake.width() {
-            return Err(Fault::RaggedLine {
+            return Err(RecordingFault::RaggedLine {
                 line,
                 have: record.len(),
                 expected: intake.width(),
@@ -119,17 +119,17 @@ fn read(stream: impl Read, file: &str, options: &ReadOptions) -> Result<Recordin
         }
         sample.clear();
         sample.extend(record.iter().enumerate().map(|(place, text)| {
-            if intake.reads(place) {
+            if intake.is_place_needed(place) {
                 parse(text)
             } else {
-                Field::Number(0.0)
+                SampleField::Number(0.0)
             }
         }));
         let text = |place: usize| {
             let bytes = record.get(place).unwrap_or_default().trim_ascii();
             String::from_utf8_lossy(bytes).chars().take(60).collect()
         };
-        if intake.take(line, &sample, &text)? == Flow::Stop {
+        if intake.take_sample(line, &sample, &text)? == IntakeFlow::Stop {
             break;
         }
     }
@@ -141,13 +141,13 @@ fn read(stream: impl Read, file: &str, options: &ReadOptions) -> Result<Recordin
 fn open(
     stream: impl Read,
     since: Rc<Cell<usize>>,
-) -> Result<(csv::Reader<impl Read>, u8, u64), Fault> {
+) -> Result<(csv::Reader<impl Read>, u8, u64), RecordingFault> {
     let mut stream = BufReader::with_capacity(1 << 16, stream);
     let (header, first_lines) = read_header(&mut stream)?;
     let separator = find_separator(&header)?;
     let blank = first_lines.len() - first_lines.trim_ascii_start().len();
     let header_line = 1 + newlines(&first_lines[..blank]);
-    let lines_of_text = EvenLines::new(Cursor::new(first_lines).chain(stream), since);
+    let lines_of_text = LineFeedReader::new(Cursor::new(first_lines).chain(stream), since);
     let reader = csv::ReaderBuilder::new()
         .delimiter(separator)
         .flexible(true)
@@ -156,10 +156,10 @@ fn open(
     Ok((reader, separator, header_line))
 }
 
-fn names(reader: &mut csv::Reader<impl Read>, line: u64) -> Result<Vec<String>, Fault> {
+fn names(reader: &mut csv::Reader<impl Read>, line: u64) -> Result<Vec<String>, RecordingFault> {
     let header = reader.headers().map_err(unreadable)?;
     if header.iter().any(|name| name.contains('\n')) {
-        return Err(Fault::OpenQuote { line });
+        return Err(RecordingFault::OpenQuote { line });
     }
     let names = header.iter().map(|name| csv_name(name).to_owned());
     Ok(names.collect())
@@ -167,7 +167,7 @@ fn names(reader: &mut csv::Reader<impl Read>, line: u64) -> Result<Vec<String>, 
 
 /// The line in which a quote opens a field that goes on in the next line and takes in samples: to the end of the text,
 /// or so that fields are missing or no numbers. A remark of two lines is none. `last` is the line that ends the record.
-fn quote_left_open(record: &csv::ByteRecord, last: u64, intake: &Intake<'_>) -> Option<u64> {
+fn open_quote_line(record: &csv::ByteRecord, last: u64, intake: &SampleIntake<'_>) -> Option<u64> {
     let first = record.iter().position(|field| field.contains(&b'\n'))?;
     let below: u64 = record.iter().skip(first).map(newlines).sum();
     // A quote that is open to the end of the text has taken in the last line's end too.
@@ -175,7 +175,7 @@ fn quote_left_open(record: &csv::ByteRecord, last: u64, intake: &Intake<'_>) -> 
         .iter()
         .next_back()
         .is_some_and(|field| field.ends_with(b"\n"));
-    let harms = is_open || record.len() != intake.width() || intake.reads(first);
+    let harms = is_open || record.len() != intake.width() || intake.is_place_needed(first);
     harms.then(|| last + u64::from(is_open) - below)
 }
 
@@ -183,23 +183,23 @@ fn newlines(bytes: &[u8]) -> u64 {
     bytes.split(|byte| *byte == b'\n').count() as u64 - 1
 }
 
-fn parse(bytes: &[u8]) -> Field {
+fn parse(bytes: &[u8]) -> SampleField {
     let bytes = bytes.trim_ascii();
     if bytes.is_empty() {
-        return Field::NotFinite;
+        return SampleField::NotFinite;
     }
     match std::str::from_utf8(bytes)
         .ok()
         .and_then(|text| text.parse::<f64>().ok())
     {
-        Some(number) => Field::finite(number),
-        None => Field::Text,
+        Some(number) => SampleField::finite(number),
+        None => SampleField::Text,
     }
 }
 
 /// The same text with LF at the end of every line, the last one included, so that the lines of
 /// records can be told: the CSV reader counts a line only when it meets its LF.
-struct EvenLines<R> {
+struct LineFeedReader<R> {
     inner: R,
     last: u8,
     ended: bool,
@@ -207,7 +207,7 @@ struct EvenLines<R> {
     since: Rc<Cell<usize>>,
 }
 
-impl<R: Read> EvenLines<R> {
+impl<R: Read> LineFeedReader<R> {
     fn new(inner: R, since: Rc<Cell<usize>>) -> Self {
         Self {
             since,
@@ -218,7 +218,7 @@ impl<R: Read> EvenLines<R> {
     }
 }
 
-impl<R: Read> Read for EvenLines<R> {
+impl<R: Read> Read for LineFeedReader<R> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         if buffer.is_empty() || self.ended {
             return Ok(0);
@@ -256,16 +256,16 @@ impl<R: Read> Read for EvenLines<R> {
 }
 
 /// The header as text without its byte order mark, and the bytes to read again, from the header on.
-fn read_header(stream: &mut impl BufRead) -> Result<(String, Vec<u8>), Fault> {
+fn read_header(stream: &mut impl BufRead) -> Result<(String, Vec<u8>), RecordingFault> {
     let mut bytes = Vec::new();
-    let unreadable = |error: io::Error| Fault::Unreadable {
+    let unreadable = |error: io::Error| RecordingFault::Unreadable {
         reason: error.to_string(),
     };
     // Blank lines on top stay in the text, so that the lines are counted as in the file.
     let mut limited = stream.take(LONGEST_HEADER);
     while bytes.trim_ascii().is_empty() {
         if limited.read_until(b'\n', &mut bytes).map_err(unreadable)? == 0 {
-            return Err(Fault::Empty);
+            return Err(RecordingFault::Empty);
         }
     }
     let looks_like = match bytes.as_slice() {
@@ -283,25 +283,25 @@ fn read_header(stream: &mut impl BufRead) -> Result<(String, Vec<u8>), Fault> {
         _ => None,
     };
     if let Some(looks_like) = looks_like {
-        return Err(Fault::NotCsv { looks_like });
+        return Err(RecordingFault::NotCsv { looks_like });
     }
     let text = bytes
         .strip_prefix(b"\xEF\xBB\xBF")
         .unwrap_or(&bytes)
         .to_vec();
     let Ok(header) = std::str::from_utf8(&text) else {
-        return Err(Fault::NotCsv {
+        return Err(RecordingFault::NotCsv {
             looks_like: "text in another encoding than UTF-8",
         });
     };
     let header = header.trim().to_owned();
     if header.is_empty() {
-        return Err(Fault::Empty);
+        return Err(RecordingFault::Empty);
     }
     Ok((header, text))
 }
 
-fn find_separator(header: &str) -> Result<u8, Fault> {
+fn find_separator(header: &str) -> Result<u8, RecordingFault> {
     // What stands between quotes separates nothing, unless one is left open.
     let parts: Vec<&str> = header.split('"').collect();
     let step = if parts.len().is_multiple_of(2) { 1 } else { 2 };
@@ -317,29 +317,29 @@ fn find_separator(header: &str) -> Result<u8, Fault> {
         [separator] => {
             let mut fields = header.split(char::from(*separator));
             if fields.all(is_number) {
-                Err(Fault::NoHeader)
+                Err(RecordingFault::NoHeader)
             } else {
                 Ok(*separator)
             }
         }
-        [] if is_number(header) => Err(Fault::NoHeader),
+        [] if is_number(header) => Err(RecordingFault::NoHeader),
         // A single column is hardly a recording, but it is clear what it says.
         [] if !header.contains([' ', '|', ':']) => Ok(b','),
-        _ => Err(Fault::UnclearSeparator {
+        _ => Err(RecordingFault::UnclearSeparator {
             header: header.chars().take(80).collect(),
         }),
     }
 }
 
-fn unreadable(error: csv::Error) -> Fault {
+fn unreadable(error: csv::Error) -> RecordingFault {
     match error.into_kind() {
-        csv::ErrorKind::Io(error) => Fault::Unreadable {
+        csv::ErrorKind::Io(error) => RecordingFault::Unreadable {
             reason: error.to_string(),
         },
-        csv::ErrorKind::Utf8 { .. } => Fault::NotCsv {
+        csv::ErrorKind::Utf8 { .. } => RecordingFault::NotCsv {
             looks_like: "text in another encoding than UTF-8",
         },
-        other => Fault::Unreadable {
+        other => RecordingFault::Unreadable {
             reason: format!("{other:?}"),
         },
     }

@@ -11,14 +11,14 @@ use hdf5_pure::{
     ReadSeekSource,
 };
 
-use crate::recording::column::Field;
-use crate::recording::error::Fault;
-use crate::recording::formats::{Format, Input, TableInfo, all_of};
-use crate::recording::intake::{Flow, Intake};
-use crate::recording::notes::Note;
-use crate::recording::tables::{ColumnInfo, found_time};
-use crate::recording::{ReadOptions, Recording};
-use crate::words::list;
+use crate::recording::column::SampleField;
+use crate::recording::error::RecordingFault;
+use crate::recording::formats::{RecordingFormat, RecordingInput, TableInfo, read_all};
+use crate::recording::intake::{IntakeFlow, SampleIntake};
+use crate::recording::notes::RecordingNote;
+use crate::recording::tables::{ColumnInfo, find_time_range};
+use crate::recording::{ReadOptions, SignalRecording};
+use crate::words::backquoted_list;
 
 /// More datasets than any recording has.
 const MOST_DATASETS: usize = 1 << 14;
@@ -30,12 +30,12 @@ const WINDOW: u64 = 8 << 20;
 /// The largest chunk; writers make some of a megabyte.
 const LARGEST_CHUNK: u64 = 64 << 20;
 /// Groups in which MATLAB keeps what is none of the user's.
-const OF_MATLAB: [&str; 2] = ["#refs#", "#subsystem#"];
+const MATLAB_GROUPS: [&str; 2] = ["#refs#", "#subsystem#"];
 
 /// HDF5, whoever wrote it.
-pub(crate) struct Hdf5;
+pub(crate) struct Hdf5Format;
 
-impl Format for Hdf5 {
+impl RecordingFormat for Hdf5Format {
     fn suffix(&self) -> &'static str {
         " (HDF5)"
     }
@@ -44,42 +44,42 @@ impl Format for Hdf5 {
         &["h5", "hdf5", "hdf"]
     }
 
-    fn begins(&self, first: &[u8]) -> bool {
+    fn has_signature(&self, first: &[u8]) -> bool {
         first.starts_with(b"MATLAB 7.3 MAT-file") || first.starts_with(b"\x89HDF")
     }
 
     fn read(
         &self,
-        input: Input<'_>,
+        input: RecordingInput<'_>,
         file: &str,
         options: &ReadOptions,
-    ) -> Result<Recording, Fault> {
+    ) -> Result<SignalRecording, RecordingFault> {
         read(&open(input)?, file, options)
     }
 
-    fn names(&self, input: Input<'_>) -> Result<Vec<String>, Fault> {
-        Ok(Columns::new(&open(input)?)?.names())
+    fn names(&self, input: RecordingInput<'_>) -> Result<Vec<String>, RecordingFault> {
+        Ok(HdfColumns::new(&open(input)?)?.names())
     }
 
-    fn tables(&self, input: Input<'_>) -> Result<Vec<TableInfo>, Fault> {
+    fn tables(&self, input: RecordingInput<'_>) -> Result<Vec<TableInfo>, RecordingFault> {
         let file = open(input)?;
-        let columns = Columns::new(&file)?;
-        let infos = columns.sound.iter().map(|column| ColumnInfo {
+        let columns = HdfColumns::new(&file)?;
+        let infos = columns.consistent.iter().map(|column| ColumnInfo {
             name: column.name.clone(),
             kind: column.number.name(),
         });
         let remark = (!columns.others.is_empty()).then(|| {
             format!(
                 "left aside, of another length or no numbers: {}",
-                list(&columns.others)
+                backquoted_list(&columns.others)
             )
         });
         Ok(vec![TableInfo {
             name: String::new(),
             kind: String::new(),
             samples: columns.samples,
-            time: found_time(&columns.names(), |name| {
-                read(&file, "", &ReadOptions::only(name)).ok()
+            time: find_time_range(&columns.names(), |name| {
+                read(&file, "", &ReadOptions::single_column(name)).ok()
             }),
             columns: infos.collect(),
             remark,
@@ -87,26 +87,26 @@ impl Format for Hdf5 {
     }
 }
 
-fn open(input: Input<'_>) -> Result<File, Fault> {
+fn open(input: RecordingInput<'_>) -> Result<File, RecordingFault> {
     let opened = match input {
-        Input::File(stream) => ReadSeekSource::new(stream)
+        RecordingInput::File(stream) => ReadSeekSource::new(stream)
             .map_err(Error::from)
             .and_then(File::from_source),
-        Input::Bytes(bytes) => File::from_bytes(bytes.to_vec()),
-        Input::Stream(stream) => ReadSeekSource::new(Cursor::new(all_of(stream)?))
+        RecordingInput::Bytes(bytes) => File::from_bytes(bytes.to_vec()),
+        RecordingInput::Stream(stream) => ReadSeekSource::new(Cursor::new(read_all(stream)?))
             .map_err(Error::from)
             .and_then(File::from_source),
     };
-    opened.map_err(|error| unreadable(&error))
+    opened.map_err(|error| unreadable_fault(&error))
 }
 
-fn read(opened: &File, file: &str, options: &ReadOptions) -> Result<Recording, Fault> {
-    let columns = Columns::new(opened)?;
-    let mut intake = Intake::new(columns.names(), options)?;
+fn read(opened: &File, file: &str, options: &ReadOptions) -> Result<SignalRecording, RecordingFault> {
+    let columns = HdfColumns::new(opened)?;
+    let mut intake = SampleIntake::new(columns.names(), options)?;
     if !columns.others.is_empty() {
-        intake.note(Note::info(format!(
+        intake.note(RecordingNote::info(format!(
             "{} of {file} {} not of as many samples as the others, or no numbers, and left aside.",
-            list(&columns.others),
+            backquoted_list(&columns.others),
             if columns.others.len() == 1 {
                 "is"
             } else {
@@ -114,27 +114,27 @@ fn read(opened: &File, file: &str, options: &ReadOptions) -> Result<Recording, F
             },
         )));
     }
-    let is_read = |place: &usize| intake.reads(*place);
-    let read: Vec<usize> = (0..columns.sound.len()).filter(is_read).collect();
+    let is_read = |place: &usize| intake.is_place_needed(*place);
+    let read: Vec<usize> = (0..columns.consistent.len()).filter(is_read).collect();
     // Numbers are kept twice until all are taken in.
-    if read.len().saturating_mul(columns.samples) > options.most_numbers / 2 {
-        return Err(broken(
+    if read.len().saturating_mul(columns.samples) > options.max_numbers / 2 {
+        return Err(format_fault(
             "it is too large to be read as a whole; save it as CSV or Parquet, of which parts can be read",
         ));
     }
-    let mut values = vec![Vec::new(); columns.sound.len()];
+    let mut values = vec![Vec::new(); columns.consistent.len()];
     for place in read {
-        values[place] = columns.sound[place].numbers(opened, columns.samples)?;
+        values[place] = columns.consistent[place].read_numbers(opened, columns.samples)?;
     }
-    let mut sample = vec![Field::Number(0.0); columns.sound.len()];
+    let mut sample = vec![SampleField::Number(0.0); columns.consistent.len()];
     for k in 0..columns.samples {
         for (field, values) in sample.iter_mut().zip(&values) {
             if let Some(value) = values.get(k) {
-                *field = Field::finite(*value);
+                *field = SampleField::finite(*value);
             }
         }
         let text = |_: usize| "NaN or infinite".to_owned();
-        if intake.take(k as u64 + 1, &sample, &text)? == Flow::Stop {
+        if intake.take_sample(k as u64 + 1, &sample, &text)? == IntakeFlow::Stop {
             break;
         }
     }
@@ -142,34 +142,34 @@ fn read(opened: &File, file: &str, options: &ReadOptions) -> Result<Recording, F
 }
 
 /// The columns of a file, all of one length, and the names of what is none.
-struct Columns {
+struct HdfColumns {
     samples: usize,
-    sound: Vec<Column>,
+    consistent: Vec<HdfColumn>,
     others: Vec<String>,
 }
 
 /// A column, and where its numbers stand.
-struct Column {
+struct HdfColumn {
     name: String,
     path: String,
     /// Elements of a row of the dataset, and which of them is this column; or else the row that it is.
-    place: Place,
-    number: Number,
+    place: HdfColumnPlace,
+    number: HdfNumber,
 }
 
 #[derive(Clone, Copy)]
-enum Place {
+enum HdfColumnPlace {
     /// Samples are rows of so many elements, and the column is one of them.
     Element { of: u64, k: u64 },
     /// The column is a row.
     Row(u64),
 }
 
-impl Columns {
-    fn new(file: &File) -> Result<Self, Fault> {
+impl HdfColumns {
+    fn new(file: &File) -> Result<Self, RecordingFault> {
         let mut found = Vec::new();
         let mut others = Vec::new();
-        collect(&file.root(), "", 0, &mut found, &mut others)?;
+        collect_datasets(&file.root(), "", 0, &mut found, &mut others)?;
         // The number of samples is the longest side that any dataset has.
         let samples = found
             .iter()
@@ -178,12 +178,12 @@ impl Columns {
             .max()
             .unwrap_or(0);
         if samples == 0 {
-            return Err(broken("it holds no datasets of numbers"));
+            return Err(format_fault("it holds no datasets of numbers"));
         }
         let mut columns = Self {
             samples: usize::try_from(samples)
-                .map_err(|_| broken("it says to have more samples than any memory holds"))?,
-            sound: Vec::new(),
+                .map_err(|_| format_fault("it says to have more samples than any memory holds"))?,
+            consistent: Vec::new(),
             others,
         };
         for one in found {
@@ -198,8 +198,8 @@ impl Columns {
             }
             let is_upright = rows == samples;
             let n = if is_upright { width } else { rows };
-            if columns.sound.len() as u64 + n * one.numbers.len() as u64 > MOST_COLUMNS as u64 {
-                return Err(broken("it has more columns than any recording"));
+            if columns.consistent.len() as u64 + n * one.numbers.len() as u64 > MOST_COLUMNS as u64 {
+                return Err(format_fault("it has more columns than any recording"));
             }
             for k in 0..n {
                 for (field, number) in &one.numbers {
@@ -208,13 +208,13 @@ impl Columns {
                     } else {
                         format!("_{}", k + 1)
                     };
-                    columns.sound.push(Column {
+                    columns.consistent.push(HdfColumn {
                         name: format!("{}{number_of}{field}", one.name),
                         path: one.path.clone(),
                         place: if is_upright {
-                            Place::Element { of: width, k }
+                            HdfColumnPlace::Element { of: width, k }
                         } else {
-                            Place::Row(k)
+                            HdfColumnPlace::Row(k)
                         },
                         number: *number,
                     });
@@ -225,7 +225,7 @@ impl Columns {
     }
 
     fn names(&self) -> Vec<String> {
-        self.sound
+        self.consistent
             .iter()
             .map(|column| column.name.clone())
             .collect()
@@ -233,38 +233,38 @@ impl Columns {
 }
 
 /// A dataset of numbers.
-struct Found {
+struct HdfDataset {
     /// Its path with points.
     name: String,
     path: String,
     shape: Vec<u64>,
     /// The numbers of an element: one without a name, or the fields of a record.
-    numbers: Vec<(String, Number)>,
+    numbers: Vec<(String, HdfNumber)>,
 }
 
 /// Collects the datasets of a group and of those within it.
-fn collect(
+fn collect_datasets(
     group: &Group,
     path: &str,
     depth: usize,
-    found: &mut Vec<Found>,
+    found: &mut Vec<HdfDataset>,
     others: &mut Vec<String>,
-) -> Result<(), Fault> {
+) -> Result<(), RecordingFault> {
     if depth > DEEPEST || found.len() + others.len() > MOST_DATASETS {
-        return Err(broken("its groups have no end"));
+        return Err(format_fault("its groups have no end"));
     }
-    for dataset in group.datasets().map_err(|error| unreadable(&error))? {
+    for dataset in group.datasets().map_err(|error| unreadable_fault(&error))? {
         let path = format!("{path}/{dataset}");
         let name = path[1..].replace('/', ".");
         let dataset = group
             .dataset(&dataset)
-            .map_err(|error| unreadable(&error))?;
+            .map_err(|error| unreadable_fault(&error))?;
         let (Ok(kind), Ok(shape)) = (dataset.datatype(), dataset.shape()) else {
             others.push(name);
             continue;
         };
         let mut numbers = Vec::new();
-        Number::collect(
+        HdfNumber::collect_numbers(
             &kind,
             String::new(),
             0,
@@ -275,7 +275,7 @@ fn collect(
             others.push(name);
             continue;
         }
-        let chunk = dataset.chunk_shape().map_err(|error| unreadable(&error))?;
+        let chunk = dataset.chunk_shape().map_err(|error| unreadable_fault(&error))?;
         let size = chunk
             .unwrap_or_default()
             .iter()
@@ -283,23 +283,23 @@ fn collect(
                 size.saturating_mul(*side)
             });
         if size > LARGEST_CHUNK {
-            return Err(broken(format!(
+            return Err(format_fault(format!(
                 "`{name}` is stored in chunks of {size} bytes; store it in smaller ones"
             )));
         }
-        found.push(Found {
+        found.push(HdfDataset {
             name,
             path,
             shape,
             numbers,
         });
     }
-    for inner in group.groups().map_err(|error| unreadable(&error))? {
-        if OF_MATLAB.contains(&inner.as_str()) {
+    for inner in group.groups().map_err(|error| unreadable_fault(&error))? {
+        if MATLAB_GROUPS.contains(&inner.as_str()) {
             continue;
         }
-        let within = group.group(&inner).map_err(|error| unreadable(&error))?;
-        collect(
+        let within = group.group(&inner).map_err(|error| unreadable_fault(&error))?;
+        collect_datasets(
             &within,
             &format!("{path}/{inner}"),
             depth + 1,
@@ -310,12 +310,12 @@ fn collect(
     Ok(())
 }
 
-impl Column {
+impl HdfColumn {
     /// Its numbers, read in windows that fit into memory.
-    fn numbers(&self, file: &File, samples: usize) -> Result<Vec<f64>, Fault> {
+    fn read_numbers(&self, file: &File, samples: usize) -> Result<Vec<f64>, RecordingFault> {
         let dataset = file
             .dataset(&self.path)
-            .map_err(|error| unreadable(&error))?;
+            .map_err(|error| unreadable_fault(&error))?;
         let mut values = Vec::new();
         let size = usize::try_from(self.number.element).unwrap_or(usize::MAX);
         let mut take = |bytes: &[u8], every: usize, from: usize| {
@@ -323,13 +323,13 @@ impl Column {
             values.extend(elements.map(|element| self.number.value(element)));
         };
         match self.place {
-            Place::Row(k) => {
+            HdfColumnPlace::Row(k) => {
                 let bytes = dataset
                     .read_raw_rows(k, 1)
-                    .map_err(|error| unreadable(&error))?;
+                    .map_err(|error| unreadable_fault(&error))?;
                 take(&bytes, 1, 0);
             }
-            Place::Element { of, k } => {
+            HdfColumnPlace::Element { of, k } => {
                 let row = of.saturating_mul(self.number.element).max(1);
                 let most = (WINDOW / row).max(1);
                 let mut from = 0;
@@ -337,7 +337,7 @@ impl Column {
                     let rows = most.min(samples as u64 - from);
                     let bytes = dataset
                         .read_raw_rows(from, rows)
-                        .map_err(|error| unreadable(&error))?;
+                        .map_err(|error| unreadable_fault(&error))?;
                     let width = usize::try_from(of).unwrap_or(usize::MAX);
                     take(&bytes, width, usize::try_from(k).unwrap_or(0));
                     from += rows;
@@ -345,7 +345,7 @@ impl Column {
             }
         }
         if values.len() != samples {
-            return Err(broken(format!("`{}` is shorter than it says", self.name)));
+            return Err(format_fault(format!("`{}` is shorter than it says", self.name)));
         }
         Ok(values)
     }
@@ -353,25 +353,25 @@ impl Column {
 
 /// A number within an element of a dataset.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Number {
+struct HdfNumber {
     /// Bytes of an element, and where the number begins in it.
     element: u64,
     at: usize,
     size: usize,
     is_big: bool,
-    kind: Kind,
+    kind: HdfNumberKind,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Kind {
+enum HdfNumberKind {
     Signed,
     Unsigned,
     Float,
 }
 
-impl Number {
+impl HdfNumber {
     /// Finds the numbers of a type, each with the name that it adds to that of the dataset.
-    fn collect(
+    fn collect_numbers(
         kind: &Datatype,
         name: String,
         at: u64,
@@ -391,9 +391,9 @@ impl Number {
                 ..
             } if u32::from(*bit_precision) == 8 * size && matches!(size, 1 | 2 | 4 | 8) => {
                 let kind = if *signed {
-                    Kind::Signed
+                    HdfNumberKind::Signed
                 } else {
-                    Kind::Unsigned
+                    HdfNumberKind::Unsigned
                 };
                 (*byte_order, kind)
             }
@@ -402,17 +402,17 @@ impl Number {
             } if *layout == FloatingPointLayout::IEEE754_BINARY32
                 || *layout == FloatingPointLayout::IEEE754_BINARY64 =>
             {
-                (*byte_order, Kind::Float)
+                (*byte_order, HdfNumberKind::Float)
             }
             // Truths of h5py are words for 0 and 1.
             Datatype::Enumeration { base_type, .. } => {
-                return Self::collect(base_type, name, at, element, numbers);
+                return Self::collect_numbers(base_type, name, at, element, numbers);
             }
             Datatype::Compound { members, .. } => {
                 for member in members {
                     let name = format!("{name}.{}", member.name);
                     let at = at.saturating_add(member.byte_offset);
-                    Self::collect(&member.datatype, name, at, element, numbers);
+                    Self::collect_numbers(&member.datatype, name, at, element, numbers);
                 }
                 return;
             }
@@ -425,7 +425,7 @@ impl Number {
                     .fold(1_u64, |n, d| n.saturating_mul(u64::from(*d)));
                 for k in 0..n.min(MOST_COLUMNS as u64) {
                     let at = at.saturating_add(k * u64::from(base_type.type_size()));
-                    Self::collect(base_type, format!("{name}_{}", k + 1), at, element, numbers);
+                    Self::collect_numbers(base_type, format!("{name}_{}", k + 1), at, element, numbers);
                 }
                 return;
             }
@@ -458,35 +458,35 @@ impl Number {
         let bits = u64::from_le_bytes(bytes);
         let above = 64 - 8 * self.size;
         match (self.kind, self.size) {
-            (Kind::Unsigned, _) => bits as f64,
-            (Kind::Signed, _) => ((bits << above).cast_signed() >> above) as f64,
-            (Kind::Float, 4) => {
+            (HdfNumberKind::Unsigned, _) => bits as f64,
+            (HdfNumberKind::Signed, _) => ((bits << above).cast_signed() >> above) as f64,
+            (HdfNumberKind::Float, 4) => {
                 let [a, b, c, d, ..] = bytes;
                 f64::from(f32::from_le_bytes([a, b, c, d]))
             }
-            (Kind::Float, _) => f64::from_bits(bits),
+            (HdfNumberKind::Float, _) => f64::from_bits(bits),
         }
     }
 
     fn name(self) -> String {
         let kind = match self.kind {
-            Kind::Signed => "int",
-            Kind::Unsigned => "uint",
-            Kind::Float => "float",
+            HdfNumberKind::Signed => "int",
+            HdfNumberKind::Unsigned => "uint",
+            HdfNumberKind::Float => "float",
         };
         format!("{kind}{}", 8 * self.size)
     }
 }
 
-fn broken(says: impl Into<String>) -> Fault {
-    Fault::Format {
+fn format_fault(says: impl Into<String>) -> RecordingFault {
+    RecordingFault::Format {
         format: "an HDF5 or MATLAB 7.3 file",
-        says: says.into(),
+        message: says.into(),
     }
 }
 
-fn unreadable(error: &Error) -> Fault {
-    broken(format!(
+fn unreadable_fault(error: &Error) -> RecordingFault {
+    format_fault(format!(
         "it cannot be read: {error}; is it complete, and closed by whoever wrote it?"
     ))
 }

@@ -6,23 +6,23 @@
 
 use std::io::{BufReader, Read, Seek};
 
-use crate::recording::column::Field;
-use crate::recording::error::Fault;
-use crate::recording::formats::matlab_arrays::Arrays;
-use crate::recording::formats::{Format, Input, TableInfo};
-use crate::recording::intake::{Flow, Intake};
-use crate::recording::notes::Note;
-use crate::recording::tables::{ColumnInfo, found_time};
-use crate::recording::{ReadOptions, Recording};
-use crate::words::list;
+use crate::recording::column::SampleField;
+use crate::recording::error::RecordingFault;
+use crate::recording::formats::matlab_arrays::MatlabArrayFile;
+use crate::recording::formats::{RecordingFormat, RecordingInput, TableInfo};
+use crate::recording::intake::{IntakeFlow, SampleIntake};
+use crate::recording::notes::RecordingNote;
+use crate::recording::tables::{ColumnInfo, find_time_range};
+use crate::recording::{ReadOptions, SignalRecording};
+use crate::words::backquoted_list;
 
 /// More columns than any recording has.
 const MOST_COLUMNS: usize = 1 << 17;
 
 /// What `save -v7` and `-v6` write.
-pub(crate) struct Matlab5;
+pub(crate) struct Matlab5Format;
 
-impl Format for Matlab5 {
+impl RecordingFormat for Matlab5Format {
     fn suffix(&self) -> &'static str {
         " (MATLAB)"
     }
@@ -31,27 +31,27 @@ impl Format for Matlab5 {
         &["mat"]
     }
 
-    fn begins(&self, first: &[u8]) -> bool {
+    fn has_signature(&self, first: &[u8]) -> bool {
         first.starts_with(b"MATLAB 5.0 MAT-file")
     }
 
     fn read(
         &self,
-        input: Input<'_>,
+        input: RecordingInput<'_>,
         file: &str,
         options: &ReadOptions,
-    ) -> Result<Recording, Fault> {
+    ) -> Result<SignalRecording, RecordingFault> {
         read(input.seekable()?, file, options)
     }
 
-    fn names(&self, input: Input<'_>) -> Result<Vec<String>, Fault> {
-        Ok(Columns::new(&open(input.seekable()?)?)?.names())
+    fn names(&self, input: RecordingInput<'_>) -> Result<Vec<String>, RecordingFault> {
+        Ok(MatlabColumns::new(&open(input.seekable()?)?)?.names())
     }
 
-    fn tables(&self, input: Input<'_>) -> Result<Vec<TableInfo>, Fault> {
+    fn tables(&self, input: RecordingInput<'_>) -> Result<Vec<TableInfo>, RecordingFault> {
         let mut stream = input.seekable()?;
-        let columns = Columns::new(&open(&mut stream)?)?;
-        let info = |column: &Column| ColumnInfo {
+        let columns = MatlabColumns::new(&open(&mut stream)?)?;
+        let info = |column: &MatlabColumn| ColumnInfo {
             name: column.name.clone(),
             kind: if column.is_complex {
                 "complex number".to_owned()
@@ -62,26 +62,26 @@ impl Format for Matlab5 {
         Ok(vec![TableInfo {
             name: String::new(),
             kind: String::new(),
-            columns: columns.sound.iter().map(info).collect(),
+            columns: columns.consistent.iter().map(info).collect(),
             samples: columns.samples,
-            time: found_time(&columns.names(), |name| {
+            time: find_time_range(&columns.names(), |name| {
                 stream.rewind().ok()?;
-                read(&mut stream, "", &ReadOptions::only(name)).ok()
+                read(&mut stream, "", &ReadOptions::single_column(name)).ok()
             }),
             remark: (!columns.others.is_empty())
-                .then(|| format!("left aside, of another length: {}", list(&columns.others))),
+                .then(|| format!("left aside, of another length: {}", backquoted_list(&columns.others))),
         }])
     }
 }
 
-fn read(stream: impl Read + Seek, file: &str, options: &ReadOptions) -> Result<Recording, Fault> {
+fn read(stream: impl Read + Seek, file: &str, options: &ReadOptions) -> Result<SignalRecording, RecordingFault> {
     let mut arrays = open(stream)?;
-    let columns = Columns::new(&arrays)?;
-    let mut intake = Intake::new(columns.names(), options)?;
+    let columns = MatlabColumns::new(&arrays)?;
+    let mut intake = SampleIntake::new(columns.names(), options)?;
     if !columns.others.is_empty() {
-        intake.note(Note::info(format!(
+        intake.note(RecordingNote::info(format!(
             "{} of {file} {} not of as many samples as the others, and left aside.",
-            list(&columns.others),
+            backquoted_list(&columns.others),
             if columns.others.len() == 1 {
                 "is"
             } else {
@@ -89,34 +89,34 @@ fn read(stream: impl Read + Seek, file: &str, options: &ReadOptions) -> Result<R
             },
         )));
     }
-    let mut wanted = vec![false; arrays.found.len()];
-    for (place, column) in columns.sound.iter().enumerate() {
-        wanted[column.array] |= intake.reads(place) && !column.is_complex;
+    let mut wanted = vec![false; arrays.arrays.len()];
+    for (place, column) in columns.consistent.iter().enumerate() {
+        wanted[column.array] |= intake.is_place_needed(place) && !column.is_complex;
     }
     // An array is read as a whole, and its numbers are kept twice until all are taken in.
     let sizes = arrays
-        .found
+        .arrays
         .iter()
         .zip(&wanted)
         .filter(|(_, wanted)| **wanted);
     let numbers: usize = sizes
         .map(|(array, _)| array.size.iter().product::<usize>())
         .sum();
-    if numbers > options.most_numbers / 2 {
-        return Err(broken(
+    if numbers > options.max_numbers / 2 {
+        return Err(format_fault(
             "it is too large to be read as a whole; save it as CSV or Parquet, of which parts can be read",
         ));
     }
     let mut values = Vec::new();
-    for (array, wanted) in arrays.found.clone().iter().zip(wanted) {
+    for (array, wanted) in arrays.arrays.clone().iter().zip(wanted) {
         values.push(if wanted {
-            arrays.numbers(array).map_err(|error| unreadable(&error))?
+            arrays.read_numbers(array).map_err(|error| unreadable_fault(&error))?
         } else {
             Vec::new()
         });
     }
     let value = |place: usize, k: usize| {
-        let column = &columns.sound[place];
+        let column = &columns.consistent[place];
         let numbers = &values[column.array];
         numbers
             .get(column.first + k * column.step)
@@ -126,40 +126,40 @@ fn read(stream: impl Read + Seek, file: &str, options: &ReadOptions) -> Result<R
     let mut sample = Vec::new();
     for k in 0..columns.samples {
         sample.clear();
-        sample.extend((0..columns.sound.len()).map(|place| {
-            if columns.sound[place].is_complex {
-                Field::Text
+        sample.extend((0..columns.consistent.len()).map(|place| {
+            if columns.consistent[place].is_complex {
+                SampleField::Text
             } else {
-                Field::finite(value(place, k))
+                SampleField::finite(value(place, k))
             }
         }));
         let text = |place: usize| {
-            if columns.sound[place].is_complex {
+            if columns.consistent[place].is_complex {
                 "a complex number".to_owned()
             } else {
                 value(place, k).to_string()
             }
         };
-        if intake.take(k as u64 + 1, &sample, &text)? == Flow::Stop {
+        if intake.take_sample(k as u64 + 1, &sample, &text)? == IntakeFlow::Stop {
             break;
         }
     }
     intake.finish(file)
 }
 
-fn open<R: Read + Seek>(stream: R) -> Result<Arrays<BufReader<R>>, Fault> {
-    Arrays::new(BufReader::new(stream)).map_err(|error| unreadable(&error))
+fn open<R: Read + Seek>(stream: R) -> Result<MatlabArrayFile<BufReader<R>>, RecordingFault> {
+    MatlabArrayFile::new(BufReader::new(stream)).map_err(|error| unreadable_fault(&error))
 }
 
 /// The columns of a file, all of one length, and the names of what is none.
-struct Columns {
+struct MatlabColumns {
     samples: usize,
-    sound: Vec<Column>,
+    consistent: Vec<MatlabColumn>,
     others: Vec<String>,
 }
 
 /// A column, and where its numbers stand: from `first` on, `step` apart.
-struct Column {
+struct MatlabColumn {
     name: String,
     array: usize,
     first: usize,
@@ -167,25 +167,25 @@ struct Column {
     is_complex: bool,
 }
 
-impl Columns {
-    fn new<R>(file: &Arrays<R>) -> Result<Self, Fault> {
+impl MatlabColumns {
+    fn new<R>(file: &MatlabArrayFile<R>) -> Result<Self, RecordingFault> {
         // The number of samples is the longest side that any array has.
-        let sides = file.found.iter().flat_map(|array| &array.size);
+        let sides = file.arrays.iter().flat_map(|array| &array.size);
         let samples = sides.copied().max().unwrap_or(0);
         if samples == 0 {
-            return Err(broken(
+            return Err(format_fault(
                 "it holds no numeric arrays at its top level; structures and tables cannot be read: save their fields as \
                  variables of their own, or as CSV or Parquet",
             ));
         }
         let mut columns = Self {
             samples,
-            sound: Vec::new(),
+            consistent: Vec::new(),
             others: Vec::new(),
         };
-        for (i, array) in file.found.iter().enumerate() {
+        for (i, array) in file.arrays.iter().enumerate() {
             let (rows, cols) = match array.size.as_slice() {
-                [rows, cols] if array.is_sound => (*rows, *cols),
+                [rows, cols] if array.is_consistent => (*rows, *cols),
                 _ => (0, 0),
             };
             if rows != samples && cols != samples {
@@ -194,11 +194,11 @@ impl Columns {
             }
             let is_upright = rows == samples;
             let width = if is_upright { cols } else { rows };
-            if columns.sound.len() + width > MOST_COLUMNS {
-                return Err(broken("it has more columns than any recording"));
+            if columns.consistent.len() + width > MOST_COLUMNS {
+                return Err(format_fault("it has more columns than any recording"));
             }
             for j in 0..width {
-                columns.sound.push(Column {
+                columns.consistent.push(MatlabColumn {
                     name: if width == 1 {
                         array.name.clone()
                     } else {
@@ -215,22 +215,22 @@ impl Columns {
     }
 
     fn names(&self) -> Vec<String> {
-        self.sound
+        self.consistent
             .iter()
             .map(|column| column.name.clone())
             .collect()
     }
 }
 
-fn broken(says: impl Into<String>) -> Fault {
-    Fault::Format {
+fn format_fault(says: impl Into<String>) -> RecordingFault {
+    RecordingFault::Format {
         format: "a MATLAB file",
-        says: says.into(),
+        message: says.into(),
     }
 }
 
-fn unreadable(error: &std::io::Error) -> Fault {
-    broken(format!(
+fn unreadable_fault(error: &std::io::Error) -> RecordingFault {
+    format_fault(format!(
         "it cannot be read: {error}; save it again with `-v7`"
     ))
 }

@@ -23,13 +23,13 @@ const CHUNK: usize = 1 << 16;
 
 /// A numeric array of a file.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Array {
+pub(super) struct MatlabArray {
     /// What the file calls it.
     pub(super) name: String,
     /// Rows, columns and whatever further sides it has.
     pub(super) size: Vec<usize>,
     /// Whether its numbers are as many as its size says.
-    pub(super) is_sound: bool,
+    pub(super) is_consistent: bool,
     /// Whether its numbers have imaginary parts, which stand behind the real ones.
     pub(super) is_complex: bool,
     /// Where its element begins in the file, and how long that is.
@@ -39,19 +39,19 @@ pub(super) struct Array {
 }
 
 /// A file whose elements are known.
-pub(super) struct Arrays<R> {
+pub(super) struct MatlabArrayFile<R> {
     stream: R,
     is_little: bool,
     /// The numeric arrays in the file's order.
-    pub(super) found: Vec<Array>,
+    pub(super) arrays: Vec<MatlabArray>,
 }
 
-impl<R: Read + Seek> Arrays<R> {
+impl<R: Read + Seek> MatlabArrayFile<R> {
     /// Looks through a file; fails when it breaks off or is no such file.
     pub(super) fn new(mut stream: R) -> io::Result<Self> {
         let end = stream.seek(SeekFrom::End(0))?;
         if end < HEADER {
-            return Err(broken_off());
+            return Err(truncated_error());
         }
         stream.seek(SeekFrom::Start(HEADER - 4))?;
         let mut version = [0; 4];
@@ -65,20 +65,20 @@ impl<R: Read + Seek> Arrays<R> {
         let mut at = HEADER;
         while at + 8 <= end {
             stream.seek(SeekFrom::Start(at))?;
-            let tag = Element::new(&mut stream, is_little).tag()?;
+            let tag = MatlabElementReader::new(&mut stream, is_little).read_tag()?;
             let is_compressed = tag.kind == COMPRESSED;
             let length = u64::from(tag.length);
             at += 8;
             if length > end - at {
-                return Err(broken_off());
+                return Err(truncated_error());
             }
             if is_compressed || tag.kind == MATRIX {
-                let place = Place {
+                let place = MatlabElementPlace {
                     at,
                     length,
                     is_compressed,
                 };
-                arrays.extend(place.open(&mut stream, is_little, |element| element.array(&place))?);
+                arrays.extend(place.open(&mut stream, is_little, |element| element.read_array(&place))?);
             }
             at += if is_compressed {
                 length
@@ -87,89 +87,89 @@ impl<R: Read + Seek> Arrays<R> {
             };
         }
         if at != end {
-            return Err(broken_off());
+            return Err(truncated_error());
         }
         Ok(Self {
             stream,
             is_little,
-            found: arrays,
+            arrays,
         })
     }
 
     /// The numbers of an array that is sound, column by column.
-    pub(super) fn numbers(&mut self, array: &Array) -> io::Result<Vec<f64>> {
-        let place = Place {
+    pub(super) fn read_numbers(&mut self, array: &MatlabArray) -> io::Result<Vec<f64>> {
+        let place = MatlabElementPlace {
             at: array.at,
             length: array.length,
             is_compressed: array.is_compressed,
         };
         place.open(&mut self.stream, self.is_little, |element| {
-            element.array(&place)?;
-            let tag = element.data.ok_or_else(broken_off)?;
-            element.numbers(&tag)
+            element.read_array(&place)?;
+            let tag = element.data.ok_or_else(truncated_error)?;
+            element.read_numbers(&tag)
         })
     }
 }
 
 /// Where an element stands.
-struct Place {
+struct MatlabElementPlace {
     at: u64,
     length: u64,
     is_compressed: bool,
 }
 
-impl Place {
+impl MatlabElementPlace {
     /// Reads an element from its inside on, unpacked.
     fn open<T>(
         &self,
         stream: &mut (impl Read + Seek),
         is_little: bool,
-        read: impl FnOnce(&mut Element<'_>) -> io::Result<T>,
+        read: impl FnOnce(&mut MatlabElementReader<'_>) -> io::Result<T>,
     ) -> io::Result<T> {
         stream.seek(SeekFrom::Start(self.at))?;
         let mut inside = stream.take(self.length);
         if !self.is_compressed {
-            return read(&mut Element::new(&mut inside, is_little));
+            return read(&mut MatlabElementReader::new(&mut inside, is_little));
         }
         let mut unpacked = ZlibDecoder::new(inside);
-        let mut element = Element::new(&mut unpacked, is_little);
+        let mut element = MatlabElementReader::new(&mut unpacked, is_little);
         // The tag of the one element within.
-        if element.tag()?.kind != MATRIX {
-            element.is_other = true;
+        if element.read_tag()?.kind != MATRIX {
+            element.is_not_array = true;
         }
         read(&mut element)
     }
 }
 
 /// Bytes of an element, read in order.
-struct Element<'a> {
+struct MatlabElementReader<'a> {
     stream: &'a mut dyn Read,
     is_little: bool,
     /// Whether it is known to be no array.
-    is_other: bool,
+    is_not_array: bool,
     /// The tag of the real numbers, once the stream stands before them.
-    data: Option<Tag>,
+    data: Option<MatlabTag>,
 }
 
 /// Type and length of an element, and the bytes that fill it up behind.
 #[derive(Clone, Copy)]
-struct Tag {
+struct MatlabTag {
     kind: u32,
     length: u32,
     padding: u32,
 }
 
-impl<'a> Element<'a> {
+impl<'a> MatlabElementReader<'a> {
     fn new(stream: &'a mut dyn Read, is_little: bool) -> Self {
         Self {
             stream,
             is_little,
-            is_other: false,
+            is_not_array: false,
             data: None,
         }
     }
 
-    fn word(&mut self) -> io::Result<u32> {
+    fn read_word(&mut self) -> io::Result<u32> {
         let mut bytes = [0; 4];
         self.stream.read_exact(&mut bytes)?;
         Ok(if self.is_little {
@@ -180,12 +180,12 @@ impl<'a> Element<'a> {
     }
 
     /// A tag; short elements of up to four bytes have both in one word.
-    fn tag(&mut self) -> io::Result<Tag> {
-        let first = self.word()?;
+    fn read_tag(&mut self) -> io::Result<MatlabTag> {
+        let first = self.read_word()?;
         if first >> 16 == 0 {
-            let length = self.word()?;
+            let length = self.read_word()?;
             let padding = length.wrapping_neg() % 8;
-            return Ok(Tag {
+            return Ok(MatlabTag {
                 kind: first,
                 length,
                 padding,
@@ -195,7 +195,7 @@ impl<'a> Element<'a> {
         let padding = 4_u32
             .checked_sub(length)
             .ok_or_else(|| io::Error::other("a short element is too long"))?;
-        Ok(Tag {
+        Ok(MatlabTag {
             kind: first & 0xffff,
             length,
             padding,
@@ -203,7 +203,7 @@ impl<'a> Element<'a> {
     }
 
     /// The bytes of an element that has at most so many.
-    fn bytes(&mut self, tag: Tag, most: u32) -> io::Result<Vec<u8>> {
+    fn read_bytes(&mut self, tag: MatlabTag, most: u32) -> io::Result<Vec<u8>> {
         if tag.length > most {
             return Err(io::Error::other("a name or a size is too long"));
         }
@@ -214,23 +214,23 @@ impl<'a> Element<'a> {
     }
 
     /// What an array says of itself, up to its numbers; none of what is not numeric, such as texts and structures.
-    fn array(&mut self, place: &Place) -> io::Result<Option<Array>> {
-        if self.is_other {
+    fn read_array(&mut self, place: &MatlabElementPlace) -> io::Result<Option<MatlabArray>> {
+        if self.is_not_array {
             return Ok(None);
         }
-        let flags = self.tag()?;
+        let flags = self.read_tag()?;
         if flags.length != 8 {
             return Err(io::Error::other("an array has no class"));
         }
-        let class = self.word()?;
-        self.word()?;
+        let class = self.read_word()?;
+        self.read_word()?;
         // Classes of numbers go from `double` to `uint64`.
         if !(6..=15).contains(&(class & 0xff)) {
             return Ok(None);
         }
         let is_complex = class & 0x0800 != 0;
-        let sides = self.tag()?;
-        let sides = self.bytes(sides, 4 * MOST_SIDES)?;
+        let sides = self.read_tag()?;
+        let sides = self.read_bytes(sides, 4 * MOST_SIDES)?;
         let size = sides.chunks_exact(4).map(|side| {
             let bytes = [side[0], side[1], side[2], side[3]];
             let side = if self.is_little {
@@ -241,17 +241,17 @@ impl<'a> Element<'a> {
             usize::try_from(side).map_err(|_| io::Error::other("an array has a negative size"))
         });
         let size = size.collect::<io::Result<Vec<usize>>>()?;
-        let name = self.tag()?;
-        let name = self.bytes(name, LONGEST_NAME)?;
-        let data = self.tag()?;
+        let name = self.read_tag()?;
+        let name = self.read_bytes(name, LONGEST_NAME)?;
+        let data = self.read_tag()?;
         self.data = Some(data);
         let numbers = size
             .iter()
             .try_fold(1, |n: usize, side| n.checked_mul(*side));
-        let bytes = numbers.and_then(|n| n.checked_mul(width(data.kind)?));
-        Ok(Some(Array {
+        let bytes = numbers.and_then(|n| n.checked_mul(number_width(data.kind)?));
+        Ok(Some(MatlabArray {
             name: String::from_utf8_lossy(&name).into_owned(),
-            is_sound: bytes == Some(data.length as usize),
+            is_consistent: bytes == Some(data.length as usize),
             is_complex,
             size,
             at: place.at,
@@ -261,8 +261,8 @@ impl<'a> Element<'a> {
     }
 
     /// The numbers of an element, whatever type they are kept as.
-    fn numbers(&mut self, tag: &Tag) -> io::Result<Vec<f64>> {
-        let width = width(tag.kind).ok_or_else(|| io::Error::other("it holds no numbers"))?;
+    fn read_numbers(&mut self, tag: &MatlabTag) -> io::Result<Vec<f64>> {
+        let width = number_width(tag.kind).ok_or_else(|| io::Error::other("it holds no numbers"))?;
         let mut numbers = Vec::new();
         let mut left = tag.length as usize;
         let mut chunk = vec![0; CHUNK.min(left)];
@@ -272,7 +272,7 @@ impl<'a> Element<'a> {
             if !self.is_little {
                 chunk.chunks_exact_mut(width).for_each(<[u8]>::reverse);
             }
-            push(tag.kind, chunk, &mut numbers);
+            push_numbers(tag.kind, chunk, &mut numbers);
             left -= chunk.len();
         }
         Ok(numbers)
@@ -280,7 +280,7 @@ impl<'a> Element<'a> {
 }
 
 /// Bytes of a number of this type; none of types that are no numbers.
-fn width(kind: u32) -> Option<usize> {
+fn number_width(kind: u32) -> Option<usize> {
     match kind {
         1 | 2 => Some(1),
         3 | 4 => Some(2),
@@ -291,7 +291,7 @@ fn width(kind: u32) -> Option<usize> {
 }
 
 /// Adds numbers of a type from their bytes, the least first.
-fn push(kind: u32, bytes: &[u8], numbers: &mut Vec<f64>) {
+fn push_numbers(kind: u32, bytes: &[u8], numbers: &mut Vec<f64>) {
     macro_rules! of {
         ($number:ty, $float:expr) => {{
             let (all, _) = bytes.as_chunks::<{ size_of::<$number>() }>();
@@ -312,6 +312,6 @@ fn push(kind: u32, bytes: &[u8], numbers: &mut Vec<f64>) {
     }
 }
 
-fn broken_off() -> io::Error {
+fn truncated_error() -> io::Error {
     io::Error::other("it breaks off within a variable")
 }

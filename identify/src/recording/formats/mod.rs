@@ -17,27 +17,27 @@ mod sqlite;
 use std::fs::File;
 use std::io::{Cursor, Read, Seek};
 
-use crate::recording::error::Fault;
+use crate::recording::error::RecordingFault;
 use crate::recording::tables::TableInfo;
-use crate::recording::{ReadOptions, Recording};
+use crate::recording::{ReadOptions, SignalRecording};
 
 /// All formats, in the order in which they are asked whether a file is theirs; text comes last and takes what is left.
-pub(crate) const FORMATS: [&dyn Format; 8] = [
-    &parquet::Parquet,
-    &matlab::Matlab5,
-    &hdf5::Hdf5,
-    &mcap::Mcap,
-    &rosbag::Rosbag2,
-    &packing::Packed(packing::Packing::Gzip),
-    &packing::Packed(packing::Packing::Zstd),
-    &csv::Csv,
+pub(crate) const FORMATS: [&dyn RecordingFormat; 8] = [
+    &parquet::ParquetFormat,
+    &matlab::Matlab5Format,
+    &hdf5::Hdf5Format,
+    &mcap::McapFormat,
+    &rosbag::Rosbag2Format,
+    &packing::CompressedFormat(packing::CompressionMethod::Gzip),
+    &packing::CompressedFormat(packing::CompressionMethod::Zstd),
+    &csv::CsvFormat,
 ];
 
 /// As many bytes from the beginning of a file as tell its format.
-pub(crate) const TELLING_BYTES: usize = 32;
+pub(crate) const SIGNATURE_BYTES: usize = 32;
 
 /// How files of one kind are known and read.
-pub(crate) trait Format: Sync {
+pub(crate) trait RecordingFormat: Sync {
     /// What follows the name of a recording that came without a file, so that one sees what it is taken for.
     fn suffix(&self) -> &'static str {
         ""
@@ -54,34 +54,34 @@ pub(crate) trait Format: Sync {
     }
 
     /// Whether a file of another format is in it.
-    fn is_packed(&self) -> bool {
+    fn is_compressed(&self) -> bool {
         false
     }
 
     /// Whether a file that begins with these bytes, [`TELLING_BYTES`] of them if it has as many, is of this kind.
-    fn begins(&self, first: &[u8]) -> bool;
+    fn has_signature(&self, first: &[u8]) -> bool;
 
     /// Reads a recording; `file` is what messages call it.
-    fn read(&self, input: Input<'_>, file: &str, options: &ReadOptions)
-    -> Result<Recording, Fault>;
+    fn read(&self, input: RecordingInput<'_>, file: &str, options: &ReadOptions)
+    -> Result<SignalRecording, RecordingFault>;
 
     /// Names of the columns as the file has them.
-    fn names(&self, input: Input<'_>) -> Result<Vec<String>, Fault>;
+    fn names(&self, input: RecordingInput<'_>) -> Result<Vec<String>, RecordingFault>;
 
     /// What it holds, table by table.
-    fn tables(&self, input: Input<'_>) -> Result<Vec<TableInfo>, Fault>;
+    fn tables(&self, input: RecordingInput<'_>) -> Result<Vec<TableInfo>, RecordingFault>;
 }
 
 /// The format of what begins with these bytes.
-pub(crate) fn format_of(first: &[u8]) -> &'static dyn Format {
+pub(crate) fn format_of(first: &[u8]) -> &'static dyn RecordingFormat {
     FORMATS
         .into_iter()
-        .find(|format| format.begins(first))
-        .unwrap_or(&csv::Csv)
+        .find(|format| format.has_signature(first))
+        .unwrap_or(&csv::CsvFormat)
 }
 
 /// Where a format reads from.
-pub(crate) enum Input<'a> {
+pub(crate) enum RecordingInput<'a> {
     /// A file, at its beginning.
     File(File),
     /// What is in memory.
@@ -95,7 +95,7 @@ pub(crate) trait ReadSeek: Read + Seek {}
 
 impl<T: Read + Seek> ReadSeek for T {}
 
-impl<'a> Input<'a> {
+impl<'a> RecordingInput<'a> {
     /// For those who read from the beginning to the end.
     pub(crate) fn stream(self) -> Box<dyn Read + 'a> {
         match self {
@@ -106,11 +106,11 @@ impl<'a> Input<'a> {
     }
 
     /// For those who go to and fro; what can be looked at once only is taken into memory.
-    pub(crate) fn seekable(self) -> Result<Box<dyn ReadSeek + 'a>, Fault> {
+    pub(crate) fn seekable(self) -> Result<Box<dyn ReadSeek + 'a>, RecordingFault> {
         Ok(match self {
             Self::File(file) => Box::new(file),
             Self::Bytes(bytes) => Box::new(Cursor::new(bytes)),
-            Self::Stream(stream) => Box::new(Cursor::new(all_of(stream)?)),
+            Self::Stream(stream) => Box::new(Cursor::new(read_all(stream)?)),
         })
     }
 }
@@ -119,8 +119,8 @@ impl<'a> Input<'a> {
 pub(crate) const LONGEST_STREAM: u64 = 3 << 27;
 
 /// All bytes of a stream, which must have an end.
-pub(crate) fn all_of(stream: impl Read) -> Result<Vec<u8>, Fault> {
-    let unreadable = |reason: String| Fault::Unreadable { reason };
+pub(crate) fn read_all(stream: impl Read) -> Result<Vec<u8>, RecordingFault> {
+    let unreadable = |reason: String| RecordingFault::Unreadable { reason };
     let mut bytes = Vec::new();
     let read = stream.take(LONGEST_STREAM + 1).read_to_end(&mut bytes);
     read.map_err(|error| unreadable(error.to_string()))?;

@@ -10,19 +10,19 @@ use flate2::read::MultiGzDecoder;
 use ruzstd::decoding::errors::{FrameDecoderError, ReadFrameHeaderError};
 use ruzstd::decoding::{BlockDecodingStrategy, FrameDecoder};
 
-use crate::recording::error::Fault;
-use crate::recording::formats::{Format, Input, TELLING_BYTES, TableInfo, format_of};
-use crate::recording::{ReadOptions, Recording};
+use crate::recording::error::RecordingFault;
+use crate::recording::formats::{RecordingFormat, RecordingInput, SIGNATURE_BYTES, TableInfo, format_of};
+use crate::recording::{ReadOptions, SignalRecording};
 
 /// The longest stretch of bytes that zstd may look back over; its own program allows as much.
 const LONGEST_WINDOW: u64 = 128 << 20;
 /// Up to here what is packed may grow as it likes, and beyond it so many times.
-const HARMLESS: u64 = 64 << 20;
+const UNCHECKED_GROWTH: u64 = 64 << 20;
 const MOST_GROWTH: u64 = 200;
 
 /// Fails when a file grows as no recording does.
 pub(super) fn check_growth(packed: u64, unpacked: u64) -> io::Result<()> {
-    if unpacked > HARMLESS.max(MOST_GROWTH.saturating_mul(packed)) {
+    if unpacked > UNCHECKED_GROWTH.max(MOST_GROWTH.saturating_mul(packed)) {
         return Err(io::Error::other(
             "it unpacks to more than two hundred times its size, as no recording does",
         ));
@@ -32,28 +32,28 @@ pub(super) fn check_growth(packed: u64, unpacked: u64) -> io::Result<()> {
 
 /// The ways in which bytes are packed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Packing {
+pub(super) enum CompressionMethod {
     Gzip,
     Zstd,
     Brotli,
     Lz4,
 }
 
-impl Packing {
+impl CompressionMethod {
     /// The bytes of a stream, unpacked.
-    pub(super) fn reader<'a>(self, packed: impl Read + 'a) -> Box<dyn Read + 'a> {
+    pub(super) fn decompressing_reader<'a>(self, packed: impl Read + 'a) -> Box<dyn Read + 'a> {
         match self {
             Self::Gzip => Box::new(MultiGzDecoder::new(packed)),
-            Self::Zstd => Box::new(Zstd::new(packed)),
+            Self::Zstd => Box::new(ZstdReader::new(packed)),
             Self::Brotli => Box::new(brotli_decompressor::Decompressor::new(packed, 1 << 16)),
             Self::Lz4 => Box::new(lz4_flex::frame::FrameDecoder::new(packed)),
         }
     }
 
     /// Bytes unpacked; fails when they are more than `most`.
-    pub(super) fn unpacked(self, packed: &[u8], most: u64) -> io::Result<Vec<u8>> {
+    pub(super) fn decompress(self, packed: &[u8], most: u64) -> io::Result<Vec<u8>> {
         let mut bytes = Vec::new();
-        self.reader(packed)
+        self.decompressing_reader(packed)
             .take(most.saturating_add(1))
             .read_to_end(&mut bytes)?;
         if bytes.len() as u64 > most {
@@ -73,13 +73,13 @@ impl Packing {
 }
 
 /// Frames of zstd, one behind the other, as its program writes them.
-struct Zstd<R> {
+struct ZstdReader<R> {
     packed: BufReader<R>,
     decoder: FrameDecoder,
     is_in_frame: bool,
 }
 
-impl<R: Read> Zstd<R> {
+impl<R: Read> ZstdReader<R> {
     fn new(packed: R) -> Self {
         let mut decoder = FrameDecoder::new();
         decoder.set_max_window_size(LONGEST_WINDOW);
@@ -121,7 +121,7 @@ impl<R: Read> Zstd<R> {
     }
 }
 
-impl<R: Read> Read for Zstd<R> {
+impl<R: Read> Read for ZstdReader<R> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         if buffer.is_empty() {
             return Ok(0);
@@ -147,7 +147,7 @@ impl<R: Read> Read for Zstd<R> {
 }
 
 /// A stream that is not allowed to grow without bounds.
-struct Bounded<R> {
+struct BoundedReader<R> {
     unpacked: R,
     so_far: u64,
     /// Bytes that it was made of.
@@ -155,12 +155,12 @@ struct Bounded<R> {
 }
 
 /// A stream whose bytes are counted.
-struct Counted<R> {
+struct CountingReader<R> {
     stream: R,
     count: Rc<Cell<u64>>,
 }
 
-impl<R: Read> Read for Counted<R> {
+impl<R: Read> Read for CountingReader<R> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         let n = self.stream.read(buffer)?;
         self.count.set(self.count.get() + n as u64);
@@ -168,7 +168,7 @@ impl<R: Read> Read for Counted<R> {
     }
 }
 
-impl<R: Read> Read for Bounded<R> {
+impl<R: Read> Read for BoundedReader<R> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         let n = self.unpacked.read(buffer)?;
         self.so_far += n as u64;
@@ -178,29 +178,29 @@ impl<R: Read> Read for Bounded<R> {
 }
 
 /// A file that is packed as a whole.
-pub(super) struct Packed(pub(super) Packing);
+pub(super) struct CompressedFormat(pub(super) CompressionMethod);
 
-impl Packed {
+impl CompressedFormat {
     /// What reads the inside says that it cannot go on; here it is clear why.
-    fn fault(&self, fault: Fault) -> Fault {
+    fn explain_fault(&self, fault: RecordingFault) -> RecordingFault {
         match fault {
-            Fault::Unreadable { reason } => self.not_unpacked(&reason),
+            RecordingFault::Unreadable { reason } => self.decompression_fault(&reason),
             other => other,
         }
     }
 
-    fn not_unpacked(&self, reason: &str) -> Fault {
-        Fault::Format {
+    fn decompression_fault(&self, reason: &str) -> RecordingFault {
+        RecordingFault::Format {
             format: self.0.name(),
-            says: format!("it cannot be unpacked: {reason}; is it complete?"),
+            message: format!("it cannot be unpacked: {reason}; is it complete?"),
         }
     }
 
     /// What is in the file, by its first bytes, and all of them.
-    fn inside<'a>(&self, input: Input<'a>) -> Result<(&'static dyn Format, Input<'a>), Fault> {
+    fn open_content<'a>(&self, input: RecordingInput<'a>) -> Result<(&'static dyn RecordingFormat, RecordingInput<'a>), RecordingFault> {
         let packed = Rc::new(Cell::new(0));
-        let mut stream = Bounded {
-            unpacked: self.0.reader(Counted {
+        let mut stream = BoundedReader {
+            unpacked: self.0.decompressing_reader(CountingReader {
                 stream: BufReader::with_capacity(1 << 16, input.stream()),
                 count: packed.clone(),
             }),
@@ -209,24 +209,24 @@ impl Packed {
         };
         let mut first = Vec::new();
         let head = (&mut stream)
-            .take(TELLING_BYTES as u64)
+            .take(SIGNATURE_BYTES as u64)
             .read_to_end(&mut first);
-        head.map_err(|error| self.not_unpacked(&error.to_string()))?;
+        head.map_err(|error| self.decompression_fault(&error.to_string()))?;
         let format = format_of(&first);
-        if format.is_packed() {
-            return Err(Fault::Format {
+        if format.is_compressed() {
+            return Err(RecordingFault::Format {
                 format: self.0.name(),
-                says: "what is in it is packed again; unpack it once".to_owned(),
+                message: "what is in it is packed again; unpack it once".to_owned(),
             });
         }
         Ok((
             format,
-            Input::Stream(Box::new(io::Cursor::new(first).chain(stream))),
+            RecordingInput::Stream(Box::new(io::Cursor::new(first).chain(stream))),
         ))
     }
 }
 
-impl Format for Packed {
+impl RecordingFormat for CompressedFormat {
     fn extensions(&self) -> &'static [&'static str] {
         &["gz", "zst"]
     }
@@ -235,42 +235,42 @@ impl Format for Packed {
         false
     }
 
-    fn is_packed(&self) -> bool {
+    fn is_compressed(&self) -> bool {
         true
     }
 
-    fn begins(&self, first: &[u8]) -> bool {
+    fn has_signature(&self, first: &[u8]) -> bool {
         match self.0 {
-            Packing::Gzip => first.starts_with(&[0x1F, 0x8B]),
-            Packing::Zstd => {
+            CompressionMethod::Gzip => first.starts_with(&[0x1F, 0x8B]),
+            CompressionMethod::Zstd => {
                 // A frame, or one to be passed over in front of it.
                 first.starts_with(&[0x28, 0xB5, 0x2F, 0xFD])
                     || (first.len() > 3 && first[0] >> 4 == 5 && first[1..4] == [0x2A, 0x4D, 0x18])
             }
-            Packing::Brotli | Packing::Lz4 => false,
+            CompressionMethod::Brotli | CompressionMethod::Lz4 => false,
         }
     }
 
     fn read(
         &self,
-        input: Input<'_>,
+        input: RecordingInput<'_>,
         file: &str,
         options: &ReadOptions,
-    ) -> Result<Recording, Fault> {
-        let (format, inside) = self.inside(input)?;
+    ) -> Result<SignalRecording, RecordingFault> {
+        let (format, inside) = self.open_content(input)?;
         let found = format.read(inside, file, options);
-        found.map_err(|fault| self.fault(fault))
+        found.map_err(|fault| self.explain_fault(fault))
     }
 
-    fn names(&self, input: Input<'_>) -> Result<Vec<String>, Fault> {
-        let (format, inside) = self.inside(input)?;
+    fn names(&self, input: RecordingInput<'_>) -> Result<Vec<String>, RecordingFault> {
+        let (format, inside) = self.open_content(input)?;
         let found = format.names(inside);
-        found.map_err(|fault| self.fault(fault))
+        found.map_err(|fault| self.explain_fault(fault))
     }
 
-    fn tables(&self, input: Input<'_>) -> Result<Vec<TableInfo>, Fault> {
-        let (format, inside) = self.inside(input)?;
+    fn tables(&self, input: RecordingInput<'_>) -> Result<Vec<TableInfo>, RecordingFault> {
+        let (format, inside) = self.open_content(input)?;
         let found = format.tables(inside);
-        found.map_err(|fault| self.fault(fault))
+        found.map_err(|fault| self.explain_fault(fault))
     }
 }

@@ -12,7 +12,7 @@ use flate2::read::MultiGzDecoder;
 use parquet::column::page::{Page, PageMetadata, PageReader};
 use parquet::errors::{ParquetError, Result};
 
-use crate::recording::formats::packing::Packing;
+use crate::recording::formats::packing::CompressionMethod;
 
 /// The largest page that is unpacked, bytes; writers make pages of one million.
 const LARGEST_PAGE: u64 = 128 << 20;
@@ -24,9 +24,9 @@ const DEEPEST: usize = 16;
 
 /// How much pages may grow when they are unpacked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Growth {
+pub(super) enum PageGrowth {
     /// To the size that the header says, which whoever unpacks them holds to.
-    AsSaid,
+    Declared,
     /// To whatever is in it.
     Gzip,
     /// To whatever is in it, up to 255 times.
@@ -36,23 +36,23 @@ pub(super) enum Growth {
 /// Looks through the pages of a column that is `length` bytes long; the size of the largest unpacked.
 ///
 /// Fails when a page is larger than any that makes sense, or does not keep to its header.
-pub(super) fn largest(stream: impl Read, length: u64, growth: Growth) -> io::Result<u64> {
+pub(super) fn largest_page(stream: impl Read, length: u64, growth: PageGrowth) -> io::Result<u64> {
     let mut stream = BufReader::with_capacity(1 << 16, stream.take(length)).take(length);
     let mut largest = 0;
     while stream.limit() > 0 {
-        let page = Header::read(&mut stream)?;
+        let page = PageSizes::read(&mut stream)?;
         if page.packed > stream.limit() {
             return Err(io::Error::other("a page is longer than its column"));
         }
         // A dictionary's numbers have four bytes at least.
         let is_too_large = page.unpacked > LARGEST_PAGE
             || page.words.saturating_mul(4) > page.unpacked
-            || (growth == Growth::OldLz4 && page.packed > LARGEST_OLD_LZ4);
+            || (growth == PageGrowth::OldLz4 && page.packed > LARGEST_OLD_LZ4);
         if is_too_large {
             return Err(io::Error::other("a page would take too much memory"));
         }
         let mut body = (&mut stream).take(page.packed);
-        if growth == Growth::Gzip && page.is_packed {
+        if growth == PageGrowth::Gzip && page.is_packed {
             io::copy(&mut (&mut body).take(page.levels), &mut io::sink())?;
             let inside = page.unpacked.saturating_sub(page.levels);
             let mut all = MultiGzDecoder::new(&mut body).take(inside + 1);
@@ -69,13 +69,13 @@ pub(super) fn largest(stream: impl Read, length: u64, growth: Growth) -> io::Res
 /// The pages of a column, of which the library takes the bytes as they are stored.
 pub(super) struct UnpackedPages<P> {
     pub(super) pages: P,
-    pub(super) packing: Packing,
+    pub(super) packing: CompressionMethod,
 }
 
 impl<P: PageReader> UnpackedPages<P> {
-    fn unpacked(&self, page: Page) -> Result<Page> {
+    fn decompress_page(&self, page: Page) -> Result<Page> {
         let unpack = |packed: &[u8]| {
-            let unpacked = self.packing.unpacked(packed, LARGEST_PAGE);
+            let unpacked = self.packing.decompress(packed, LARGEST_PAGE);
             unpacked.map_err(|error| ParquetError::General(error.to_string()))
         };
         Ok(match page {
@@ -156,7 +156,7 @@ impl<P: PageReader> Iterator for UnpackedPages<P> {
 impl<P: PageReader> PageReader for UnpackedPages<P> {
     fn get_next_page(&mut self) -> Result<Option<Page>> {
         let page = self.pages.get_next_page()?;
-        page.map(|page| self.unpacked(page)).transpose()
+        page.map(|page| self.decompress_page(page)).transpose()
     }
 
     fn peek_next_page(&mut self) -> Result<Option<PageMetadata>> {
@@ -170,7 +170,7 @@ impl<P: PageReader> PageReader for UnpackedPages<P> {
 
 /// What a header says of sizes.
 #[derive(Debug, Default)]
-struct Header {
+struct PageSizes {
     /// Bytes in the file.
     packed: u64,
     /// Bytes in memory.
@@ -182,14 +182,14 @@ struct Header {
     is_packed: bool,
 }
 
-impl Header {
+impl PageSizes {
     fn read(stream: &mut impl Read) -> io::Result<Self> {
         let mut page = Self {
             is_packed: true,
             ..Self::default()
         };
         let mut is_negative = false;
-        fields(stream, &mut Vec::new(), &mut |path, value| {
+        read_fields(stream, &mut Vec::new(), &mut |path, value| {
             let size = || value.and_then(|n| u64::try_from(n).ok());
             match path {
                 [2] => page.unpacked = size().unwrap_or(u64::MAX),
@@ -222,7 +222,7 @@ const STRUCT: u8 = 12;
 
 /// Reads a structure; `tell` hears of every whole number by the numbers of its fields, and of truths, of which a false one
 /// has no value.
-fn fields(
+fn read_fields(
     stream: &mut dyn Read,
     path: &mut Vec<i64>,
     tell: &mut dyn FnMut(&[i64], Option<i64>),
@@ -237,7 +237,7 @@ fn fields(
             return Ok(());
         }
         field = match head >> 4 {
-            0 => signed(varint(stream)?),
+            0 => decode_zigzag(varint(stream)?),
             step => field.wrapping_add(i64::from(step)),
         };
         path.push(field);
@@ -245,18 +245,18 @@ fn fields(
             TRUE => tell(path, Some(1)),
             FALSE => tell(path, None),
             4..=6 => {
-                let number = signed(varint(stream)?);
+                let number = decode_zigzag(varint(stream)?);
                 tell(path, Some(number));
             }
-            STRUCT => fields(stream, path, tell)?,
-            kind => pass(stream, kind, path)?,
+            STRUCT => read_fields(stream, path, tell)?,
+            kind => skip_value(stream, kind, path)?,
         }
         path.pop();
     }
 }
 
 /// Passes over a value of which nothing is wanted.
-fn pass(stream: &mut dyn Read, kind: u8, path: &mut Vec<i64>) -> io::Result<()> {
+fn skip_value(stream: &mut dyn Read, kind: u8, path: &mut Vec<i64>) -> io::Result<()> {
     match kind {
         // Within a list a truth takes a byte.
         TRUE | FALSE | BYTE => skip(stream, 1),
@@ -274,12 +274,12 @@ fn pass(stream: &mut dyn Read, kind: u8, path: &mut Vec<i64>) -> io::Result<()> 
                 n => u64::from(n),
             };
             for _ in 0..n {
-                pass(stream, head & 15, path)?;
+                skip_value(stream, head & 15, path)?;
             }
             path.pop();
             Ok(())
         }
-        STRUCT => fields(stream, path, &mut |_, _| {}),
+        STRUCT => read_fields(stream, path, &mut |_, _| {}),
         _ => Err(io::Error::other("a page's header cannot be read")),
     }
 }
@@ -310,7 +310,7 @@ fn varint(stream: &mut dyn Read) -> io::Result<u64> {
 }
 
 /// The sign stands in the last bit.
-fn signed(value: u64) -> i64 {
+fn decode_zigzag(value: u64) -> i64 {
     (value >> 1).cast_signed() ^ -(value & 1).cast_signed()
 }
 
@@ -352,16 +352,16 @@ mod tests {
         packed.finish().unwrap()
     }
 
-    fn look(bytes: &[u8], growth: Growth) -> Result<u64, String> {
-        largest(bytes, bytes.len() as u64, growth).map_err(|error| error.to_string())
+    fn look(bytes: &[u8], growth: PageGrowth) -> Result<u64, String> {
+        largest_page(bytes, bytes.len() as u64, growth).map_err(|error| error.to_string())
     }
 
     #[test]
     fn honest_pages_tell_the_largest() {
         let two = [page(5, b"abcde"), page(300, b"xyz")].concat();
-        assert_eq!(look(&two, Growth::AsSaid), Ok(300));
+        assert_eq!(look(&two, PageGrowth::Declared), Ok(300));
         let three = [page(70_000, &gzip(70_000)), page(9, &gzip(9))].concat();
-        assert_eq!(look(&three, Growth::Gzip), Ok(70_000));
+        assert_eq!(look(&three, PageGrowth::Gzip), Ok(70_000));
         // The second form has its levels unpacked in front, and may leave all unpacked.
         let mut second = vec![0x15, 6, 0x15];
         second.extend(whole(6));
@@ -371,22 +371,22 @@ mod tests {
             0x5c, 0x15, 2, 0x15, 0, 0x15, 2, 0x15, 0, 0x15, 4, 0x15, 0, 0x12, 0, 0,
         ]);
         second.extend(b"llabcd");
-        assert_eq!(look(&second, Growth::Gzip), Ok(6));
+        assert_eq!(look(&second, PageGrowth::Gzip), Ok(6));
     }
 
     #[test]
     fn pages_that_lie_are_refused() {
-        let huge = look(&page(1 << 30, b"abc"), Growth::AsSaid).unwrap_err();
+        let huge = look(&page(1 << 30, b"abc"), PageGrowth::Declared).unwrap_err();
         assert!(huge.contains("too much memory"), "{huge}");
-        let bomb = look(&page(100, &gzip(1 << 20)), Growth::Gzip).unwrap_err();
+        let bomb = look(&page(100, &gzip(1 << 20)), PageGrowth::Gzip).unwrap_err();
         assert!(bomb.contains("larger than its header"), "{bomb}");
         let cut = page(100, b"abc");
-        assert!(look(&cut[..cut.len() - 1], Growth::AsSaid).is_err());
+        assert!(look(&cut[..cut.len() - 1], PageGrowth::Declared).is_err());
         // A dictionary of more numbers than it has bytes for.
         let mut dictionary = vec![0x15, 4, 0x15, 16, 0x15, 0, 0x4c, 0x15];
         dictionary.extend(whole(1 << 20));
         dictionary.extend([0x15, 0, 0, 0]);
-        assert!(look(&dictionary, Growth::AsSaid).is_err());
-        assert!(look(&[0x1c; 100], Growth::AsSaid).is_err());
+        assert!(look(&dictionary, PageGrowth::Declared).is_err());
+        assert!(look(&[0x1c; 100], PageGrowth::Declared).is_err());
     }
 }

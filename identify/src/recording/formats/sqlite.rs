@@ -16,23 +16,23 @@ pub(super) const MAGIC: &[u8; 16] = b"SQLite format 3\0";
 
 /// A value of a row.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum Value {
+pub(super) enum SqliteValue {
     Null,
-    Whole(i64),
+    Integer(i64),
     Real(f64),
     Text(String),
     Bytes(Vec<u8>),
 }
 
-impl Value {
-    pub(super) fn whole(&self) -> Option<i64> {
+impl SqliteValue {
+    pub(super) fn as_integer(&self) -> Option<i64> {
         match self {
-            Self::Whole(value) => Some(*value),
+            Self::Integer(value) => Some(*value),
             _ => None,
         }
     }
 
-    pub(super) fn text(&self) -> &str {
+    pub(super) fn as_text(&self) -> &str {
         match self {
             Self::Text(text) => text,
             _ => "",
@@ -41,18 +41,18 @@ impl Value {
 }
 
 /// An open database.
-pub(super) struct Database<R> {
+pub(super) struct SqliteDatabase<R> {
     stream: R,
     page_size: usize,
     /// Bytes of a page that hold data.
     usable: usize,
     pages: u64,
-    tables: Vec<Table>,
+    tables: Vec<SqliteTable>,
 }
 
 /// A table: its columns in their order.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Table {
+pub(super) struct SqliteTable {
     name: String,
     root: u32,
     columns: Vec<String>,
@@ -60,7 +60,7 @@ pub(super) struct Table {
     row_number: Option<usize>,
 }
 
-impl<R: Read + Seek> Database<R> {
+impl<R: Read + Seek> SqliteDatabase<R> {
     /// Reads the list of tables.
     pub(super) fn open(mut stream: R) -> io::Result<Self> {
         let length = stream.seek(SeekFrom::End(0))?;
@@ -88,27 +88,27 @@ impl<R: Read + Seek> Database<R> {
             pages: length / page_size as u64,
             tables: Vec::new(),
         };
-        let schema = Table {
+        let schema = SqliteTable {
             name: String::new(),
             root: 1,
             columns: Vec::new(),
             row_number: None,
         };
         let mut tables = Vec::new();
-        database.rows(&schema, &mut |row| {
+        database.visit_all_rows(&schema, &mut |row| {
             if let [
                 kind,
-                Value::Text(name),
+                SqliteValue::Text(name),
                 _,
-                Value::Whole(root),
-                Value::Text(says),
+                SqliteValue::Integer(root),
+                SqliteValue::Text(says),
                 ..,
             ] = &row[..]
-                && kind.text() == "table"
+                && kind.as_text() == "table"
                 && let Ok(root) = u32::try_from(*root)
             {
                 let (columns, row_number) = columns_of(says);
-                tables.push(Table {
+                tables.push(SqliteTable {
                     name: name.clone(),
                     root,
                     columns,
@@ -124,11 +124,11 @@ impl<R: Read + Seek> Database<R> {
     /// Shows the rows of a table, each with the values of `columns`; whether there is such a table.
     ///
     /// Fails when the table lacks a column, and when its pages make no sense.
-    pub(super) fn show(
+    pub(super) fn visit_rows(
         &mut self,
         table: &str,
         columns: &[&str],
-        show: &mut dyn FnMut(Vec<Value>) -> io::Result<()>,
+        show: &mut dyn FnMut(Vec<SqliteValue>) -> io::Result<()>,
     ) -> io::Result<bool> {
         let Some(table) = self.tables.iter().find(|one| one.name == table).cloned() else {
             return Ok(false);
@@ -140,73 +140,73 @@ impl<R: Read + Seek> Database<R> {
             })
         });
         let places = places.collect::<io::Result<Vec<usize>>>()?;
-        self.rows(&table, &mut |mut row| {
+        self.visit_all_rows(&table, &mut |mut row| {
             let values = places.iter().map(|place| match row.get_mut(*place) {
-                Some(value) => std::mem::replace(value, Value::Null),
-                None => Value::Null,
+                Some(value) => std::mem::replace(value, SqliteValue::Null),
+                None => SqliteValue::Null,
             });
             show(values.collect())
         })?;
         Ok(true)
     }
 
-    fn rows(
+    fn visit_all_rows(
         &mut self,
-        table: &Table,
-        show: &mut dyn FnMut(Vec<Value>) -> io::Result<()>,
+        table: &SqliteTable,
+        show: &mut dyn FnMut(Vec<SqliteValue>) -> io::Result<()>,
     ) -> io::Result<()> {
         // Every page is looked at once at most, so that a circle ends.
         let mut left = self.pages;
-        self.tree(table, table.root, 0, &mut left, show)
+        self.visit_tree(table, table.root, 0, &mut left, show)
     }
 
-    fn tree(
+    fn visit_tree(
         &mut self,
-        table: &Table,
+        table: &SqliteTable,
         number: u32,
         depth: usize,
         left: &mut u64,
-        show: &mut dyn FnMut(Vec<Value>) -> io::Result<()>,
+        show: &mut dyn FnMut(Vec<SqliteValue>) -> io::Result<()>,
     ) -> io::Result<()> {
         if depth > DEEPEST || *left == 0 {
             return Err(io::Error::other("its pages run in circles"));
         }
         *left -= 1;
-        let page = self.page(number)?;
+        let page = self.read_page(number)?;
         let start = if number == 1 { 100 } else { 0 };
         let kind = page[start];
-        let cells = usize::from(short(&page, start + 3)?);
+        let cells = usize::from(read_u16(&page, start + 3)?);
         let pointers = match kind {
             LEAF => start + 8,
             BRANCH => start + 12,
             _ => return Err(io::Error::other("a page of it is no table")),
         };
         for i in 0..cells {
-            let at = usize::from(short(&page, pointers + 2 * i)?);
+            let at = usize::from(read_u16(&page, pointers + 2 * i)?);
             if kind == BRANCH {
-                self.tree(table, long(&page, at)?, depth + 1, left, show)?;
+                self.visit_tree(table, read_u32(&page, at)?, depth + 1, left, show)?;
             } else {
-                let (number, payload) = self.cell(&page, at, left)?;
-                let mut row = record(&payload)?;
+                let (number, payload) = self.read_cell(&page, at, left)?;
+                let mut row = read_record(&payload)?;
                 if let Some(place) = table.row_number
-                    && row.get(place) == Some(&Value::Null)
+                    && row.get(place) == Some(&SqliteValue::Null)
                 {
-                    row[place] = Value::Whole(number);
+                    row[place] = SqliteValue::Integer(number);
                 }
                 show(row)?;
             }
         }
         if kind == BRANCH {
-            self.tree(table, long(&page, start + 8)?, depth + 1, left, show)?;
+            self.visit_tree(table, read_u32(&page, start + 8)?, depth + 1, left, show)?;
         }
         Ok(())
     }
 
     /// The number of a row and its bytes, those of further pages among them.
-    fn cell(&mut self, page: &[u8], at: usize, left: &mut u64) -> io::Result<(i64, Vec<u8>)> {
-        let mut cell = page.get(at..self.usable).ok_or_else(cut)?;
-        let length = varint(&mut cell)?.cast_unsigned();
-        let number = varint(&mut cell)?;
+    fn read_cell(&mut self, page: &[u8], at: usize, left: &mut u64) -> io::Result<(i64, Vec<u8>)> {
+        let mut cell = page.get(at..self.usable).ok_or_else(truncated_error)?;
+        let length = read_varint(&mut cell)?.cast_unsigned();
+        let number = read_varint(&mut cell)?;
         if length > LONGEST_ROW {
             return Err(io::Error::other("a row of it is longer than 256 MB"));
         }
@@ -219,16 +219,16 @@ impl<R: Read + Seek> Database<R> {
             let here = least + (length - least) % (self.usable - 4);
             if here <= most { here } else { least }
         };
-        let mut payload = cell.get(..here).ok_or_else(cut)?.to_vec();
+        let mut payload = cell.get(..here).ok_or_else(truncated_error)?.to_vec();
         if here < length {
-            let mut next = long(cell, here)?;
+            let mut next = read_u32(cell, here)?;
             while payload.len() < length {
                 if next == 0 || *left == 0 {
-                    return Err(cut());
+                    return Err(truncated_error());
                 }
                 *left -= 1;
-                let page = self.page(next)?;
-                next = long(&page, 0)?;
+                let page = self.read_page(next)?;
+                next = read_u32(&page, 0)?;
                 let n = (length - payload.len()).min(self.usable - 4);
                 payload.extend_from_slice(&page[4..4 + n]);
             }
@@ -236,9 +236,9 @@ impl<R: Read + Seek> Database<R> {
         Ok((number, payload))
     }
 
-    fn page(&mut self, number: u32) -> io::Result<Vec<u8>> {
+    fn read_page(&mut self, number: u32) -> io::Result<Vec<u8>> {
         if number == 0 || u64::from(number) > self.pages {
-            return Err(cut());
+            return Err(truncated_error());
         }
         let start = u64::from(number - 1) * self.page_size as u64;
         self.stream.seek(SeekFrom::Start(start))?;
@@ -252,25 +252,25 @@ impl<R: Read + Seek> Database<R> {
 const LEAF: u8 = 0x0d;
 const BRANCH: u8 = 0x05;
 
-fn cut() -> io::Error {
+fn truncated_error() -> io::Error {
     io::Error::other("it refers to bytes that it does not have")
 }
 
-fn short(bytes: &[u8], at: usize) -> io::Result<u16> {
-    let found = bytes.get(at..at + 2).ok_or_else(cut)?;
+fn read_u16(bytes: &[u8], at: usize) -> io::Result<u16> {
+    let found = bytes.get(at..at + 2).ok_or_else(truncated_error)?;
     Ok(u16::from_be_bytes([found[0], found[1]]))
 }
 
-fn long(bytes: &[u8], at: usize) -> io::Result<u32> {
-    let found = bytes.get(at..at + 4).ok_or_else(cut)?;
+fn read_u32(bytes: &[u8], at: usize) -> io::Result<u32> {
+    let found = bytes.get(at..at + 4).ok_or_else(truncated_error)?;
     Ok(u32::from_be_bytes([found[0], found[1], found[2], found[3]]))
 }
 
 /// A number of one to nine bytes, the highest first; the ninth byte counts whole.
-fn varint(bytes: &mut &[u8]) -> io::Result<i64> {
+fn read_varint(bytes: &mut &[u8]) -> io::Result<i64> {
     let mut value = 0_u64;
     for i in 0..9 {
-        let (byte, rest) = bytes.split_first().ok_or_else(cut)?;
+        let (byte, rest) = bytes.split_first().ok_or_else(truncated_error)?;
         *bytes = rest;
         if i == 8 {
             return Ok((value << 8 | u64::from(*byte)).cast_signed());
@@ -284,17 +284,17 @@ fn varint(bytes: &mut &[u8]) -> io::Result<i64> {
 }
 
 /// The values of a row: their types stand in front.
-fn record(bytes: &[u8]) -> io::Result<Vec<Value>> {
+fn read_record(bytes: &[u8]) -> io::Result<Vec<SqliteValue>> {
     let mut rest = bytes;
-    let length = usize::try_from(varint(&mut rest)?).map_err(|_| cut())?;
-    let mut values = bytes.get(length..).ok_or_else(cut)?;
+    let length = usize::try_from(read_varint(&mut rest)?).map_err(|_| truncated_error())?;
+    let mut values = bytes.get(length..).ok_or_else(truncated_error)?;
     let mut types = &bytes[bytes.len() - rest.len()..];
     types = types
         .get(..length.saturating_sub(bytes.len() - rest.len()))
-        .ok_or_else(cut)?;
+        .ok_or_else(truncated_error)?;
     let mut row = Vec::new();
     while !types.is_empty() {
-        let kind = varint(&mut types)?;
+        let kind = read_varint(&mut types)?;
         let size = match kind {
             0 | 8 | 9 => 0,
             1..=4 => kind,
@@ -304,22 +304,22 @@ fn record(bytes: &[u8]) -> io::Result<Vec<Value>> {
             _ => return Err(io::Error::other("a row of it has a value of no type")),
         };
         let size = usize::try_from(size).map_err(io::Error::other)?;
-        let (value, more) = values.split_at_checked(size).ok_or_else(cut)?;
+        let (value, more) = values.split_at_checked(size).ok_or_else(truncated_error)?;
         values = more;
         row.push(match kind {
-            0 => Value::Null,
-            8 | 9 => Value::Whole(kind - 8),
-            7 => Value::Real(f64::from_bits(whole(value).cast_unsigned())),
-            1..=6 => Value::Whole(whole(value)),
-            _ if kind % 2 == 0 => Value::Bytes(value.to_vec()),
-            _ => Value::Text(String::from_utf8_lossy(value).into_owned()),
+            0 => SqliteValue::Null,
+            8 | 9 => SqliteValue::Integer(kind - 8),
+            7 => SqliteValue::Real(f64::from_bits(read_integer(value).cast_unsigned())),
+            1..=6 => SqliteValue::Integer(read_integer(value)),
+            _ if kind % 2 == 0 => SqliteValue::Bytes(value.to_vec()),
+            _ => SqliteValue::Text(String::from_utf8_lossy(value).into_owned()),
         });
     }
     Ok(row)
 }
 
 /// A whole number with a sign, the highest byte first.
-fn whole(bytes: &[u8]) -> i64 {
+fn read_integer(bytes: &[u8]) -> i64 {
     let sign = bytes.first().is_some_and(|byte| byte & 0x80 != 0);
     let start = if sign { -1 } else { 0 };
     bytes
@@ -377,12 +377,12 @@ mod tests {
 
     #[test]
     fn numbers_keep_their_signs() {
-        assert_eq!(whole(&[0xff]), -1);
-        assert_eq!(whole(&[0x80, 0]), -32768);
-        assert_eq!(whole(&[0x7f, 0xff, 0xff]), 0x7f_ffff);
-        assert_eq!(varint(&mut &[0x81, 0][..]).unwrap(), 128);
-        assert_eq!(varint(&mut &[0xff; 9][..]).unwrap(), -1);
-        assert!(varint(&mut &[0x81][..]).is_err());
+        assert_eq!(read_integer(&[0xff]), -1);
+        assert_eq!(read_integer(&[0x80, 0]), -32768);
+        assert_eq!(read_integer(&[0x7f, 0xff, 0xff]), 0x7f_ffff);
+        assert_eq!(read_varint(&mut &[0x81, 0][..]).unwrap(), 128);
+        assert_eq!(read_varint(&mut &[0xff; 9][..]).unwrap(), -1);
+        assert!(read_varint(&mut &[0x81][..]).is_err());
     }
 
     #[test]

@@ -1,19 +1,19 @@
 //! Only what the recordings support.
 
-use modelmill_identify::estimate::{EssentialOptions, Estimate, essential};
+use modelmill_identify::estimate::{EssentialOptions, WeightedEstimate, select_essential};
 
-use super::Refined;
+use super::RefinementResult;
 use crate::error::Outcome;
 
 /// Leaves out parameters until all others are needed; those that are left out keep their nominal values.
-pub(super) fn refine(found: &mut Estimate, nominal: &[f64]) -> Outcome<Refined> {
-    let Estimate {
+pub(super) fn refine(found: &mut WeightedEstimate, nominal: &[f64]) -> Outcome<RefinementResult> {
+    let WeightedEstimate {
         solution,
-        deviations,
-        triangle,
+        uncertainty: deviations,
+        r_factor: triangle,
         ..
     } = found;
-    let kept = essential(
+    let kept = select_essential(
         triangle,
         solution,
         deviations,
@@ -31,5 +31,5 @@ pub(super) fn refine(found: &mut Estimate, nominal: &[f64]) -> Outcome<Refined> 
         .map(|(std, classical)| deviations.samples as f64 * (classical / std).powi(2))
         .collect();
     deviations.std = kept.std;
-    Ok(Refined::Essential(kept.dropped, kept.rise))
+    Ok(RefinementResult::Essential(kept.dropped, kept.residual_rise))
 }

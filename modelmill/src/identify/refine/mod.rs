@@ -7,7 +7,7 @@ mod essential;
 mod physical;
 mod prior;
 
-use modelmill_identify::estimate::{Dropped, Estimate, PhysicalParameters};
+use modelmill_identify::estimate::{DroppedParameter, WeightedEstimate, PhysicalParameters};
 
 use crate::error::{Error, Outcome};
 use crate::model::Model;
@@ -15,7 +15,7 @@ use crate::text::table::count;
 
 /// What is made of the reduced rows.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub enum Refinement {
+pub enum EstimateRefinement {
     /// Nothing: the solution of least squares.
     #[default]
     None,
@@ -30,20 +30,20 @@ pub enum Refinement {
 
 /// What a refinement found beside solution and deviations.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Refined {
+pub enum RefinementResult {
     /// Nothing.
     Nothing,
     /// Parameters were left out; those by position among the unknown ones, and by how much the residual rose.
-    Essential(Vec<Dropped>, f64),
+    Essential(Vec<DroppedParameter>, f64),
     /// Nominal values of this relative standard deviation counted as measurements, as many as said.
     Prior(f64, usize),
     /// Physical parameters that bodies can have, beside the residual norm of the solution without that demand.
     Physical(Box<PhysicalParameters>, Vec<String>, f64),
 }
 
-impl Refined {
+impl RefinementResult {
     /// The parameters that were left out, by position among the unknown ones.
-    pub fn left_out(&self) -> impl Iterator<Item = usize> + '_ {
+    pub fn removed_parameters(&self) -> impl Iterator<Item = usize> + '_ {
         let dropped = match self {
             Self::Essential(dropped, _) => dropped.as_slice(),
             _ => &[],
@@ -55,13 +55,13 @@ impl Refined {
 /// Refines what least squares found of the base parameters `unknown`, whose nominal values are given.
 pub(crate) fn refine(
     model: &Model,
-    found: &mut Estimate,
+    found: &mut WeightedEstimate,
     unknown: &[usize],
     nominal: &[f64],
-    refinement: Refinement,
-) -> Outcome<Refined> {
+    refinement: EstimateRefinement,
+) -> Outcome<RefinementResult> {
     let solution = &found.solution;
-    if refinement != Refinement::None && solution.rows <= solution.rank {
+    if refinement != EstimateRefinement::None && solution.rows <= solution.rank {
         return Err(Error::input(format!(
             "{} for {}: no degree of freedom is left for the residuals, from which option `prior`, option `essential` \
              and option `physical` learn what the recording is worth; use a longer recording",
@@ -70,9 +70,9 @@ pub(crate) fn refine(
         )));
     }
     match refinement {
-        Refinement::None => Ok(Refined::Nothing),
-        Refinement::Prior(sigma) => prior::refine(model, found, unknown, nominal, sigma),
-        Refinement::Essential => essential::refine(found, nominal),
-        Refinement::Physical => physical::refine(model, found, unknown),
+        EstimateRefinement::None => Ok(RefinementResult::Nothing),
+        EstimateRefinement::Prior(sigma) => prior::refine(model, found, unknown, nominal, sigma),
+        EstimateRefinement::Essential => essential::refine(found, nominal),
+        EstimateRefinement::Physical => physical::refine(model, found, unknown),
     }
 }

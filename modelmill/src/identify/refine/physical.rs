@@ -2,53 +2,53 @@
 //! physical ones.
 
 use modelmill_identify::estimate::{
-    BaseMap, BodyMatrix, Estimate, PhysicalParameters, physical_parameters, planar_pseudo_inertia,
+    BaseMap, BodyMatrix, WeightedEstimate, PhysicalParameters, physical_parameters, planar_pseudo_inertia,
     pseudo_inertia,
 };
-use modelmill_identify::{Deviations, Solution, Triangle};
-use modelmill_spec::{Exact, Inertial, Mechanism, Sign, Symbol};
+use modelmill_identify::{ParameterUncertainty, RegressionSolution, RFactor};
+use modelmill_spec::{ExactExpression, PartInertia, Mechanism, Sign, ModelSymbol};
 use nalgebra::{DMatrix, DVector};
 
-use super::Refined;
+use super::RefinementResult;
 use crate::error::{Error, Outcome};
 use crate::model::Model;
 
 /// Takes the physical parameters that bodies can have and that fit the recordings best.
-pub(super) fn refine(model: &Model, found: &mut Estimate, unknown: &[usize]) -> Outcome<Refined> {
-    let Estimate {
+pub(super) fn refine(model: &Model, found: &mut WeightedEstimate, unknown: &[usize]) -> Outcome<RefinementResult> {
+    let WeightedEstimate {
         solution,
-        deviations,
-        triangle,
+        uncertainty: deviations,
+        r_factor: triangle,
         ..
     } = found;
     let before = solution.residual_norm;
-    let (physical, bodies) = find(model, triangle, solution, deviations, unknown)?;
+    let (physical, bodies) = solve_physical(model, triangle, solution, deviations, unknown)?;
     solution.values.clone_from(&physical.base);
     solution.residual_norm = physical.residual_norm;
     deviations.std.clone_from(&physical.base_std);
     // Nominal values say what the recordings do not.
     solution.undetermined.clear();
     solution.determined = physical.base.iter().map(|_| true).collect();
-    Ok(Refined::Physical(Box::new(physical), bodies, before))
+    Ok(RefinementResult::Physical(Box::new(physical), bodies, before))
 }
 
 /// Physical parameters that bodies can have, with the names of the bodies.
-fn find(
+fn solve_physical(
     model: &Model,
-    triangle: &Triangle,
-    solution: &Solution,
-    deviations: &Deviations,
+    triangle: &RFactor,
+    solution: &RegressionSolution,
+    deviations: &ParameterUncertainty,
     unknown: &[usize],
 ) -> Outcome<(PhysicalParameters, Vec<String>)> {
     let mechanism = &model.derivation.mechanism;
-    let start = start(model, solution, deviations, unknown);
+    let start = start_values(model, solution, deviations, unknown);
     let mut bodies = bodies(mechanism);
     for p in model.positive_effects() {
         // One whose nominal value is not given and whose column repeats another's stays free.
         if start[p] > 0.0 {
             bodies.push(BodyMatrix {
                 name: mechanism.parameters[p].name.clone(),
-                matrix: Box::new(move |x: &[f64]| number(x[p])),
+                matrix: Box::new(move |x: &[f64]| scalar_matrix(x[p])),
                 copies: 1.0,
             });
         }
@@ -61,10 +61,10 @@ fn find(
 }
 
 /// Nominal values; where the file gives none for a parameter of an effect, what least squares found.
-fn start(
+fn start_values(
     model: &Model,
-    solution: &Solution,
-    deviations: &Deviations,
+    solution: &RegressionSolution,
+    deviations: &ParameterUncertainty,
     unknown: &[usize],
 ) -> Vec<f64> {
     let parameters = &model.derivation.mechanism.parameters;
@@ -111,7 +111,7 @@ fn base_map(model: &Model, unknown: &[usize], x: &[f64]) -> (DVector<f64>, DMatr
     (values, slopes)
 }
 
-fn number(value: f64) -> DMatrix<f64> {
+fn scalar_matrix(value: f64) -> DMatrix<f64> {
     DMatrix::from_element(1, 1, value)
 }
 
@@ -130,7 +130,7 @@ fn bodies(mechanism: &Mechanism) -> Vec<BodyMatrix<'_>> {
                     k + 1,
                     mechanism.frames[lump.frame.0].name
                 ),
-                matrix: Box::new(|x: &[f64]| number(value(mechanism, &lump.mass, x))),
+                matrix: Box::new(|x: &[f64]| scalar_matrix(value(mechanism, &lump.mass, x))),
                 copies: 1.0,
             });
         }
@@ -141,15 +141,15 @@ fn bodies(mechanism: &Mechanism) -> Vec<BodyMatrix<'_>> {
 fn add_part<'a>(
     mechanism: &'a Mechanism,
     name: &str,
-    inertial: &'a Inertial,
+    inertial: &'a PartInertia,
     bodies: &mut Vec<BodyMatrix<'a>>,
 ) {
-    let (Inertial::AboutCentre {
+    let (PartInertia::AboutCentre {
         mass,
         centre: place,
         inertia,
     }
-    | Inertial::Linear {
+    | PartInertia::Linear {
         mass,
         first_moment: place,
         inertia,
@@ -172,7 +172,7 @@ fn add_part<'a>(
     match moments.as_slice() {
         [] if has_mass => bodies.push(BodyMatrix {
             name,
-            matrix: Box::new(move |x: &[f64]| number(value(mechanism, mass, x))),
+            matrix: Box::new(move |x: &[f64]| scalar_matrix(value(mechanism, mass, x))),
             copies: 1.0,
         }),
         [axis] if has_mass => {
@@ -203,14 +203,14 @@ fn add_part<'a>(
                 let moment = &inertia[diagonal[*axis]];
                 bodies.push(BodyMatrix {
                     name: about(["inertia about x", "inertia about y", "inertia about z"][*axis]),
-                    matrix: Box::new(move |x: &[f64]| number(value(mechanism, moment, x))),
+                    matrix: Box::new(move |x: &[f64]| scalar_matrix(value(mechanism, moment, x))),
                     copies: 1.0,
                 });
             }
             if has_mass {
                 bodies.push(BodyMatrix {
                     name: about("mass"),
-                    matrix: Box::new(move |x: &[f64]| number(value(mechanism, mass, x))),
+                    matrix: Box::new(move |x: &[f64]| scalar_matrix(value(mechanism, mass, x))),
                     copies: 1.0,
                 });
             }
@@ -221,12 +221,12 @@ fn add_part<'a>(
 /// Mass, first moment and inertia about the frame's origin.
 fn about_origin(
     mechanism: &Mechanism,
-    inertial: &Inertial,
+    inertial: &PartInertia,
     x: &[f64],
 ) -> (f64, [f64; 3], [f64; 6]) {
-    let get = |exact: &Exact| value(mechanism, exact, x);
+    let get = |exact: &ExactExpression| value(mechanism, exact, x);
     match inertial {
-        Inertial::Linear {
+        PartInertia::Linear {
             mass,
             first_moment,
             inertia,
@@ -235,7 +235,7 @@ fn about_origin(
             std::array::from_fn(|i| get(&first_moment[i])),
             std::array::from_fn(|i| get(&inertia[i])),
         ),
-        Inertial::AboutCentre {
+        PartInertia::AboutCentre {
             mass,
             centre,
             inertia,
@@ -260,16 +260,16 @@ fn about_origin(
     }
 }
 
-fn value(mechanism: &Mechanism, exact: &Exact, x: &[f64]) -> f64 {
+fn value(mechanism: &Mechanism, exact: &ExactExpression, x: &[f64]) -> f64 {
     exact.evaluate(&|symbol| match symbol {
-        Symbol::Parameter(p) => x[p.0],
-        Symbol::Constant(c) => mechanism.constants[c.0].value,
+        ModelSymbol::Parameter(p) => x[p.0],
+        ModelSymbol::Constant(c) => mechanism.constants[c.0].value,
         _ => 0.0,
     })
 }
 
-fn has_parameter(exact: &Exact) -> bool {
-    exact.mentions(&|symbol| matches!(symbol, Symbol::Parameter(_)))
+fn has_parameter(exact: &ExactExpression) -> bool {
+    exact.mentions(&|symbol| matches!(symbol, ModelSymbol::Parameter(_)))
 }
 
 impl Model {

@@ -1,8 +1,8 @@
 //! Nominal values as soft constraints.
 
-use modelmill_identify::estimate::{Estimate, with_prior};
+use modelmill_identify::estimate::{WeightedEstimate, solve_with_prior};
 
-use super::Refined;
+use super::RefinementResult;
 use crate::error::{Error, Outcome};
 use crate::model::Model;
 use crate::text::table::percent;
@@ -10,11 +10,11 @@ use crate::text::table::percent;
 /// Lets nominal values count as measurements of the relative standard deviation `sigma`.
 pub(super) fn refine(
     model: &Model,
-    found: &mut Estimate,
+    found: &mut WeightedEstimate,
     unknown: &[usize],
     nominal: &[f64],
     sigma: f64,
-) -> Outcome<Refined> {
+) -> Outcome<RefinementResult> {
     let beliefs = model.beliefs(unknown, sigma);
     if beliefs.is_empty() {
         let parameters = &model.derivation.mechanism.parameters;
@@ -29,12 +29,12 @@ pub(super) fn refine(
             }
         )));
     }
-    (found.solution, found.deviations) = with_prior(
-        &found.triangle,
+    (found.solution, found.uncertainty) = solve_with_prior(
+        &found.r_factor,
         &found.solution,
-        &found.deviations,
+        &found.uncertainty,
         nominal,
         &beliefs,
     )?;
-    Ok(Refined::Prior(sigma, beliefs.len()))
+    Ok(RefinementResult::Prior(sigma, beliefs.len()))
 }

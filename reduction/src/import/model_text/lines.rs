@@ -2,21 +2,21 @@
 
 use std::fmt::Write as _;
 
-use super::super::chain::Chain;
-use super::super::closing::Closed;
+use super::super::chain::FrameChain;
+use super::super::closing::LoopSolution;
 use super::super::description::StraightDrive;
-use super::{Build, Coordinate, rounded};
-use crate::write::float;
+use super::{ModelTextBuilder, ImportCoordinate, round_to_15_digits};
+use crate::write::toml_float;
 
 /// A line that is a drive of the model, with the names that it and its points have there.
-pub(super) struct Pulled<'a> {
+pub(super) struct NamedDriveLine<'a> {
     pub(super) line: &'a StraightDrive,
     pub(super) name: String,
     pub(super) points: [String; 2],
 }
 
 /// Variables that move one of two frames on the other.
-pub(super) fn between(chain: &Chain, frames: [Option<usize>; 2]) -> Vec<usize> {
+pub(super) fn relative_variables(chain: &FrameChain, frames: [Option<usize>; 2]) -> Vec<usize> {
     let paths = frames.map(|frame| -> Vec<usize> {
         std::iter::successors(frame, |k| chain.nodes[*k].on).collect()
     });
@@ -32,7 +32,7 @@ pub(super) fn between(chain: &Chain, frames: [Option<usize>; 2]) -> Vec<usize> {
 }
 
 /// For each line one of those that it wants, no two the same, for as many lines as can be: by augmenting paths (H. W. Kuhn 1955).
-fn matched(wanted: &[Vec<usize>]) -> Vec<Option<usize>> {
+fn match_lines(wanted: &[Vec<usize>]) -> Vec<Option<usize>> {
     fn finds(
         line: usize,
         wanted: &[Vec<usize>],
@@ -59,7 +59,7 @@ fn matched(wanted: &[Vec<usize>]) -> Vec<Option<usize>> {
     of
 }
 
-impl Build<'_> {
+impl ModelTextBuilder<'_> {
     /// The frames that carry the ends of a line.
     pub(super) fn frames_of(&self, line: &StraightDrive) -> [Option<usize>; 2] {
         line.ends
@@ -68,18 +68,18 @@ impl Build<'_> {
 
     /// Finds for each line an independent coordinate that nothing else drives. Lines that are left over are more drives than
     /// there are freedoms, which a tree may have if all else is driven.
-    pub(super) fn pull<'l>(
+    pub(super) fn assign_coordinates<'l>(
         &mut self,
         lines: &'l [StraightDrive],
-        closed: Option<&Closed>,
-    ) -> Vec<Pulled<'l>> {
-        let is_open = |one: &Coordinate| {
+        closed: Option<&LoopSolution>,
+    ) -> Vec<NamedDriveLine<'l>> {
+        let is_open = |one: &ImportCoordinate| {
             let is_passive = |v: usize| closed.is_some_and(|closed| closed.passive[v]);
             !one.is_driven && !one.is_pulled && one.variable.is_some_and(|v| !is_passive(v))
         };
         // What each line can drive: what moves its ends on each other first; around a loop any coordinate moves all others.
         let drives = |line: &StraightDrive| -> Vec<usize> {
-            let near = between(&self.chain, self.frames_of(line));
+            let near = relative_variables(&self.chain, self.frames_of(line));
             let open = self.coordinates.iter().enumerate();
             let open = open.filter(|(_, one)| is_open(one));
             let (mut on_line, others): (Vec<_>, Vec<_>) =
@@ -90,7 +90,7 @@ impl Build<'_> {
             on_line.into_iter().map(|(k, _)| k).collect()
         };
         let wanted: Vec<Vec<usize>> = lines.iter().map(drives).collect();
-        let driven = matched(&wanted);
+        let driven = match_lines(&wanted);
         let (mut kept, mut over): (Vec<&StraightDrive>, Vec<&StraightDrive>) =
             (Vec::new(), Vec::new());
         for (line, driven) in lines.iter().zip(driven) {
@@ -117,16 +117,16 @@ impl Build<'_> {
         }
         kept.into_iter()
             .map(|line| {
-                let name = self.name(&line.name);
-                let points = ["from", "to"].map(|end| self.name(&format!("{name}_{end}")));
-                Pulled { line, name, points }
+                let name = self.unique_name(&line.name);
+                let points = ["from", "to"].map(|end| self.unique_name(&format!("{name}_{end}")));
+                NamedDriveLine { line, name, points }
             })
             .collect()
     }
 
     /// The points between which lines act.
-    pub(super) fn line_points(&self, lines: &[Pulled<'_>], text: &mut String) {
-        for Pulled { line, points, .. } in lines {
+    pub(super) fn line_points(&self, lines: &[NamedDriveLine<'_>], text: &mut String) {
+        for NamedDriveLine { line, points, .. } in lines {
             for ((link, at), point) in line.ends.iter().zip(points) {
                 let (frame, place) = match link {
                     Some(link) => {
@@ -142,7 +142,7 @@ impl Build<'_> {
                         if x.abs() < 1e-12 {
                             "0".to_owned()
                         } else {
-                            float(rounded(*x))
+                            toml_float(round_to_15_digits(*x))
                         }
                     })
                     .collect();
@@ -158,10 +158,10 @@ impl Build<'_> {
     /// Drives, effects and limits of forces of lines, added to those of joints.
     pub(super) fn line_forces(
         &mut self,
-        lines: &[Pulled<'_>],
+        lines: &[NamedDriveLine<'_>],
         [drives, effects, forces]: [&mut String; 3],
     ) {
-        for Pulled {
+        for NamedDriveLine {
             line,
             name: place,
             points: [from, to],
@@ -184,7 +184,7 @@ impl Build<'_> {
                     let _ = write!(
                         effects,
                         "\n[[effect]]\nkind = \"{kind}\"\nat = [\"{place}\"]\nparameters = {{ {symbol} = {{ nominal = {} }} }}\n",
-                        float(value)
+                        toml_float(value)
                     );
                 }
             }
@@ -192,8 +192,8 @@ impl Build<'_> {
                 let _ = writeln!(
                     forces,
                     "{place} = {{ force = [{}, {}] }}",
-                    float(low),
-                    float(high)
+                    toml_float(low),
+                    toml_float(high)
                 );
             }
         }
@@ -208,15 +208,15 @@ impl Build<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::matched;
+    use super::match_lines;
 
     /// A tendon over two joints gives way to one that has the first alone, in whatever order they stand.
     #[test]
     fn no_line_takes_what_another_alone_can_have() {
-        assert_eq!(matched(&[vec![0, 1], vec![0]]), [Some(1), Some(0)]);
-        assert_eq!(matched(&[vec![0], vec![0, 1]]), [Some(0), Some(1)]);
+        assert_eq!(match_lines(&[vec![0, 1], vec![0]]), [Some(1), Some(0)]);
+        assert_eq!(match_lines(&[vec![0], vec![0, 1]]), [Some(0), Some(1)]);
         assert_eq!(
-            matched(&[vec![0, 1], vec![1, 2], vec![0], vec![0]]),
+            match_lines(&[vec![0, 1], vec![1, 2], vec![0], vec![0]]),
             [Some(1), Some(2), Some(0), None]
         );
     }

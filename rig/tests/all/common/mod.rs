@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use modelmill_boundary::files::Memory;
-use modelmill_rig::{Rig, Samples, State, Tracker, Trajectory, forces};
+use modelmill_boundary::files::MemoryFiles;
+use modelmill_rig::{Rig, CoordinateSamples, RigState, RigTracker, Trajectory, forces};
 
 fn workspace(path: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(path)
@@ -20,7 +20,7 @@ pub(crate) fn load(name: &str) -> Rig {
 /// A rig from its text; `schema` and `name` are added.
 pub(crate) fn rig(text: &str) -> Rig {
     let text = format!("schema = 1\nname = \"test\"\n{text}");
-    modelmill_rig::load("test.toml", &text, &Memory::default())
+    modelmill_rig::load("test.toml", &text, &MemoryFiles::default())
         .unwrap_or_else(|failure| panic!("{failure}"))
         .rig
 }
@@ -62,7 +62,7 @@ pub(crate) fn column<'a>(table: &'a Table, name: &str) -> &'a [f64] {
 /// The trajectory of a recording.
 pub(crate) fn trajectory(table: &Table, coordinates: &[&str]) -> Trajectory {
     let of = |name: String| column(table, &name).to_vec();
-    let samples = coordinates.iter().map(|name| Samples {
+    let samples = coordinates.iter().map(|name| CoordinateSamples {
         q: of((*name).to_owned()),
         qd: Some(of(format!("{name}_d"))),
         qdd: Some(of(format!("{name}_dd"))),
@@ -82,7 +82,7 @@ pub(crate) fn relative_rms(found: &[f64], expected: &[f64]) -> f64 {
 }
 
 /// Forces of the drives in a state.
-pub(crate) fn force(rig: &Rig, tracker: &mut Tracker<'_>, state: &State) -> Vec<f64> {
+pub(crate) fn force(rig: &Rig, tracker: &mut RigTracker<'_>, state: &RigState) -> Vec<f64> {
     let motion = tracker
         .follow(state)
         .unwrap_or_else(|error| panic!("{error}"));
@@ -90,7 +90,7 @@ pub(crate) fn force(rig: &Rig, tracker: &mut Tracker<'_>, state: &State) -> Vec<
 }
 
 /// States with coordinates between -0.5 and 0.5, rates and accelerations between -2 and 2, always the same.
-pub(crate) fn states(n_coordinates: usize, n: usize) -> Vec<State> {
+pub(crate) fn states(n_coordinates: usize, n: usize) -> Vec<RigState> {
     let mut bits = 1_u32;
     let mut draw = |scale: f64| -> Vec<f64> {
         let mut values = Vec::new();
@@ -101,7 +101,7 @@ pub(crate) fn states(n_coordinates: usize, n: usize) -> Vec<State> {
         values
     };
     (0..n)
-        .map(|_| State {
+        .map(|_| RigState {
             q: draw(1.0),
             qd: draw(4.0),
             qdd: draw(4.0),

@@ -2,9 +2,9 @@
 
 use std::fmt::Write as _;
 
-use super::statements::{C, comment};
-use super::{Function, Unit};
-use crate::emit::language::syntax::Syntax;
+use super::statements::{CSyntax, comment};
+use super::{CFunction, TranslationUnit};
+use crate::emit::language::syntax::LanguageSyntax;
 
 /// What functions return, with its name after the prefix, and its meaning.
 const STATUS: [(&str, &str); 6] = [
@@ -26,11 +26,11 @@ const STATUS: [(&str, &str); 6] = [
 ];
 
 #[allow(clippy::too_many_lines, reason = "one text from top to bottom")]
-pub(super) fn header(unit: &Unit<'_>) -> String {
-    let Unit { name, upper, .. } = unit;
+pub(super) fn header(unit: &TranslationUnit<'_>) -> String {
+    let TranslationUnit { name, upper, .. } = unit;
     let derivation = unit.source.derivation;
     let mechanism = &derivation.mechanism;
-    let c = C { name, upper };
+    let c = CSyntax { name, upper };
     let mut text = String::new();
     let title = comment(mechanism.title.as_deref().unwrap_or(&mechanism.name));
     _ = write!(
@@ -186,7 +186,7 @@ int {name}_passive_position_near(const {name}_dynamics *dynamics, const double *
             text,
             "\n/* {}. {}. */",
             function.doc,
-            super::source::count(function)
+            super::source::operation_count(function)
         );
         _ = writeln!(text, "{};", signature(unit, function, "dynamics", false));
         if function.follows {
@@ -196,13 +196,13 @@ int {name}_passive_position_near(const {name}_dynamics *dynamics, const double *
     }
     if unit.source.dynamics.is_some() {
         text.push_str("\n/* c + g + e alone. */\n");
-        for near in bias_is_near(unit) {
-            _ = writeln!(text, "{};", bias(unit, *near));
+        for near in bias_variants(unit) {
+            _ = writeln!(text, "{};", bias_declaration(unit, *near));
         }
         _ = writeln!(
             text,
             "\n/* Forward dynamics: accelerations under given forces of the drives; those of the state are not read. */\n{};",
-            forward(unit)
+            forward_dynamics_declaration(unit)
         );
     }
     if let (Some((function, once)), Some(reactions)) = (&unit.reactions, unit.source.reactions) {
@@ -247,7 +247,7 @@ int {name}_self_test(const {name}_geometry *geometry);"
 }
 
 /// What each output of the reactions is.
-fn source_names(reactions: &crate::Reactions) -> Vec<String> {
+fn source_names(reactions: &crate::ReactionPrograms) -> Vec<String> {
     let mut names = vec![String::new(); reactions.program.outputs.len()];
     let mut name = |what: &str, of: &str, places: &[Option<usize>; 3]| {
         for (place, axis) in places.iter().zip(["x", "y", "z"]) {
@@ -268,15 +268,15 @@ fn source_names(reactions: &crate::Reactions) -> Vec<String> {
 
 /// How a function is declared.
 pub(super) fn signature(
-    unit: &Unit<'_>,
-    function: &Function<'_>,
+    unit: &TranslationUnit<'_>,
+    function: &CFunction<'_>,
     owner: &str,
     near: bool,
 ) -> String {
-    declared(unit, function.name, owner, near, function.result)
+    declaration(unit, function.name, owner, near, function.result)
 }
 
-fn declared(unit: &Unit<'_>, what: &str, owner: &str, near: bool, result: &str) -> String {
+fn declaration(unit: &TranslationUnit<'_>, what: &str, owner: &str, near: bool, result: &str) -> String {
     let name = &unit.name;
     let (suffix, passive) = if near {
         ("_near", ", double *passive")
@@ -290,8 +290,8 @@ fn declared(unit: &Unit<'_>, what: &str, owner: &str, near: bool, result: &str) 
 }
 
 /// Whether the bias forces come from the nominal pose, and from a pose near by.
-pub(super) fn bias_is_near(unit: &Unit<'_>) -> &'static [bool] {
-    let follows = |f: &Function<'_>| f.name == "bias_and_drives" && f.follows;
+pub(super) fn bias_variants(unit: &TranslationUnit<'_>) -> &'static [bool] {
+    let follows = |f: &CFunction<'_>| f.name == "bias_and_drives" && f.follows;
     if unit.functions.iter().any(follows) {
         &[false, true]
     } else {
@@ -300,12 +300,12 @@ pub(super) fn bias_is_near(unit: &Unit<'_>) -> &'static [bool] {
 }
 
 /// How the bias forces are declared.
-pub(super) fn bias(unit: &Unit<'_>, near: bool) -> String {
-    declared(unit, "bias", "dynamics", near, "bias")
+pub(super) fn bias_declaration(unit: &TranslationUnit<'_>, near: bool) -> String {
+    declaration(unit, "bias", "dynamics", near, "bias")
 }
 
 /// How forward dynamics are declared.
-pub(super) fn forward(unit: &Unit<'_>) -> String {
+pub(super) fn forward_dynamics_declaration(unit: &TranslationUnit<'_>) -> String {
     let name = &unit.name;
     format!(
         "int {name}_forward(const {name}_dynamics *dynamics, {}, const double *forces, double *accelerations)",

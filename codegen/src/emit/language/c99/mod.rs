@@ -8,10 +8,10 @@ mod self_test;
 mod source;
 mod statements;
 
-use super::{EmittedFile, Source};
-use crate::emit::identifier::of_module;
-use crate::emit::tree::{Once, Routine, Scope, reads_passive, uses_load};
-use crate::lower::Program;
+use super::{EmittedFile, EmissionRequest};
+use crate::emit::identifier::module_identifier;
+use crate::emit::tree::{PrecomputedValues, StatementRoutine, NameScope, reads_passive, uses_load};
+use crate::lower::StraightLineProgram;
 use crate::programs::PassivePosition;
 
 /// Names whose headers the C library has itself, and `main`.
@@ -49,8 +49,8 @@ pub(in crate::emit) const RESERVED: [&str; 30] = [
 ];
 
 /// The header and the source.
-pub(in crate::emit) fn write(source: &Source<'_>) -> Vec<EmittedFile> {
-    let unit = Unit::new(source);
+pub(in crate::emit) fn emit_sources(source: &EmissionRequest<'_>) -> Vec<EmittedFile> {
+    let unit = TranslationUnit::new(source);
     let file = |suffix: &str, text: String| EmittedFile {
         path: format!("{}.{suffix}", unit.name),
         text,
@@ -62,58 +62,58 @@ pub(in crate::emit) fn write(source: &Source<'_>) -> Vec<EmittedFile> {
 }
 
 /// What is printed.
-struct Unit<'a> {
-    source: &'a Source<'a>,
-    scope: Scope,
+struct TranslationUnit<'a> {
+    source: &'a EmissionRequest<'a>,
+    scope: NameScope,
     /// Prefix of everything, and its capitals.
     name: String,
     upper: String,
     load: bool,
     newton: bool,
     /// Programs of the geometry and the base parameters, and what they compute once.
-    functions: Vec<Function<'a>>,
-    once: Once,
+    functions: Vec<CFunction<'a>>,
+    once: PrecomputedValues,
     /// The reactions, and what they compute once.
-    reactions: Option<(Function<'a>, Once)>,
+    reactions: Option<(CFunction<'a>, PrecomputedValues)>,
     /// H for all products, for the self-test.
-    columns: Option<(Function<'a>, Once)>,
+    columns: Option<(CFunction<'a>, PrecomputedValues)>,
 }
 
 /// A program with its statements.
-struct Function<'a> {
-    program: &'a Program,
+struct CFunction<'a> {
+    program: &'a StraightLineProgram,
     name: &'static str,
     doc: String,
     /// What its results are called in declarations.
     result: &'static str,
-    routine: Routine,
+    routine: StatementRoutine,
     /// Whether it reads passive coordinates that are found first.
     follows: bool,
     /// Whether it may be called from outside.
     is_public: bool,
 }
 
-impl<'a> Unit<'a> {
+impl<'a> TranslationUnit<'a> {
     #[allow(
         clippy::too_many_lines,
         reason = "a list of functions, one after the other"
     )]
-    fn new(source: &'a Source<'a>) -> Self {
+    fn new(source: &'a EmissionRequest<'a>) -> Self {
         let derivation = source.derivation;
         let mechanism = &derivation.mechanism;
-        let scope = Scope::new(derivation);
-        let module = of_module(&mechanism.name).to_string();
+        let scope = NameScope::new(derivation);
+        let module = module_identifier(&mechanism.name).to_string();
         let mut name = module.trim_start_matches("r#").to_owned();
-        if RESERVED.contains(&name.as_str()) || statements::is_taken(&name) {
+        if RESERVED.contains(&name.as_str()) || statements::is_reserved(&name) {
             name.push_str("_model");
         }
         let programs = &derivation.programs;
         let (active, passive) = derivation.coordinates();
         let of_coordinate = |i: &usize| mechanism.coordinates[*i].name.clone();
-        let function = |program: &'a Program, name, doc: String, result, outputs: Vec<String>| {
-            let routine = Routine::new(program, &scope, &outputs);
+        let function = |program: &'a StraightLineProgram, name, doc: String, result, outputs: Vec<String>| {
+            let routine = StatementRoutine::new(program, &scope, &outputs);
             let follows = reads_passive(derivation, program);
-            Function {
+            CFunction {
                 program,
                 name,
                 doc,
@@ -220,8 +220,8 @@ impl<'a> Unit<'a> {
             }
             _ => false,
         };
-        let alone = |mut function: Function<'a>| {
-            let mut once = Once::new(&scope);
+        let alone = |mut function: CFunction<'a>| {
+            let mut once = PrecomputedValues::new(&scope);
             once.absorb(&mut function.routine);
             (function, once)
         };
@@ -245,7 +245,7 @@ impl<'a> Unit<'a> {
             function.is_public = false;
             alone(function)
         });
-        let mut once = Once::new(&scope);
+        let mut once = PrecomputedValues::new(&scope);
         for function in &mut functions {
             once.absorb(&mut function.routine);
         }
@@ -265,7 +265,7 @@ impl<'a> Unit<'a> {
     }
 
     /// A template with the names of this unit.
-    fn named(&self, template: &str) -> String {
+    fn expand_template(&self, template: &str) -> String {
         let text = template.replace("NAME_", &format!("{}_", self.name));
         text.replace("UPPER_", &format!("{}_", self.upper))
     }
@@ -287,7 +287,7 @@ impl<'a> Unit<'a> {
     }
 
     /// The parts of a state, with how many numbers each has.
-    fn state(&self) -> Vec<(&'static str, usize)> {
+    fn state_parts(&self) -> Vec<(&'static str, usize)> {
         let n = self.n_active();
         let mut parts = vec![("q", n), ("qd", n), ("qdd", n)];
         if self.load {
@@ -298,14 +298,14 @@ impl<'a> Unit<'a> {
 
     /// Declarations of a state.
     fn state_parameters(&self) -> String {
-        let parts = self.state().into_iter();
+        let parts = self.state_parts().into_iter();
         let parts = parts.map(|(name, _)| format!("const double *{name}"));
         parts.collect::<Vec<String>>().join(", ")
     }
 
     /// The names of a state as arguments.
     fn state_arguments(&self) -> String {
-        let parts = self.state().into_iter().map(|(name, _)| name);
+        let parts = self.state_parts().into_iter().map(|(name, _)| name);
         parts.collect::<Vec<&str>>().join(", ")
     }
 }

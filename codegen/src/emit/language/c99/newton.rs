@@ -2,14 +2,14 @@
 
 use std::fmt::Write as _;
 
-use super::Unit;
-use super::source::{given, single};
-use crate::emit::tree::Routine;
+use super::TranslationUnit;
+use super::source::{parameter_bindings, single_value};
+use crate::emit::tree::StatementRoutine;
 use crate::expr::coordinates_of;
 
 /// The nominal pose, Newton's method, and how it begins.
-pub(super) fn newton(unit: &Unit<'_>, text: &mut String) {
-    let Unit { name, upper, .. } = unit;
+pub(super) fn newton(unit: &TranslationUnit<'_>, text: &mut String) {
+    let TranslationUnit { name, upper, .. } = unit;
     let derivation = unit.source.derivation;
     let (active, passive) = derivation.coordinates();
     let residual = &derivation.equations.projection.loops.residual;
@@ -33,7 +33,7 @@ pub(super) fn newton(unit: &Unit<'_>, text: &mut String) {
     }
     text.push_str("}\n\n");
     let driver = include_str!("loops.c").replace("NAME_model", "NAME_dynamics");
-    text.push_str(&unit.named(&driver));
+    text.push_str(&unit.expand_template(&driver));
     _ = writeln!(
         text,
         "\nstatic void {name}_settle({name}_dynamics *self)\n{{\n    const {name}_rule rule = {{50, 0, 0.0}};\n    \
@@ -41,12 +41,12 @@ pub(super) fn newton(unit: &Unit<'_>, text: &mut String) {
     );
     let mut lines = Vec::new();
     if let Some(program) = &derivation.programs.scale {
-        let routine = Routine::new(program, &unit.scope, &[]);
+        let routine = StatementRoutine::new(program, &unit.scope, &[]);
         let read = routine.read_once.union(&routine.read).copied().collect();
-        given(unit, &read, "self->geometry.", "", "", &mut lines);
+        parameter_bindings(unit, &read, "self->geometry.", "", "", &mut lines);
         unit.syntax().statements(&routine.once, &mut lines);
         if let Some(result) = routine.results.first() {
-            lines.push(format!("self->scale = {};", single(unit, result)));
+            lines.push(format!("self->scale = {};", single_value(unit, result)));
         }
     } else {
         lines.push("self->scale = 1.0;".to_owned());

@@ -2,16 +2,16 @@
 
 use std::fmt::Write as _;
 
-use super::Unit;
-use super::source::{given, single};
-use crate::derive::self_test::reaches;
-use crate::emit::language::syntax::Syntax;
-use crate::emit::tree::Routine;
+use super::TranslationUnit;
+use super::source::{parameter_bindings, single_value};
+use crate::derive::self_test::self_test_reach;
+use crate::emit::language::syntax::LanguageSyntax;
+use crate::emit::tree::StatementRoutine;
 
 /// The function that draws states, and H for all products.
 #[allow(clippy::too_many_lines, reason = "one text from top to bottom")]
-pub(super) fn self_test(unit: &Unit<'_>, text: &mut String) {
-    let Unit { name, upper, .. } = unit;
+pub(super) fn self_test(unit: &TranslationUnit<'_>, text: &mut String) {
+    let TranslationUnit { name, upper, .. } = unit;
     let Some((function, once)) = &unit.columns else {
         return;
     };
@@ -28,15 +28,15 @@ typedef struct {{
     double once[{kept}];
 }} {name}_all_columns;"
     );
-    super::source::program(unit, function, once, "all_columns", text);
+    super::source::write_program(unit, function, once, "all_columns", text);
     _ = writeln!(
         text,
         "\nstatic void {name}_prepare_columns({name}_all_columns *self, const {name}_geometry *geometry)\n{{"
     );
     let lines = super::source::once_lines(unit, once, "geometry->", "", "");
-    super::source::body(&lines, text);
+    super::source::write_body(&lines, text);
     _ = writeln!(text, "    self->geometry = *geometry;\n}}\n");
-    text.push_str(&unit.named(include_str!("self_test.c")));
+    text.push_str(&unit.expand_template(include_str!("self_test.c")));
 
     let (active, _) = derivation.coordinates();
     let has_scale = derivation.programs.scale.is_some();
@@ -49,7 +49,7 @@ typedef struct {{
         }
     };
     let n_active = unit.n_active();
-    let n_state: usize = unit.state().iter().map(|(_, n)| n).sum();
+    let n_state: usize = unit.state_parts().iter().map(|(_, n)| n).sum();
     let n_inputs = n_state
         + if function.follows {
             unit.n_passive()
@@ -81,19 +81,19 @@ typedef struct {{
         ),
     ];
     if let Some(program) = &derivation.programs.scale {
-        let routine = Routine::new(program, &unit.scope, &[]);
+        let routine = StatementRoutine::new(program, &unit.scope, &[]);
         let read = routine.read_once.union(&routine.read).copied().collect();
         lines.push("double scale;".to_owned());
         lines.push("{".to_owned());
-        given(unit, &read, "geometry->", "", "", &mut lines);
+        parameter_bindings(unit, &read, "geometry->", "", "", &mut lines);
         c.statements(&routine.once, &mut lines);
         if let Some(result) = routine.results.first() {
-            lines.push(format!("scale = {};", single(unit, result)));
+            lines.push(format!("scale = {};", single_value(unit, result)));
         }
         lines.push("}".to_owned());
         lines.push("(void)scale;".to_owned());
     }
-    for (k, (i, reach)) in active.iter().zip(reaches(derivation)).enumerate() {
+    for (k, (i, reach)) in active.iter().zip(self_test_reach(derivation)).enumerate() {
         lines.push(format!(
             "nominal[{k}] = {}; reach_of[{k}] = {}; unit_of[{k}] = {};",
             scaled(i, mechanism.coordinates[*i].nominal),
@@ -134,7 +134,7 @@ typedef struct {{
     ));
     let mut at = 0;
     let mut parts = Vec::new();
-    for (part, n) in unit.state() {
+    for (part, n) in unit.state_parts() {
         parts.push(format!("inputs + {at}"));
         at += n;
         _ = part;
@@ -158,7 +158,7 @@ typedef struct {{
         text,
         "\nint {name}_self_test(const {name}_geometry *geometry)\n{{"
     );
-    super::source::body(&lines, text);
+    super::source::write_body(&lines, text);
     _ = writeln!(
         text,
         "    for (halving = 0; halving <= 4; halving++) {{

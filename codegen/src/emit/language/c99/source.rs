@@ -3,20 +3,20 @@
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
-use super::header::{forward, signature};
-use super::statements::{C, comment};
-use super::{Function, Unit, newton, self_test};
-use crate::emit::language::syntax::Syntax;
-use crate::emit::tree::{BaseParameters, Expression, Once, inputs_of_state};
+use super::header::{forward_dynamics_declaration, signature};
+use super::statements::{CSyntax, comment};
+use super::{CFunction, TranslationUnit, newton, self_test};
+use crate::emit::language::syntax::LanguageSyntax;
+use crate::emit::tree::{BaseParameterCode, CodeExpression, PrecomputedValues, inputs_of_state};
 use crate::expr::Atom;
-use crate::lower::{OperationCount, Stage};
+use crate::lower::{OperationCount, ProgramStage};
 
 /// Operations of a function.
-pub(super) fn count(function: &Function<'_>) -> OperationCount {
-    function.program.count(Stage::State)
+pub(super) fn operation_count(function: &CFunction<'_>) -> OperationCount {
+    function.program.count_operations(ProgramStage::State)
 }
 
-pub(super) fn source(unit: &Unit<'_>) -> String {
+pub(super) fn source(unit: &TranslationUnit<'_>) -> String {
     let name = &unit.name;
     let mut text = format!(
         "/* Written by modelmill; do not edit. See {name}.h. */
@@ -29,12 +29,12 @@ pub(super) fn source(unit: &Unit<'_>) -> String {
 
 "
     );
-    text.push_str(&unit.named(include_str!("support.c")));
-    if uses(unit, "_sin_cos") {
+    text.push_str(&unit.expand_template(include_str!("support.c")));
+    if has_call(unit, "_sin_cos") {
         text.push('\n');
-        text.push_str(&unit.named(include_str!("sin_cos.c")));
+        text.push_str(&unit.expand_template(include_str!("sin_cos.c")));
     }
-    if uses(unit, "_sign(") {
+    if has_call(unit, "_sign(") {
         _ = writeln!(
             text,
             "\nstatic double {name}_sign(double x)\n{{\n    return x > 0.0 ? 1.0 : x < 0.0 ? -1.0 : x;\n}}"
@@ -42,29 +42,29 @@ pub(super) fn source(unit: &Unit<'_>) -> String {
     }
     if unit.newton || unit.source.dynamics.is_some() {
         text.push('\n');
-        text.push_str(&unit.named(include_str!("solve.c")));
+        text.push_str(&unit.expand_template(include_str!("solve.c")));
     }
-    records(unit, &mut text);
-    base_parameters(unit, &mut text);
+    write_records(unit, &mut text);
+    write_base_parameters(unit, &mut text);
     for function in &unit.functions {
-        program(unit, function, &unit.once, "dynamics", &mut text);
+        write_program(unit, function, &unit.once, "dynamics", &mut text);
     }
     if unit.newton {
         newton::newton(unit, &mut text);
     }
-    prepare(unit, &mut text);
-    state(unit, &mut text);
+    write_preparation(unit, &mut text);
+    write_state_inputs(unit, &mut text);
     for function in unit.functions.iter().filter(|f| f.is_public) {
-        public(unit, function, "dynamics", &mut text);
+        write_public_function(unit, function, "dynamics", &mut text);
     }
     if unit.source.dynamics.is_some() {
-        bias(unit, &mut text);
-        forward_dynamics(unit, &mut text);
+        write_bias(unit, &mut text);
+        write_forward_dynamics(unit, &mut text);
     }
     if let Some((function, once)) = &unit.reactions {
-        program(unit, function, once, "reactions", &mut text);
-        prepare_reactions(unit, function, once, &mut text);
-        public(unit, function, "reactions", &mut text);
+        write_program(unit, function, once, "reactions", &mut text);
+        write_reaction_preparation(unit, function, once, &mut text);
+        write_public_function(unit, function, "reactions", &mut text);
     }
     if unit.columns.is_some() {
         self_test::self_test(unit, &mut text);
@@ -73,7 +73,7 @@ pub(super) fn source(unit: &Unit<'_>) -> String {
 }
 
 /// Whether any statement calls a function.
-fn uses(unit: &Unit<'_>, what: &str) -> bool {
+fn has_call(unit: &TranslationUnit<'_>, what: &str) -> bool {
     let c = unit.syntax();
     let mut lines = Vec::new();
     let others = unit.reactions.iter().chain(&unit.columns);
@@ -90,9 +90,9 @@ fn uses(unit: &Unit<'_>, what: &str) -> bool {
         .any(|line| line.contains(&format!("{}{what}", unit.name)))
 }
 
-impl Unit<'_> {
-    pub(super) fn syntax(&self) -> C<'_> {
-        C {
+impl TranslationUnit<'_> {
+    pub(super) fn syntax(&self) -> CSyntax<'_> {
+        CSyntax {
             name: &self.name,
             upper: &self.upper,
         }
@@ -100,7 +100,7 @@ impl Unit<'_> {
 }
 
 /// Default values of geometry and parameters.
-fn records(unit: &Unit<'_>, text: &mut String) {
+fn write_records(unit: &TranslationUnit<'_>, text: &mut String) {
     let (name, c) = (&unit.name, unit.syntax());
     let mechanism = &unit.source.derivation.mechanism;
     let constants = mechanism
@@ -126,10 +126,10 @@ fn records(unit: &Unit<'_>, text: &mut String) {
 }
 
 /// Base parameters as eq. (16) gives them.
-fn base_parameters(unit: &Unit<'_>, text: &mut String) {
+fn write_base_parameters(unit: &TranslationUnit<'_>, text: &mut String) {
     let (name, c) = (&unit.name, unit.syntax());
     let derivation = unit.source.derivation;
-    let BaseParameters {
+    let BaseParameterCode {
         sums,
         values,
         divisors,
@@ -140,7 +140,7 @@ fn base_parameters(unit: &Unit<'_>, text: &mut String) {
         "\nint {name}_base_parameters(const {name}_geometry *geometry, const {name}_parameters *parameters, double *base)\n{{"
     );
     let mut lines = Vec::new();
-    given(unit, &read, "geometry->", "parameters->", "", &mut lines);
+    parameter_bindings(unit, &read, "geometry->", "parameters->", "", &mut lines);
     if !read.iter().any(|atom| matches!(atom, Atom::Constant(_))) {
         lines.push("(void)geometry;".to_owned());
     }
@@ -150,29 +150,29 @@ fn base_parameters(unit: &Unit<'_>, text: &mut String) {
     for divisor in &divisors {
         lines.push(format!(
             "if (!(fabs({}) > SINGULAR_SHARE * {})) return {}_SPECIAL; /* {} vanishes */",
-            c.term(&divisor.value),
-            c.whole(&divisor.size),
+            c.operand_text(&divisor.value),
+            c.grouped_text(&divisor.size),
             unit.upper,
             comment(&divisor.text)
         ));
     }
     for (name, value) in &sums {
-        lines.push(format!("const double {name} = {};", c.term(value)));
+        lines.push(format!("const double {name} = {};", c.operand_text(value)));
     }
     for (k, value) in values.iter().enumerate() {
-        lines.push(format!("base[{k}] = {};", c.term(value)));
+        lines.push(format!("base[{k}] = {};", c.operand_text(value)));
     }
     if values.is_empty() {
         lines.push("(void)base;".to_owned());
     }
     lines.push(format!("return {}_OK;", unit.upper));
-    body(&lines, text);
+    write_body(&lines, text);
     text.push_str("}\n");
 }
 
 /// Names for what is read of geometry, parameters and base parameters.
-pub(super) fn given(
-    unit: &Unit<'_>,
+pub(super) fn parameter_bindings(
+    unit: &TranslationUnit<'_>,
     read: &BTreeSet<Atom>,
     geometry: &str,
     parameters: &str,
@@ -193,22 +193,22 @@ pub(super) fn given(
         };
         lines.push(format!(
             "const double {} = {value};",
-            c.name(unit.scope.name(*atom))
+            c.name(unit.scope.input_name(*atom))
         ));
     }
 }
 
-pub(super) fn body(lines: &[String], text: &mut String) {
+pub(super) fn write_body(lines: &[String], text: &mut String) {
     for line in lines {
         _ = writeln!(text, "    {line}");
     }
 }
 
 /// A program.
-pub(super) fn program(
-    unit: &Unit<'_>,
-    function: &Function<'_>,
-    once: &Once,
+pub(super) fn write_program(
+    unit: &TranslationUnit<'_>,
+    function: &CFunction<'_>,
+    once: &PrecomputedValues,
     owner: &str,
     text: &mut String,
 ) {
@@ -225,7 +225,7 @@ pub(super) fn program(
     } else {
         ""
     };
-    given(
+    parameter_bindings(
         unit,
         &routine.read,
         &format!("self->{within}geometry."),
@@ -253,33 +253,33 @@ pub(super) fn program(
         if routine.read.contains(&atom) {
             lines.push(format!(
                 "const double {} = inputs[{k}];",
-                c.name(unit.scope.name(atom))
+                c.name(unit.scope.input_name(atom))
             ));
         }
     }
     for unused in ["self", "inputs", "outputs"] {
         lines.push(format!("(void){unused};"));
     }
-    for k in routine.zeros() {
+    for k in routine.zero_outputs() {
         lines.push(format!("outputs[{k}] = 0.0;"));
     }
     c.statements(&routine.state, &mut lines);
     lines.push(format!("return {}_OK;", unit.upper));
-    body(&lines, text);
+    write_body(&lines, text);
     text.push_str("}\n");
 }
 
 /// Statements of what is computed once, into `self->once`.
 pub(super) fn once_lines(
-    unit: &Unit<'_>,
-    once: &Once,
+    unit: &TranslationUnit<'_>,
+    once: &PrecomputedValues,
     geometry: &str,
     parameters: &str,
     base: &str,
 ) -> Vec<String> {
     let c = unit.syntax();
     let mut lines = Vec::new();
-    given(unit, &once.read, geometry, parameters, base, &mut lines);
+    parameter_bindings(unit, &once.read, geometry, parameters, base, &mut lines);
     c.statements(&once.statements(), &mut lines);
     for (k, kept) in once.kept.iter().enumerate() {
         lines.push(format!("self->once[{k}] = {};", c.name(kept)));
@@ -288,8 +288,8 @@ pub(super) fn once_lines(
 }
 
 /// What depends on geometry and base parameters alone.
-fn prepare(unit: &Unit<'_>, text: &mut String) {
-    let Unit { name, upper, .. } = unit;
+fn write_preparation(unit: &TranslationUnit<'_>, text: &mut String) {
+    let TranslationUnit { name, upper, .. } = unit;
     let c = unit.syntax();
     let constants = &unit.source.derivation.mechanism.constants;
     _ = writeln!(
@@ -320,16 +320,16 @@ fn prepare(unit: &Unit<'_>, text: &mut String) {
         lines.push(format!("{name}_settle(self);"));
     }
     lines.push("return self->input;".to_owned());
-    body(&lines, text);
+    write_body(&lines, text);
     text.push_str("}\n");
 }
 
 /// The inputs of programs from a state.
-fn state(unit: &Unit<'_>, text: &mut String) {
-    let Unit { name, upper, .. } = unit;
+fn write_state_inputs(unit: &TranslationUnit<'_>, text: &mut String) {
+    let TranslationUnit { name, upper, .. } = unit;
     let mut lines = Vec::new();
     let mut next = 0;
-    for (part, n) in unit.state() {
+    for (part, n) in unit.state_parts() {
         for k in 0..n {
             lines.push(format!("inputs[{next}] = {part}[{k}];"));
             next += 1;
@@ -343,14 +343,14 @@ fn state(unit: &Unit<'_>, text: &mut String) {
         "\nstatic int {name}_inputs({}, double *inputs)\n{{",
         unit.state_parameters()
     );
-    body(&lines, text);
+    write_body(&lines, text);
     text.push_str("}\n");
 }
 
 /// A function that may be called from outside, and its fellow with a guess.
-fn public(unit: &Unit<'_>, function: &Function<'_>, owner: &str, text: &mut String) {
-    let Unit { name, upper, .. } = unit;
-    let n_state: usize = unit.state().iter().map(|(_, n)| n).sum();
+fn write_public_function(unit: &TranslationUnit<'_>, function: &CFunction<'_>, owner: &str, text: &mut String) {
+    let TranslationUnit { name, upper, .. } = unit;
+    let n_state: usize = unit.state_parts().iter().map(|(_, n)| n).sum();
     let n_inputs = n_state
         + if function.follows {
             unit.n_passive()
@@ -426,16 +426,16 @@ fn public(unit: &Unit<'_>, function: &Function<'_>, owner: &str, text: &mut Stri
         }
         lines.push("return status;".to_owned());
         _ = writeln!(text, "\n{}\n{{", signature(unit, function, owner, *near));
-        body(&lines, text);
+        write_body(&lines, text);
         text.push_str("}\n");
     }
 }
 
 /// The bias forces alone, without what forward dynamics need beside them.
-fn bias(unit: &Unit<'_>, text: &mut String) {
-    let Unit { name, upper, .. } = unit;
+fn write_bias(unit: &TranslationUnit<'_>, text: &mut String) {
+    let TranslationUnit { name, upper, .. } = unit;
     let arguments = unit.state_arguments();
-    for near in super::header::bias_is_near(unit) {
+    for near in super::header::bias_variants(unit) {
         let (suffix, passive) = if *near {
             ("_near", ", passive")
         } else {
@@ -452,14 +452,14 @@ fn bias(unit: &Unit<'_>, text: &mut String) {
         memcpy(bias, all, {upper}_N_ACTIVE * sizeof *bias);
     return status;
 }}",
-            super::header::bias(unit, *near)
+            super::header::bias_declaration(unit, *near)
         );
     }
 }
 
 /// Accelerations from forces: a linear system with the mass matrix.
-fn forward_dynamics(unit: &Unit<'_>, text: &mut String) {
-    let Unit { name, upper, .. } = unit;
+fn write_forward_dynamics(unit: &TranslationUnit<'_>, text: &mut String) {
+    let TranslationUnit { name, upper, .. } = unit;
     let arguments = unit.state_arguments();
     _ = writeln!(
         text,
@@ -488,13 +488,13 @@ fn forward_dynamics(unit: &Unit<'_>, text: &mut String) {
         memcpy(accelerations, found, sizeof found);
     return status;
 }}",
-        forward(unit)
+        forward_dynamics_declaration(unit)
     );
 }
 
 /// What the reactions compute once.
-fn prepare_reactions(unit: &Unit<'_>, function: &Function<'_>, once: &Once, text: &mut String) {
-    let Unit { name, upper, .. } = unit;
+fn write_reaction_preparation(unit: &TranslationUnit<'_>, function: &CFunction<'_>, once: &PrecomputedValues, text: &mut String) {
+    let TranslationUnit { name, upper, .. } = unit;
     let c = unit.syntax();
     _ = function;
     _ = writeln!(
@@ -521,11 +521,11 @@ int {name}_prepare_reactions({name}_reactions *reactions, const {name}_geometry 
         ));
     }
     lines.push("return self->dynamics.input;".to_owned());
-    body(&lines, text);
+    write_body(&lines, text);
     text.push_str("}\n");
 }
 
 /// An expression of a program without a state.
-pub(super) fn single(unit: &Unit<'_>, result: &Expression) -> String {
-    unit.syntax().term(result)
+pub(super) fn single_value(unit: &TranslationUnit<'_>, result: &CodeExpression) -> String {
+    unit.syntax().operand_text(result)
 }

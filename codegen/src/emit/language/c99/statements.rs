@@ -2,19 +2,19 @@
 
 use std::fmt::Write as _;
 
-use crate::emit::language::syntax::Syntax;
-use crate::emit::tree::{Check, Statement};
+use crate::emit::language::syntax::LanguageSyntax;
+use crate::emit::tree::{PoseCheck, CodeStatement};
 use crate::expr::Unary;
 
 /// The syntax of C, with functions that begin with the name of the module.
-pub(super) struct C<'a> {
+pub(super) struct CSyntax<'a> {
     /// Prefix of functions, and of the status.
     pub(super) name: &'a str,
     pub(super) upper: &'a str,
 }
 
 /// Words of C, of its headers, and of the functions that are written.
-const TAKEN: [&str; 83] = [
+const RESERVED_NAMES: [&str; 83] = [
     "sines",
     "cosines",
     "SINGULAR_SHARE",
@@ -101,15 +101,15 @@ const TAKEN: [&str; 83] = [
 ];
 
 /// Whether a name means something else in C or C++.
-pub(super) fn is_taken(name: &str) -> bool {
-    TAKEN.contains(&name)
+pub(super) fn is_reserved(name: &str) -> bool {
+    RESERVED_NAMES.contains(&name)
 }
 
-impl Syntax for C<'_> {
+impl LanguageSyntax for CSyntax<'_> {
     fn name(&self, name: &str) -> String {
         let plain = name.starts_with(|c: char| c.is_ascii_alphabetic())
             && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
-            && !is_taken(name)
+            && !is_reserved(name)
             && !name.starts_with(&format!("{}_", self.name))
             && !name.starts_with(&format!("{}_", self.upper));
         if plain {
@@ -130,7 +130,7 @@ impl Syntax for C<'_> {
         format!("{value:?}")
     }
 
-    fn alone(&self, value: f64) -> String {
+    fn standalone_number(&self, value: f64) -> String {
         if value.is_sign_negative() {
             format!("({value:?})")
         } else {
@@ -142,7 +142,7 @@ impl Syntax for C<'_> {
         let bare = argument
             .strip_prefix('(')
             .and_then(|rest| rest.strip_suffix(')'))
-            .filter(|inner| balanced(inner));
+            .filter(|inner| is_balanced(inner));
         let argument = bare.unwrap_or(argument);
         let name = match function {
             Unary::Sqrt => "sqrt",
@@ -162,7 +162,7 @@ impl Syntax for C<'_> {
 }
 
 /// Whether every parenthesis is closed in the text itself.
-fn balanced(text: &str) -> bool {
+fn is_balanced(text: &str) -> bool {
     let mut depth = 0_i32;
     for c in text.chars() {
         match c {
@@ -177,29 +177,29 @@ fn balanced(text: &str) -> bool {
     depth == 0
 }
 
-impl C<'_> {
+impl CSyntax<'_> {
     /// Statements, one per line, with `outputs` for the results in scope.
-    pub(super) fn statements(&self, statements: &[Statement], lines: &mut Vec<String>) {
+    pub(super) fn statements(&self, statements: &[CodeStatement], lines: &mut Vec<String>) {
         for statement in statements {
             self.statement(statement, lines);
         }
     }
 
-    fn statement(&self, statement: &Statement, lines: &mut Vec<String>) {
+    fn statement(&self, statement: &CodeStatement, lines: &mut Vec<String>) {
         match statement {
-            Statement::Section(text) => lines.push(format!("/* {} */", comment(text))),
-            Statement::Let { name, value, note } => {
+            CodeStatement::Section(text) => lines.push(format!("/* {} */", comment(text))),
+            CodeStatement::Let { name, value, note } => {
                 let note = note
                     .as_ref()
                     .map_or(String::new(), |note| format!(" /* {} */", comment(note)));
                 lines.push(format!(
                     "const double {} = {};{note}",
                     self.name(name),
-                    self.term(value)
+                    self.operand_text(value)
                 ));
             }
-            Statement::Angles(angles) => {
-                let mut values: Vec<String> = angles.iter().map(|a| self.term(&a.value)).collect();
+            CodeStatement::Angles(angles) => {
+                let mut values: Vec<String> = angles.iter().map(|a| self.operand_text(&a.value)).collect();
                 // They are computed in pairs.
                 if values.len() % 2 == 1 {
                     values.extend(values.last().cloned());
@@ -215,10 +215,10 @@ impl C<'_> {
                     self.name
                 ));
             }
-            Statement::SinCos {
+            CodeStatement::SinCos {
                 sine,
                 cosine,
-                asked: Some(k),
+                requested: Some(k),
                 ..
             } => {
                 for (name, all) in [(sine, "sines"), (cosine, "cosines")] {
@@ -227,11 +227,11 @@ impl C<'_> {
                     }
                 }
             }
-            Statement::SinCos {
+            CodeStatement::SinCos {
                 sine,
                 cosine,
                 angle,
-                asked: None,
+                requested: None,
             } => {
                 let place = lines.len();
                 let [sine, cosine] =
@@ -243,31 +243,31 @@ impl C<'_> {
                 lines.push(format!(
                     "{}_sin_cos({}, &{sine}, &{cosine});",
                     self.name,
-                    self.term(angle)
+                    self.operand_text(angle)
                 ));
             }
-            Statement::Guard(check) => lines.push(match check {
-                Check::Reachable(value) => format!(
+            CodeStatement::Guard(check) => lines.push(match check {
+                PoseCheck::Reachable(value) => format!(
                     "if (!({} >= 0.0)) return {}_OUT_OF_REACH;",
-                    self.term(value),
+                    self.operand_text(value),
                     self.upper
                 ),
-                Check::Regular(value, size) => format!(
+                PoseCheck::Regular(value, size) => format!(
                     "if (!(fabs({}) > SINGULAR_SHARE * {})) return {}_SINGULAR;",
-                    self.term(value),
-                    self.whole(size),
+                    self.operand_text(value),
+                    self.grouped_text(size),
                     self.upper
                 ),
-                Check::Finite(value) => format!(
+                PoseCheck::Finite(value) => format!(
                     "if (!(fabs({}) <= DBL_MAX)) return {}_UNDEFINED;",
-                    self.term(value),
+                    self.operand_text(value),
                     self.upper
                 ),
             }),
-            Statement::Put { output, value } => {
-                lines.push(format!("outputs[{output}] = {};", self.term(value)));
+            CodeStatement::Put { output, value } => {
+                lines.push(format!("outputs[{output}] = {};", self.operand_text(value)));
             }
-            Statement::Group { statements, .. } => self.statements(statements, lines),
+            CodeStatement::Group { statements, .. } => self.statements(statements, lines),
         }
     }
 }

@@ -3,14 +3,14 @@
 use proc_macro2::TokenStream;
 use quote::quote;
 
-use super::items::count;
-use super::program::{Function, Made, More, Owner, Results, Told};
+use super::items::operation_count;
+use super::program::{ProgramMethod, PreparationInputs, ExtraItems, ProgramStruct, ResultConversion, ProgramStateInputs};
 use crate::Derivation;
-use crate::emit::tree::{Scope, reads_passive};
-use crate::on_request::dynamics::Dynamics;
+use crate::emit::tree::{NameScope, reads_passive};
+use crate::on_request::dynamics::DynamicsPrograms;
 
 /// The struct `Dynamics`.
-pub(super) fn dynamics(derivation: &Derivation, scope: &Scope, dynamics: &Dynamics) -> TokenStream {
+pub(super) fn dynamics(derivation: &Derivation, scope: &NameScope, dynamics: &DynamicsPrograms) -> TokenStream {
     let (active, _) = derivation.coordinates();
     let names = active
         .iter()
@@ -70,21 +70,21 @@ pub(super) fn dynamics(derivation: &Derivation, scope: &Scope, dynamics: &Dynami
             vector,
         ),
     ];
-    let functions = functions.map(|([name, item], program, doc, outputs, output)| Function {
+    let functions = functions.map(|([name, item], program, doc, outputs, output)| ProgramMethod {
         program,
         name,
         item,
-        doc: format!("{doc} {}.", count(program)),
-        told: Told::Motion,
+        doc: format!("{doc} {}.", operation_count(program)),
+        inputs: ProgramStateInputs::Motion,
         outputs,
         output: Some(output),
         // The Jacobian stands behind the bias in its program.
-        results: (name == "bias").then(|| Results {
-            of: quote! { Linearised<T, N_ACTIVE, N_DRIVES> },
-            made: quote! { found.values },
+        results: (name == "bias").then(|| ResultConversion {
+            from_type: quote! { Linearised<T, N_ACTIVE, N_DRIVES> },
+            conversion: quote! { found.values },
         }),
     });
-    Owner {
+    ProgramStruct {
         derivation,
         scope,
         name: "Dynamics",
@@ -94,18 +94,18 @@ pub(super) fn dynamics(derivation: &Derivation, scope: &Scope, dynamics: &Dynami
         },
         prepares: "Prepares the equation of motion: what does not depend on the state is computed once.",
         is_public: true,
-        made: Made::Base,
+        preparation: PreparationInputs::Base,
         functions: functions.into(),
-        more: More {
-            methods: forward(derivation, dynamics),
-            ..More::default()
+        more: ExtraItems {
+            methods: forward_dynamics(derivation, dynamics),
+            ..ExtraItems::default()
         },
     }
     .tokens()
 }
 
 /// Accelerations from forces: a linear system with the mass matrix.
-fn forward(derivation: &Derivation, dynamics: &Dynamics) -> TokenStream {
+fn forward_dynamics(derivation: &Derivation, dynamics: &DynamicsPrograms) -> TokenStream {
     let doc = quote! {
         /// Forward dynamics: accelerations of the independent coordinates under given forces of the drives.
         ///

@@ -3,28 +3,28 @@
 use proc_macro2::TokenStream;
 use quote::quote;
 
-use super::items::count;
+use super::items::operation_count;
 use super::newton::newton;
-use super::program::{Function, Made, More, Owner, Told};
+use super::program::{ProgramMethod, PreparationInputs, ExtraItems, ProgramStruct, ProgramStateInputs};
 use crate::Derivation;
-use crate::emit::tree::{Scope, reads_passive};
+use crate::emit::tree::{NameScope, reads_passive};
 use crate::programs::PassivePosition;
 
 /// The struct `Model` with everything that needs no parameters.
-pub(super) fn model(derivation: &Derivation, scope: &Scope) -> TokenStream {
+pub(super) fn model(derivation: &Derivation, scope: &NameScope) -> TokenStream {
     let programs = &derivation.programs;
     let mechanism = &derivation.mechanism;
     let (active, passive) = derivation.coordinates();
     let name = |i: &usize| mechanism.coordinates[*i].name.as_str();
-    let regressor = Function {
+    let regressor = ProgramMethod {
         program: &programs.regressor,
         name: "regressor",
         item: "Regressor",
         doc: format!(
             "H_min: one row per drive, one column per base parameter. {}.",
-            count(&programs.regressor)
+            operation_count(&programs.regressor)
         ),
-        told: Told::Motion,
+        inputs: ProgramStateInputs::Motion,
         outputs: Vec::new(),
         output: Some(quote! { [[T; N_BASE]; N_DRIVES] }),
         results: None,
@@ -44,12 +44,12 @@ pub(super) fn model(derivation: &Derivation, scope: &Scope) -> TokenStream {
                 .map(|a| format!("J_{}_{}", drive.name, name(a))),
         );
     }
-    let drives = Function {
+    let drives = ProgramMethod {
         program: &programs.drives,
         name: "drives",
         item: "MotionOfDrives",
         doc: "Lengths or angles of the drives, their rates, and their Jacobian.".to_owned(),
-        told: Told::Motion,
+        inputs: ProgramStateInputs::Motion,
         outputs: of_motion,
         output: Some(quote! { Drives<T> }),
         results: None,
@@ -58,12 +58,12 @@ pub(super) fn model(derivation: &Derivation, scope: &Scope) -> TokenStream {
     if !passive.is_empty() {
         let motion = ["", "_d", "_dd"].iter();
         let motion = motion.flat_map(|suffix| passive.iter().map(move |p| (p, suffix)));
-        functions.push(Function {
+        functions.push(ProgramMethod {
             program: &programs.passive,
             name: "passive",
             item: "MotionOfPassive",
             doc: "Passive coordinates with their rates and accelerations.".to_owned(),
-            told: Told::Motion,
+            inputs: ProgramStateInputs::Motion,
             outputs: motion
                 .map(|(p, suffix)| format!("{}{suffix}", name(p)))
                 .collect(),
@@ -78,9 +78,9 @@ pub(super) fn model(derivation: &Derivation, scope: &Scope) -> TokenStream {
             functions.extend(newton.functions);
             (newton.items, newton.more)
         }
-        None => (TokenStream::new(), More::default()),
+        None => (TokenStream::new(), ExtraItems::default()),
     };
-    let owner = Owner {
+    let owner = ProgramStruct {
         derivation,
         scope,
         name: "Model",
@@ -89,7 +89,7 @@ pub(super) fn model(derivation: &Derivation, scope: &Scope) -> TokenStream {
         },
         prepares: "Prepares the model of a geometry.",
         is_public: true,
-        made: Made::Geometry,
+        preparation: PreparationInputs::Geometry,
         functions,
         more,
     };
@@ -112,20 +112,20 @@ pub(super) fn model(derivation: &Derivation, scope: &Scope) -> TokenStream {
 }
 
 /// The struct `InverseDynamics`.
-pub(super) fn inverse_dynamics(derivation: &Derivation, scope: &Scope) -> TokenStream {
+pub(super) fn inverse_dynamics(derivation: &Derivation, scope: &NameScope) -> TokenStream {
     let program = &derivation.programs.inverse_dynamics;
     let drives = derivation.mechanism.drives.iter();
-    let function = Function {
+    let function = ProgramMethod {
         program,
         name: "forces",
         item: "Forces",
-        doc: format!("Forces of the drives, N or N m. {}.", count(program)),
-        told: Told::Motion,
+        doc: format!("Forces of the drives, N or N m. {}.", operation_count(program)),
+        inputs: ProgramStateInputs::Motion,
         outputs: drives.map(|d| format!("f_{}", d.name)).collect(),
         output: Some(quote! { [T; N_DRIVES] }),
         results: None,
     };
-    let owner = Owner {
+    let owner = ProgramStruct {
         derivation,
         scope,
         name: "InverseDynamics",
@@ -134,9 +134,9 @@ pub(super) fn inverse_dynamics(derivation: &Derivation, scope: &Scope) -> TokenS
         },
         prepares: "Prepares the recursion: what does not depend on the state is computed once.",
         is_public: true,
-        made: Made::Base,
+        preparation: PreparationInputs::Base,
         functions: vec![function],
-        more: More::default(),
+        more: ExtraItems::default(),
     };
     let owner = owner.tokens();
     let of_many = if reads_passive(derivation, program) {

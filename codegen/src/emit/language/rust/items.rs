@@ -6,15 +6,15 @@ use proc_macro2::{Literal, TokenStream};
 use quote::{format_ident, quote};
 
 use super::functions::{inverse_dynamics, is_newton, model};
-use super::program::single;
-use super::statements::{Rust, filled, lines, number as signed, verbatim};
+use super::program::single_value;
+use super::statements::{RustSyntax, fill_lines, line_tokens, number_token as signed, verbatim_tokens};
 use crate::Derivation;
-use crate::emit::identifier::of_field;
-use crate::emit::language::syntax::Syntax;
-use crate::emit::tree::{BaseParameters, Expression, Scope, inputs_of_state, uses_load};
+use crate::emit::identifier::field_identifier;
+use crate::emit::language::syntax::LanguageSyntax;
+use crate::emit::tree::{BaseParameterCode, CodeExpression, NameScope, inputs_of_state, uses_load};
 use crate::expr::Atom;
 use crate::expr::coordinates_of;
-use crate::lower::{OperationCount, Program, Stage};
+use crate::lower::{OperationCount, StraightLineProgram, ProgramStage};
 
 /// What the module says of itself.
 pub(super) fn module_doc(derivation: &Derivation) -> String {
@@ -44,12 +44,12 @@ pub(super) fn module_doc(derivation: &Derivation) -> String {
     doc
 }
 
-pub(super) fn count(program: &Program) -> OperationCount {
-    program.count(Stage::State)
+pub(super) fn operation_count(program: &StraightLineProgram) -> OperationCount {
+    program.count_operations(ProgramStage::State)
 }
 
 /// All items.
-pub(super) fn items(derivation: &Derivation, scope: &Scope) -> TokenStream {
+pub(super) fn items(derivation: &Derivation, scope: &NameScope) -> TokenStream {
     let mechanism = &derivation.mechanism;
     let tables = tables(derivation);
     let constants: Vec<_> = mechanism
@@ -62,13 +62,13 @@ pub(super) fn items(derivation: &Derivation, scope: &Scope) -> TokenStream {
         .iter()
         .map(|p| (p.name.as_str(), p.nominal, p.unit.as_str()))
         .collect();
-    let geometry = record(
+    let geometry = record_struct(
         "Geometry",
         "Known quantities; the default is the model file's.",
         "CONSTANTS",
         &constants,
     );
-    let parameters = record(
+    let parameters = record_struct(
         "Parameters",
         "Dynamic parameters; the default is nominal.",
         "PARAMETERS",
@@ -107,7 +107,7 @@ fn tables(derivation: &Derivation) -> TokenStream {
     let bases = bases.iter().map(|base| {
         let (name, retained, expression, unit) =
             (&base.name, &base.retained, &base.expression, &base.unit);
-        verbatim(&format!(
+        verbatim_tokens(&format!(
             "BaseParameter::new({name:?}, {retained:?}, {unit:?}, {expression:?})"
         ))
     });
@@ -134,10 +134,10 @@ fn tables(derivation: &Derivation) -> TokenStream {
 }
 
 /// A struct of named quantities and the table of their values, in one list.
-fn record(name: &str, doc: &str, table: &str, fields: &[(&str, f64, &str)]) -> TokenStream {
+fn record_struct(name: &str, doc: &str, table: &str, fields: &[(&str, f64, &str)]) -> TokenStream {
     let mut text = format!("/// {doc}\n{name}, {table}:");
     for (field, value, unit) in fields {
-        let ident = of_field(field).to_string();
+        let ident = field_identifier(field).to_string();
         let called = if ident == *field {
             String::new()
         } else {
@@ -145,7 +145,7 @@ fn record(name: &str, doc: &str, table: &str, fields: &[(&str, f64, &str)]) -> T
         };
         _ = write!(text, "\n{ident}{called}: {unit:?} = {value:?},");
     }
-    let text = verbatim(&text);
+    let text = verbatim_tokens(&text);
     quote! { ::modelmill_runtime::record! { #text } }
 }
 
@@ -168,7 +168,7 @@ fn state(derivation: &Derivation) -> TokenStream {
     let inputs = inputs_of_state(derivation, false);
     let n_inputs = Literal::usize_unsuffixed(inputs.len());
     let names = inputs.into_iter().map(|atom| format!("{:?}", name(atom)));
-    let names = verbatim(&filled("[", names, "];").join("\n"));
+    let names = verbatim_tokens(&fill_lines("[", names, "];").join("\n"));
     let mut fields = vec![
         ("q", active.len()),
         ("qd", active.len()),
@@ -185,10 +185,10 @@ fn state(derivation: &Derivation) -> TokenStream {
         let all = inputs_of_state(derivation, true);
         let n_all = Literal::usize_unsuffixed(all.len());
         let names = all.into_iter().map(|atom| format!("{:?}", name(atom)));
-        let names = verbatim(&filled("[", names, "];").join("\n"));
+        let names = verbatim_tokens(&fill_lines("[", names, "];").join("\n"));
         let passive = (0..passive.len()).map(|k| format!("passive[{k}]"));
         let entries = entries.iter().cloned().chain(passive);
-        let entries = verbatim(&filled("[", entries, "]").join("\n"));
+        let entries = verbatim_tokens(&fill_lines("[", entries, "]").join("\n"));
         quote! {
             /// The inputs of a program that reads passive coordinates.
             const INPUTS_WITH_PASSIVE: [&str; #n_all] = #names;
@@ -199,7 +199,7 @@ fn state(derivation: &Derivation) -> TokenStream {
             }
         }
     });
-    let entries = verbatim(&filled("[", entries.into_iter(), "]").join("\n"));
+    let entries = verbatim_tokens(&fill_lines("[", entries.into_iter(), "]").join("\n"));
     quote! {
         /// Motion of the independent coordinates, rad or m, and seconds.
         pub type State<T> = #alias;
@@ -223,13 +223,13 @@ fn state(derivation: &Derivation) -> TokenStream {
 
 /// How large the loops of a `geometry` in scope are beside those of the file, for numbers `T`; nothing where no coordinate
 /// in them is a length.
-pub(super) fn scale(derivation: &Derivation, scope: &Scope) -> Option<TokenStream> {
+pub(super) fn loop_scale(derivation: &Derivation, scope: &NameScope) -> Option<TokenStream> {
     let program = derivation.programs.scale.as_ref()?;
-    Some(single(derivation, scope, program))
+    Some(single_value(derivation, scope, program))
 }
 
 /// Nominal values of coordinates, lengths in loops as many times longer as `scale` says.
-pub(super) fn nominal<'a>(
+pub(super) fn nominal_values<'a>(
     derivation: &'a Derivation,
     coordinates: &'a [usize],
     scale: Option<&'a TokenStream>,
@@ -247,8 +247,8 @@ pub(super) fn nominal<'a>(
 }
 
 /// Base parameters as eq. (16) gives them, term by term.
-fn base_parameters(derivation: &Derivation, scope: &Scope) -> TokenStream {
-    let BaseParameters {
+fn base_parameters(derivation: &Derivation, scope: &NameScope) -> TokenStream {
+    let BaseParameterCode {
         sums,
         values,
         divisors,
@@ -263,19 +263,19 @@ fn base_parameters(derivation: &Derivation, scope: &Scope) -> TokenStream {
     };
     let geometry = argument("geometry", |atom| matches!(atom, Atom::Constant(_)));
     let parameters = argument("parameters", |atom| matches!(atom, Atom::Parameter(_)));
-    let given = super::program::given(derivation, scope, &read, &geometry, &parameters, "");
+    let given = super::program::parameter_bindings(derivation, scope, &read, &geometry, &parameters, "");
     let names: Vec<_> = (0..n_base)
-        .map(|k| of_field(scope.name(Atom::Base(k))))
+        .map(|k| field_identifier(scope.input_name(Atom::Base(k))))
         .collect();
     let written = names.iter().zip(&values);
-    let written = written.flat_map(|(name, value)| sum(&format!("let {name} = "), value));
+    let written = written.flat_map(|(name, value)| sum_lines(&format!("let {name} = "), value));
     let divisors = divisors.iter().map(|divisor| {
-        let [value, size] = [&divisor.value, &divisor.size].map(|x| Rust.term(x));
+        let [value, size] = [&divisor.value, &divisor.size].map(|x| RustSyntax.operand_text(x));
         format!("divisor({:?}, {value}, {size})?;", divisor.text)
     });
     let sums = sums.iter();
-    let sums = sums.flat_map(|(name, value)| sum(&format!("let {name} = "), value));
-    let written = lines(&divisors.chain(sums).chain(written).collect::<Vec<String>>());
+    let sums = sums.flat_map(|(name, value)| sum_lines(&format!("let {name} = "), value));
+    let written = line_tokens(&divisors.chain(sums).chain(written).collect::<Vec<String>>());
     quote! {
         /// Base parameters of given physical parameters, eq. (16).
         ///
@@ -293,20 +293,20 @@ fn base_parameters(derivation: &Derivation, scope: &Scope) -> TokenStream {
 }
 
 /// A statement with a sum, term by term in as many lines as it needs.
-fn sum(start: &str, value: &Expression) -> Vec<String> {
+fn sum_lines(start: &str, value: &CodeExpression) -> Vec<String> {
     let mut terms = Vec::new();
     let mut rest = value;
     loop {
         let (before, operator, term) = match rest {
-            Expression::Add(a, b) => (a, "+", b),
-            Expression::Sub(a, b) => (a, "-", b),
+            CodeExpression::Add(a, b) => (a, "+", b),
+            CodeExpression::Sub(a, b) => (a, "-", b),
             first => {
-                terms.push(Rust.term(first));
+                terms.push(RustSyntax.operand_text(first));
                 break;
             }
         };
-        let text = Rust.expression(term);
-        let nested = matches!(**term, Expression::Add(..) | Expression::Sub(..));
+        let text = RustSyntax.expression_text(term);
+        let nested = matches!(**term, CodeExpression::Add(..) | CodeExpression::Sub(..));
         terms.push(if nested {
             format!("{operator} ({text})")
         } else {

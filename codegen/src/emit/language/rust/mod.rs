@@ -16,24 +16,24 @@ use proc_macro2::TokenStream;
 use quote::quote;
 
 use crate::emit::identifier;
-use crate::emit::tree::Scope;
-use crate::{Derivation, Dynamics, Reactions};
+use crate::emit::tree::NameScope;
+use crate::{Derivation, DynamicsPrograms, ReactionPrograms};
 
 /// Rust source of a module.
 #[derive(Clone, Debug)]
-pub struct Emitted {
+pub struct EmittedModule {
     /// Name of the module.
     pub name: String,
     /// Documentation of the module, in Markdown.
     pub doc: String,
-    scope: Scope,
+    scope: NameScope,
     items: TokenStream,
 }
 
 /// Writes the module of a derivation: regressor and inverse dynamics.
-pub fn emit(derivation: &Derivation) -> Emitted {
-    let scope = Scope::with_pose(derivation);
-    Emitted {
+pub fn emit(derivation: &Derivation) -> EmittedModule {
+    let scope = NameScope::with_pose(derivation);
+    EmittedModule {
         name: derivation.mechanism.name.clone(),
         doc: items::module_doc(derivation),
         items: items::items(derivation, &scope),
@@ -43,14 +43,14 @@ pub fn emit(derivation: &Derivation) -> Emitted {
 
 /// Writes the module of a derivation with its equation of motion besides: mass matrix, forward dynamics and what belongs
 /// to them.
-pub fn emit_with_dynamics(derivation: &Derivation, dynamics: &Dynamics) -> Emitted {
+pub fn emit_with_dynamics(derivation: &Derivation, dynamics: &DynamicsPrograms) -> EmittedModule {
     emit(derivation).with_dynamics(derivation, dynamics)
 }
 
-impl Emitted {
+impl EmittedModule {
     /// The module with the equation of motion of the same derivation.
     #[must_use]
-    pub fn with_dynamics(mut self, derivation: &Derivation, dynamics: &Dynamics) -> Self {
+    pub fn with_dynamics(mut self, derivation: &Derivation, dynamics: &DynamicsPrograms) -> Self {
         let items = dynamics::dynamics(derivation, &self.scope, dynamics);
         self.items.extend(items);
         self
@@ -66,7 +66,7 @@ impl Emitted {
 
     /// The module with the reactions of the same derivation.
     #[must_use]
-    pub fn with_reactions(mut self, derivation: &Derivation, reactions: &Reactions) -> Self {
+    pub fn with_reactions(mut self, derivation: &Derivation, reactions: &ReactionPrograms) -> Self {
         let items = reactions::reactions(derivation, &self.scope, reactions);
         self.items.extend(items);
         self
@@ -75,27 +75,27 @@ impl Emitted {
     /// The source as a file of its own, to be declared with `mod`.
     pub fn file(&self) -> String {
         let (doc, items) = (doc_lines(&self.doc, true), &self.items);
-        print(&quote! { #doc #![allow(#LINTS)] #items })
+        print_source(&quote! { #doc #![allow(#LINTS)] #items })
     }
 
     /// The source as a `pub mod` that can be included anywhere.
     pub fn module(&self) -> String {
         let (doc, items) = (doc_lines(&self.doc, false), &self.items);
-        let name = identifier::of_module(&self.name);
-        print(&quote! { #doc #[allow(#LINTS)] pub mod #name { #items } })
+        let name = identifier::module_identifier(&self.name);
+        print_source(&quote! { #doc #[allow(#LINTS)] pub mod #name { #items } })
     }
 }
 
 /// The name of the module that is emitted for a model: its own, or one near it where Rust cannot have that.
 pub fn module_name(model: &str) -> String {
-    identifier::of_module(model).to_string()
+    identifier::module_identifier(model).to_string()
 }
 
 /// Lints that emitted code does not keep to: names come from the model file, and formulas have a manner of their own.
-struct Lints;
-const LINTS: Lints = Lints;
+struct LintAttributes;
+const LINTS: LintAttributes = LintAttributes;
 
-impl quote::ToTokens for Lints {
+impl quote::ToTokens for LintAttributes {
     fn to_tokens(&self, tokens: &mut TokenStream) {
         tokens.extend(quote! {
             non_snake_case, unused_imports, clippy::all, clippy::pedantic
@@ -116,8 +116,8 @@ pub(in crate::emit) fn doc_lines(doc: &str, inner: bool) -> TokenStream {
 }
 
 /// Source of tokens that are a file.
-pub(in crate::emit) fn print(tokens: &TokenStream) -> String {
+pub(in crate::emit) fn print_source(tokens: &TokenStream) -> String {
     let file = syn::parse2(tokens.clone())
         .unwrap_or_else(|error| panic!("emitted tokens do not parse: {error}\n{tokens}"));
-    statements::with_lines(&prettyplease::unparse(&file))
+    statements::restore_lines(&prettyplease::unparse(&file))
 }

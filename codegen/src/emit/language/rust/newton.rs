@@ -3,32 +3,32 @@
 use proc_macro2::{Literal, TokenStream};
 use quote::quote;
 
-use super::items::{count, nominal, scale};
-use super::program::{Function, More, Told};
+use super::items::{operation_count, nominal_values, loop_scale};
+use super::program::{ProgramMethod, ExtraItems, ProgramStateInputs};
 use crate::Derivation;
-use crate::emit::tree::Scope;
+use crate::emit::tree::NameScope;
 use crate::programs::PassivePosition;
 
 /// What a model with such loops brings along.
-pub(super) struct Newton<'a> {
-    pub(super) functions: Vec<Function<'a>>,
+pub(super) struct NewtonItems<'a> {
+    pub(super) functions: Vec<ProgramMethod<'a>>,
     pub(super) items: TokenStream,
-    pub(super) more: More,
+    pub(super) more: ExtraItems,
 }
 
 /// The model's loops and its passive coordinates, where there is no closed form.
 #[allow(clippy::too_many_lines, reason = "one text from top to bottom")]
-pub(super) fn newton<'a>(derivation: &'a Derivation, scope: &Scope) -> Option<Newton<'a>> {
+pub(super) fn newton<'a>(derivation: &'a Derivation, scope: &NameScope) -> Option<NewtonItems<'a>> {
     let PassivePosition::Newton(loops) = &derivation.programs.passive_position else {
         return None;
     };
     let (active, passive) = derivation.coordinates();
-    let function = |program, name, item| Function {
+    let function = |program, name, item| ProgramMethod {
         program,
         name,
         item,
         doc: String::new(),
-        told: Told::Pose,
+        inputs: ProgramStateInputs::Pose,
         outputs: Vec::new(),
         output: None,
         results: None,
@@ -37,11 +37,11 @@ pub(super) fn newton<'a>(derivation: &'a Derivation, scope: &Scope) -> Option<Ne
         function(&loops.residual, "gaps", "Gaps"),
         function(&loops.scales, "scales", "LoopScales"),
     ];
-    let scale = scale(derivation, scope);
+    let scale = loop_scale(derivation, scope);
     let of_self = scale.as_ref().map(|_| quote! { self.scale });
-    let nominal_active = nominal(derivation, &active, of_self.as_ref());
+    let nominal_active = nominal_values(derivation, &active, of_self.as_ref());
     let of_model = scale.as_ref().map(|_| quote! { model.scale });
-    let nominal_passive = nominal(derivation, &passive, of_model.as_ref());
+    let nominal_passive = nominal_values(derivation, &passive, of_model.as_ref());
     let scale_field = scale.as_ref().map(|_| {
         quote! {
             /// How large the loops are beside those of the file, for lengths at the nominal pose.
@@ -63,7 +63,7 @@ pub(super) fn newton<'a>(derivation: &'a Derivation, scope: &Scope) -> Option<Ne
     let n_pose = Literal::usize_unsuffixed(pose.len());
     let cost = format!(
         " Every step of Newton's method takes one evaluation of the loops ({}) and a linear system of {} unknowns.",
-        count(&loops.residual),
+        operation_count(&loops.residual),
         passive.len()
     );
     let items = quote! {
@@ -135,10 +135,10 @@ pub(super) fn newton<'a>(derivation: &'a Derivation, scope: &Scope) -> Option<Ne
             Assembly::passive_position_near(self, q, guess)
         }
     };
-    Some(Newton {
+    Some(NewtonItems {
         functions,
         items,
-        more: More {
+        more: ExtraItems {
             fields: quote! {
                 /// Passive coordinates of the nominal pose.
                 nominal: Result<[T; N_PASSIVE], PoseError>,

@@ -5,25 +5,25 @@ use std::collections::BTreeSet;
 use proc_macro2::{Ident, Literal, TokenStream};
 use quote::{format_ident, quote};
 
-use super::statements::{Rust, filled, lines, statements, verbatim};
+use super::statements::{RustSyntax, fill_lines, line_tokens, statements, verbatim_tokens};
 use crate::Derivation;
-use crate::emit::identifier::of_field;
-use crate::emit::language::syntax::Syntax;
-use crate::emit::tree::{Once, Pose, Routine, Scope, Statement, inputs_of_state, reads_passive};
+use crate::emit::identifier::field_identifier;
+use crate::emit::language::syntax::LanguageSyntax;
+use crate::emit::tree::{PrecomputedValues, SharedPose, StatementRoutine, NameScope, CodeStatement, inputs_of_state, reads_passive};
 use crate::expr::Atom;
-use crate::lower::Program;
+use crate::lower::StraightLineProgram;
 
 /// What a program is made of besides the geometry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Made {
+pub(super) enum PreparationInputs {
     Geometry,
     Base,
     Parameters,
 }
 
-impl Made {
+impl PreparationInputs {
     /// What is wrong with what it is made of.
-    fn check(self) -> TokenStream {
+    fn check_tokens(self) -> TokenStream {
         match self {
             Self::Geometry => quote! { geometry.check() },
             Self::Base => quote! { geometry.check().and(check_base(base, &BASE_PARAMETERS)) },
@@ -32,7 +32,7 @@ impl Made {
     }
 
     /// The parameters by which it is made.
-    fn parameters(self) -> TokenStream {
+    fn parameter_tokens(self) -> TokenStream {
         match self {
             Self::Geometry => quote! { geometry: &Geometry<T> },
             Self::Base => quote! { geometry: &Geometry<T>, base: &[T; N_BASE] },
@@ -45,7 +45,7 @@ impl Made {
 
 /// What a program is told about a state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Told {
+pub(super) enum ProgramStateInputs {
     /// Motion, and passive coordinates if Newton's method finds them.
     Motion,
     /// Independent and passive coordinates.
@@ -53,66 +53,66 @@ pub(super) enum Told {
 }
 
 /// A program with the method that runs it.
-pub(super) struct Function<'a> {
-    pub(super) program: &'a Program,
+pub(super) struct ProgramMethod<'a> {
+    pub(super) program: &'a StraightLineProgram,
     /// Name of the method.
     pub(super) name: &'a str,
     /// Name of the struct that the runtime runs.
     pub(super) item: &'a str,
     pub(super) doc: String,
-    pub(super) told: Told,
+    pub(super) inputs: ProgramStateInputs,
     /// Names of the program's results.
     pub(super) outputs: Vec<String>,
     /// What the method returns; none if there is no method.
     pub(super) output: Option<TokenStream>,
     /// What the program's results are, if that is something else.
-    pub(super) results: Option<Results>,
+    pub(super) results: Option<ResultConversion>,
 }
 
 /// Results of a program that are made into something else.
-pub(super) struct Results {
+pub(super) struct ResultConversion {
     /// Their type.
-    pub(super) of: TokenStream,
+    pub(super) from_type: TokenStream,
     /// What is made of them, `found`.
-    pub(super) made: TokenStream,
+    pub(super) conversion: TokenStream,
 }
 
 /// A struct whose methods are programs.
-pub(super) struct Owner<'a> {
+pub(super) struct ProgramStruct<'a> {
     pub(super) derivation: &'a Derivation,
-    pub(super) scope: &'a Scope,
+    pub(super) scope: &'a NameScope,
     /// Its name.
     pub(super) name: &'a str,
     pub(super) doc: TokenStream,
     /// What `new` is said to do.
     pub(super) prepares: &'a str,
     pub(super) is_public: bool,
-    pub(super) made: Made,
-    pub(super) functions: Vec<Function<'a>>,
+    pub(super) preparation: PreparationInputs,
+    pub(super) functions: Vec<ProgramMethod<'a>>,
     /// Further fields, their initialisers, what is left to do to a prepared `model`, and further methods.
-    pub(super) more: More,
+    pub(super) more: ExtraItems,
 }
 
 /// What a struct has besides its programs.
 #[derive(Default)]
-pub(super) struct More {
+pub(super) struct ExtraItems {
     pub(super) fields: TokenStream,
     pub(super) inits: TokenStream,
     pub(super) finish: TokenStream,
     pub(super) methods: TokenStream,
 }
 
-impl Owner<'_> {
+impl ProgramStruct<'_> {
     /// The struct, its programs, and what runs them.
     #[allow(clippy::too_many_lines, reason = "one text from top to bottom")]
     pub(super) fn tokens(&self) -> TokenStream {
-        let mut once = Once::new(self.scope);
+        let mut once = PrecomputedValues::new(self.scope);
         let mut routines = Vec::new();
         for function in &self.functions {
             let pose = self.scope.pose.as_deref();
-            let rest = pose.and_then(|pose| pose.rest(function.program));
+            let rest = pose.and_then(|pose| pose.remaining_program(function.program));
             let program = rest.as_ref().unwrap_or(function.program);
-            let mut routine = Routine::new(program, self.scope, &function.outputs);
+            let mut routine = StatementRoutine::new(program, self.scope, &function.outputs);
             once.absorb(&mut routine);
             let pose = pose.filter(|_| rest.is_some());
             routine
@@ -139,7 +139,7 @@ impl Owner<'_> {
                 .any(|f| reads_passive(self.derivation, f.program));
         let model_field = newton.then(|| quote! { model: Model<T>, });
         let model_init = newton.then(|| quote! { model: Model::new(geometry), });
-        let kept: Vec<Ident> = once.kept.iter().map(|name| of_field(name)).collect();
+        let kept: Vec<Ident> = once.kept.iter().map(|name| field_identifier(name)).collect();
         let n_kept = Literal::usize_unsuffixed(kept.len());
         let has_once = !kept.is_empty();
         let once_field = has_once.then(|| {
@@ -148,15 +148,15 @@ impl Owner<'_> {
                 once: [T; #n_kept],
             }
         });
-        let given = self.given(&once.read, false);
+        let given = self.input_bindings(&once.read, false);
         let begin = has_once.then(|| {
             let statements = statements(&once.statements());
             quote! { let n = &One::<T>::new(); #given #statements }
         });
         let once_init = has_once.then(|| quote! { once: values![#(#kept),*], });
-        let (parameters, prepares) = (self.made.parameters(), format!(" {}", self.prepares));
-        let check = self.made.check();
-        let More {
+        let (parameters, prepares) = (self.preparation.parameter_tokens(), format!(" {}", self.prepares));
+        let check = self.preparation.check_tokens();
+        let ExtraItems {
             fields,
             inits,
             finish,
@@ -221,17 +221,17 @@ impl Owner<'_> {
     /// The method of a program, and the program.
     fn function(
         &self,
-        function: &Function<'_>,
-        routine: &Routine,
-        pose: Option<&Pose>,
-        once: &Once,
+        function: &ProgramMethod<'_>,
+        routine: &StatementRoutine,
+        pose: Option<&SharedPose>,
+        once: &PrecomputedValues,
     ) -> TokenStream {
         let program = format_ident!("{}_program", function.name);
         let (inputs, _) = self.inputs(function, routine);
         let n_inputs = Literal::usize_unsuffixed(inputs.len());
-        let given = self.given(&routine.read, true);
-        let once = kept(once, routine);
-        let pose = pose.map(|pose| self.pose(pose, routine));
+        let given = self.input_bindings(&routine.read, true);
+        let once = precomputed_bindings(once, routine);
+        let pose = pose.map(|pose| self.pose_bindings(pose, routine));
         let state = statements(&routine.state);
         let method = self.method(function);
         quote! {
@@ -250,11 +250,11 @@ impl Owner<'_> {
     }
 
     /// What a program reads of the pose.
-    fn pose(&self, pose: &Pose, routine: &Routine) -> TokenStream {
+    fn pose_bindings(&self, pose: &SharedPose, routine: &StatementRoutine) -> TokenStream {
         let called = (0..pose.routine.results.len()).map(|k| {
             let atom = Atom::Shared(k);
             if routine.read.contains(&atom) {
-                Rust.name(self.scope.name(atom))
+                RustSyntax.name(self.scope.input_name(atom))
             } else {
                 "_".to_owned()
             }
@@ -262,14 +262,14 @@ impl Owner<'_> {
         let inputs = pose
             .inputs
             .iter()
-            .map(|atom| Rust.name(self.scope.name(*atom)));
+            .map(|atom| RustSyntax.name(self.scope.input_name(*atom)));
         let inputs: Vec<String> = inputs.collect();
         let end = format!("] = self.pose.at(&*n, [{}])?;", inputs.join(", "));
-        lines(&filled("let [", called, &end))
+        line_tokens(&fill_lines("let [", called, &end))
     }
 
     /// The method; where the passive coordinates are found by Newton's method, a second one that takes a guess.
-    fn method(&self, function: &Function<'_>) -> TokenStream {
+    fn method(&self, function: &ProgramMethod<'_>) -> TokenStream {
         let Some(output) = &function.output else {
             return TokenStream::new();
         };
@@ -284,7 +284,7 @@ impl Owner<'_> {
         };
         let run = |inputs: TokenStream| match &function.results {
             None => quote! { at(&#item(self), #inputs) },
-            Some(Results { of, made }) => quote! {
+            Some(ResultConversion { from_type: of, conversion: made }) => quote! {
                 let found: #of = at(&#item(self), #inputs)?;
                 Ok(#made)
             },
@@ -338,8 +338,8 @@ impl Owner<'_> {
     }
 
     fn model(&self) -> TokenStream {
-        match self.made {
-            Made::Geometry if self.name == "Model" => quote! { self },
+        match self.preparation {
+            PreparationInputs::Geometry if self.name == "Model" => quote! { self },
             _ => quote! { self.model },
         }
     }
@@ -347,27 +347,27 @@ impl Owner<'_> {
     /// What the inputs are called, those that are not read by nothing, and where their names are.
     fn inputs(
         &self,
-        function: &Function<'_>,
-        routine: &Routine,
+        function: &ProgramMethod<'_>,
+        routine: &StatementRoutine,
     ) -> (Vec<TokenStream>, TokenStream) {
         let newton =
-            function.told == Told::Motion && reads_passive(self.derivation, function.program);
-        let atoms = match function.told {
-            Told::Motion => inputs_of_state(self.derivation, newton),
-            Told::Pose => {
+            function.inputs == ProgramStateInputs::Motion && reads_passive(self.derivation, function.program);
+        let atoms = match function.inputs {
+            ProgramStateInputs::Motion => inputs_of_state(self.derivation, newton),
+            ProgramStateInputs::Pose => {
                 let (active, passive) = self.derivation.coordinates();
                 let all = active.into_iter().chain(passive);
                 all.map(Atom::Coordinate).collect()
             }
         };
-        let names = match (function.told, newton) {
-            (Told::Motion, false) => quote! { INPUTS },
-            (Told::Motion, true) => quote! { INPUTS_WITH_PASSIVE },
-            (Told::Pose, _) => quote! { POSE },
+        let names = match (function.inputs, newton) {
+            (ProgramStateInputs::Motion, false) => quote! { INPUTS },
+            (ProgramStateInputs::Motion, true) => quote! { INPUTS_WITH_PASSIVE },
+            (ProgramStateInputs::Pose, _) => quote! { POSE },
         };
         let called = atoms.into_iter().map(|atom| {
             if routine.read.contains(&atom) {
-                let name = of_field(self.scope.name(atom));
+                let name = field_identifier(self.scope.input_name(atom));
                 quote! { #name }
             } else {
                 quote! { _ }
@@ -377,9 +377,9 @@ impl Owner<'_> {
     }
 
     /// Constants, parameters and base parameters that are read, by their names.
-    fn given(&self, read: &BTreeSet<Atom>, at_state: bool) -> TokenStream {
+    fn input_bindings(&self, read: &BTreeSet<Atom>, at_state: bool) -> TokenStream {
         let owner = at_state.then(|| quote! { self. });
-        given(
+        parameter_bindings(
             self.derivation,
             self.scope,
             read,
@@ -391,9 +391,9 @@ impl Owner<'_> {
 }
 
 /// Names for what is read of geometry, parameters and base parameters, with `n` in scope.
-pub(super) fn given(
+pub(super) fn parameter_bindings(
     derivation: &Derivation,
-    scope: &Scope,
+    scope: &NameScope,
     read: &BTreeSet<Atom>,
     geometry: &TokenStream,
     parameters: &TokenStream,
@@ -418,7 +418,7 @@ pub(super) fn given(
             return TokenStream::new();
         }
         let fields = wanted.iter().map(|i| {
-            let (field, name) = (of_field(names[*i]), of_field(scope.name(atom(*i))));
+            let (field, name) = (field_identifier(names[*i]), field_identifier(scope.input_name(atom(*i))));
             if field == name {
                 quote! { #field }
             } else {
@@ -433,8 +433,8 @@ pub(super) fn given(
     let physical = record("Parameters", &physical, Atom::Parameter, parameters);
     let n_base = derivation.reduction.retained.len();
     let read_base = (0..n_base).filter(|k| read.contains(&Atom::Base(*k)));
-    let base = variables(
-        read_base.map(|k| (of_field(scope.name(Atom::Base(k))), k)),
+    let base = array_bindings(
+        read_base.map(|k| (field_identifier(scope.input_name(Atom::Base(k))), k)),
         base,
     );
     let pi = read
@@ -444,28 +444,28 @@ pub(super) fn given(
 }
 
 /// Entries of an array that are the same at every state, as variables.
-fn variables(entries: impl Iterator<Item = (Ident, usize)>, array: &str) -> TokenStream {
+fn array_bindings(entries: impl Iterator<Item = (Ident, usize)>, array: &str) -> TokenStream {
     let entries = entries.map(|(name, k)| format!("{name} = {k}"));
     let mut entries = entries.peekable();
     if entries.peek().is_none() {
         return TokenStream::new();
     }
-    lines(&filled(&format!("read!(n, {array}; "), entries, ");"))
+    line_tokens(&fill_lines(&format!("read!(n, {array}; "), entries, ");"))
 }
 
 /// What is computed once and read by a program.
-fn kept(once: &Once, routine: &Routine) -> TokenStream {
+fn precomputed_bindings(once: &PrecomputedValues, routine: &StatementRoutine) -> TokenStream {
     let places = once.kept.iter().enumerate();
     let read = places.filter(|(_, name)| routine.kept.contains(name));
-    variables(read.map(|(k, name)| (of_field(name), k)), "self.once")
+    array_bindings(read.map(|(k, name)| (field_identifier(name), k)), "self.once")
 }
 
 /// The struct of what programs share of a pose.
-pub(super) fn pose(derivation: &Derivation, scope: &Scope) -> TokenStream {
+pub(super) fn pose(derivation: &Derivation, scope: &NameScope) -> TokenStream {
     let Some(pose) = &scope.pose else {
         return TokenStream::new();
     };
-    let given_once = given(
+    let given_once = parameter_bindings(
         derivation,
         scope,
         &pose.once.read,
@@ -476,9 +476,9 @@ pub(super) fn pose(derivation: &Derivation, scope: &Scope) -> TokenStream {
     let written_once = statements(&pose.once.statements());
     let begin = (!pose.once.kept.is_empty())
         .then(|| quote! { let n = &One::<T>::new(); #given_once #written_once });
-    let names: Vec<Ident> = pose.once.kept.iter().map(|name| of_field(name)).collect();
+    let names: Vec<Ident> = pose.once.kept.iter().map(|name| field_identifier(name)).collect();
     let n_kept = Literal::usize_unsuffixed(names.len());
-    let read = given(
+    let read = parameter_bindings(
         derivation,
         scope,
         &pose.routine.read,
@@ -486,17 +486,17 @@ pub(super) fn pose(derivation: &Derivation, scope: &Scope) -> TokenStream {
         &TokenStream::new(),
         "",
     );
-    let kept = kept(&pose.once, &pose.routine);
-    let called = |atom: &Atom| of_field(scope.name(*atom));
+    let kept = precomputed_bindings(&pose.once, &pose.routine);
+    let called = |atom: &Atom| field_identifier(scope.input_name(*atom));
     let n_inputs = Literal::usize_unsuffixed(pose.inputs.len());
     let inputs = pose.inputs.iter().map(|atom| called(atom).to_string());
-    let inputs = lines(&filled("let [", inputs, "] = q;"));
+    let inputs = line_tokens(&fill_lines("let [", inputs, "] = q;"));
     let n_results = Literal::usize_unsuffixed(pose.routine.results.len());
     let state = pose.routine.state.iter();
-    let state = state.filter(|statement| !matches!(statement, Statement::Put { .. }));
-    let state = statements(&state.cloned().collect::<Vec<Statement>>());
-    let results = (0..pose.routine.results.len()).map(|k| Rust.name(scope.name(Atom::Shared(k))));
-    let results = verbatim(&filled("Ok(variables![", results, "])").join("\n"));
+    let state = state.filter(|statement| !matches!(statement, CodeStatement::Put { .. }));
+    let state = statements(&state.cloned().collect::<Vec<CodeStatement>>());
+    let results = (0..pose.routine.results.len()).map(|k| RustSyntax.name(scope.input_name(Atom::Shared(k))));
+    let results = verbatim_tokens(&fill_lines("Ok(variables![", results, "])").join("\n"));
     quote! {
         /// Where the loops close and the drives are at a pose, the same for all programs.
         #[derive(Clone, Copy, Debug, PartialEq)]
@@ -528,13 +528,13 @@ pub(super) fn pose(derivation: &Derivation, scope: &Scope) -> TokenStream {
 }
 
 /// The value of a program without a state, with `geometry` in scope.
-pub(super) fn single(derivation: &Derivation, scope: &Scope, program: &Program) -> TokenStream {
-    let routine = Routine::new(program, scope, &[]);
+pub(super) fn single_value(derivation: &Derivation, scope: &NameScope, program: &StraightLineProgram) -> TokenStream {
+    let routine = StatementRoutine::new(program, scope, &[]);
     let (geometry, nothing) = (quote! { geometry }, TokenStream::new());
     let read: BTreeSet<Atom> = routine.read_once.union(&routine.read).copied().collect();
-    let given = given(derivation, scope, &read, &geometry, &nothing, "");
+    let given = parameter_bindings(derivation, scope, &read, &geometry, &nothing, "");
     let once = statements(&routine.once);
-    let result = routine.results.first().map(|result| Rust.term(result));
+    let result = routine.results.first().map(|result| RustSyntax.operand_text(result));
     let result: TokenStream = result.unwrap_or_default().parse().unwrap_or_default();
     quote! { { let n = &One::<T>::new(); #given #once (#result).get() } }
 }

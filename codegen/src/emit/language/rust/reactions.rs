@@ -3,16 +3,16 @@
 use proc_macro2::{Literal, TokenStream};
 use quote::quote;
 
-use super::items::count;
-use super::program::{Function, Made, More, Owner, Results, Told};
-use crate::emit::tree::Scope;
-use crate::{Derivation, Reactions};
+use super::items::operation_count;
+use super::program::{ProgramMethod, PreparationInputs, ExtraItems, ProgramStruct, ResultConversion, ProgramStateInputs};
+use crate::emit::tree::NameScope;
+use crate::{Derivation, ReactionPrograms};
 
 /// The struct `Reactions` with its tables.
 pub(super) fn reactions(
     derivation: &Derivation,
-    scope: &Scope,
-    reactions: &Reactions,
+    scope: &NameScope,
+    reactions: &ReactionPrograms,
 ) -> TokenStream {
     let program = &reactions.program;
     let three = |places: &[Option<usize>; 3]| {
@@ -32,24 +32,24 @@ pub(super) fn reactions(
     let loops = reactions.loops.iter().map(|closed| three(&closed.force));
     let made = quote! { Transmitted { joints: [#(#joints),*], loops: [#(#loops),*] } };
     let n_outputs = Literal::usize_unsuffixed(program.outputs.len());
-    let function = Function {
+    let function = ProgramMethod {
         program,
         name: "transmitted",
         item: "Wrenches",
         doc: format!(
             "Forces and moments in all joints, and the forces that close the loops. {}.",
-            count(program)
+            operation_count(program)
         ),
-        told: Told::Motion,
+        inputs: ProgramStateInputs::Motion,
         outputs: names(reactions),
         output: Some(quote! { Transmitted<T> }),
-        results: Some(Results {
-            of: quote! { [T; #n_outputs] },
-            made,
+        results: Some(ResultConversion {
+            from_type: quote! { [T; #n_outputs] },
+            conversion: made,
         }),
     };
     let tables = tables(reactions);
-    let owner = Owner {
+    let owner = ProgramStruct {
         derivation,
         scope,
         name: "Reactions",
@@ -62,9 +62,9 @@ pub(super) fn reactions(
         },
         prepares: "Prepares the recursion: what does not depend on the state is computed once.",
         is_public: true,
-        made: Made::Parameters,
+        preparation: PreparationInputs::Parameters,
         functions: vec![function],
-        more: More::default(),
+        more: ExtraItems::default(),
     };
     let owner = owner.tokens();
     quote! {
@@ -86,7 +86,7 @@ pub(super) fn reactions(
 }
 
 /// Names of the program's outputs: `F_upper_x`, `M_upper_z`, `F_loop_x`.
-fn names(reactions: &Reactions) -> Vec<String> {
+fn names(reactions: &ReactionPrograms) -> Vec<String> {
     let mut names = vec![String::new(); reactions.program.outputs.len()];
     let mut name = |letter: &str, of: &str, places: &[Option<usize>; 3]| {
         let of = of.replace(|c: char| !c.is_ascii_alphanumeric(), "_");
@@ -106,7 +106,7 @@ fn names(reactions: &Reactions) -> Vec<String> {
     names
 }
 
-fn tables(reactions: &Reactions) -> TokenStream {
+fn tables(reactions: &ReactionPrograms) -> TokenStream {
     let n_joints = Literal::usize_unsuffixed(reactions.joints.len());
     let n_loops = Literal::usize_unsuffixed(reactions.loops.len());
     let joints = reactions.joints.iter().map(|joint| {

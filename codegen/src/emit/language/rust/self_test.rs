@@ -3,31 +3,31 @@
 use proc_macro2::{Literal, TokenStream};
 use quote::quote;
 
-use super::items::{nominal, scale};
-use super::program::{Function, Made, More, Owner, Told};
+use super::items::{nominal_values, loop_scale};
+use super::program::{ProgramMethod, PreparationInputs, ExtraItems, ProgramStruct, ProgramStateInputs};
 use crate::Derivation;
-use crate::derive::self_test::reaches;
-use crate::emit::identifier::of_field;
-use crate::emit::tree::{Scope, uses_load};
+use crate::derive::self_test::self_test_reach;
+use crate::emit::identifier::field_identifier;
+use crate::emit::tree::{NameScope, uses_load};
 
 /// The function `self_test`, and the regressor of all products that it needs.
 #[allow(clippy::too_many_lines, reason = "one text from top to bottom")]
-pub(super) fn self_test(derivation: &Derivation, scope: &Scope) -> TokenStream {
+pub(super) fn self_test(derivation: &Derivation, scope: &NameScope) -> TokenStream {
     let mechanism = &derivation.mechanism;
     let products = &derivation.reduction.products;
     let n_products = Literal::usize_unsuffixed(products.len());
     let program = &derivation.programs.full_regressor;
-    let function = Function {
+    let function = ProgramMethod {
         program,
         name: "all_columns",
         item: "Columns",
         doc: "H: one row per drive, one column per product of parameters.".to_owned(),
-        told: Told::Motion,
+        inputs: ProgramStateInputs::Motion,
         outputs: Vec::new(),
         output: Some(quote! { [[T; N_PRODUCTS]; N_DRIVES] }),
         results: None,
     };
-    let owner = Owner {
+    let owner = ProgramStruct {
         derivation,
         scope,
         name: "AllColumns",
@@ -36,15 +36,15 @@ pub(super) fn self_test(derivation: &Derivation, scope: &Scope) -> TokenStream {
         },
         prepares: "Prepares what depends on the geometry alone.",
         is_public: false,
-        made: Made::Geometry,
+        preparation: PreparationInputs::Geometry,
         functions: vec![function],
-        more: More::default(),
+        more: ExtraItems::default(),
     };
     let owner = owner.tokens();
     let fields: Vec<_> = mechanism
         .parameters
         .iter()
-        .map(|p| of_field(&p.name))
+        .map(|p| field_identifier(&p.name))
         .collect();
     let values = products.iter().map(|product| {
         let powers = product.0.iter();
@@ -55,10 +55,10 @@ pub(super) fn self_test(derivation: &Derivation, scope: &Scope) -> TokenStream {
         quote! { 1.0 #(#factors)* }
     });
     let (active, _) = derivation.coordinates();
-    let scale = scale(derivation, scope);
+    let scale = loop_scale(derivation, scope);
     let scaled = scale.as_ref().map(|_| quote! { scale });
-    let nominal = nominal(derivation, &active, scaled.as_ref());
-    let reach = active.iter().zip(reaches(derivation)).map(|(i, reach)| {
+    let nominal = nominal_values(derivation, &active, scaled.as_ref());
+    let reach = active.iter().zip(self_test_reach(derivation)).map(|(i, reach)| {
         let scale = scaled
             .as_ref()
             .filter(|_| mechanism.coordinates[*i].motion.is_length());

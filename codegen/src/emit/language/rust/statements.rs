@@ -6,9 +6,9 @@
 use proc_macro2::{Literal, TokenStream};
 use quote::quote;
 
-use crate::emit::identifier::of_field;
-use crate::emit::language::syntax::Syntax;
-use crate::emit::tree::{Check, Statement};
+use crate::emit::identifier::field_identifier;
+use crate::emit::language::syntax::LanguageSyntax;
+use crate::emit::tree::{PoseCheck, CodeStatement};
 use crate::expr::Unary;
 
 /// What a line of a program begins with on its way.
@@ -18,18 +18,18 @@ const LINE: char = '\u{a7}';
 const WIDTH: usize = 88;
 
 /// The syntax of Rust, with `n` for the arithmetic in scope.
-pub(super) struct Rust;
+pub(super) struct RustSyntax;
 
-impl Syntax for Rust {
+impl LanguageSyntax for RustSyntax {
     fn name(&self, name: &str) -> String {
-        of_field(name).to_string()
+        field_identifier(name).to_string()
     }
 
     fn number(&self, value: f64) -> String {
         format!("{value:?}")
     }
 
-    fn alone(&self, value: f64) -> String {
+    fn standalone_number(&self, value: f64) -> String {
         format!("n.number({value:?})")
     }
 
@@ -52,22 +52,22 @@ impl Syntax for Rust {
 }
 
 /// Statements as tokens that become lines.
-pub(super) fn statements(statements: &[Statement]) -> TokenStream {
+pub(super) fn statements(statements: &[CodeStatement]) -> TokenStream {
     let mut written = Vec::new();
     for statement in statements {
         write(statement, 0, &mut written);
     }
-    lines(&written)
+    line_tokens(&written)
 }
 
 /// Lines as tokens.
-pub(super) fn lines(written: &[String]) -> TokenStream {
+pub(super) fn line_tokens(written: &[String]) -> TokenStream {
     let texts = written.iter().map(|line| format!("{LINE}{line}"));
     quote! { #(#texts;)* }
 }
 
 /// Items of a list between its begin and its end, in as many lines as they need.
-pub(super) fn filled(start: &str, items: impl Iterator<Item = String>, end: &str) -> Vec<String> {
+pub(super) fn fill_lines(start: &str, items: impl Iterator<Item = String>, end: &str) -> Vec<String> {
     let mut lines = vec![start.to_owned()];
     let mut items = items.peekable();
     while let Some(mut item) = items.next() {
@@ -89,13 +89,13 @@ pub(super) fn filled(start: &str, items: impl Iterator<Item = String>, end: &str
 }
 
 /// An item of a list as tokens that become what it says.
-pub(super) fn verbatim(text: &str) -> TokenStream {
+pub(super) fn verbatim_tokens(text: &str) -> TokenStream {
     let text = format!("{LINE}{text}");
     quote! { #text }
 }
 
 /// Printed source with its lines in place.
-pub(super) fn with_lines(source: &str) -> String {
+pub(super) fn restore_lines(source: &str) -> String {
     let start = format!("\"{LINE}");
     let mut text = String::with_capacity(source.len());
     for line in source.lines() {
@@ -134,24 +134,24 @@ fn literal_length(text: &str) -> usize {
     text.len()
 }
 
-fn write(statement: &Statement, depth: usize, lines: &mut Vec<String>) {
+fn write(statement: &CodeStatement, depth: usize, lines: &mut Vec<String>) {
     let indent = "    ".repeat(depth);
     let mut line = |text: String| lines.push(format!("{indent}{text}"));
     match statement {
-        Statement::Section(text) => line(format!("// {text}")),
-        Statement::Let { name, value, note } => {
+        CodeStatement::Section(text) => line(format!("// {text}")),
+        CodeStatement::Let { name, value, note } => {
             let note = note
                 .as_ref()
                 .map_or(String::new(), |note| format!(" // {note}"));
             line(format!(
                 "let {} = {};{note}",
-                Rust.name(name),
-                Rust.term(value)
+                RustSyntax.name(name),
+                RustSyntax.operand_text(value)
             ));
         }
-        Statement::Angles(angles) => {
+        CodeStatement::Angles(angles) => {
             let values = angles.iter().map(|angle| {
-                let value = Rust.term(&angle.value);
+                let value = RustSyntax.operand_text(&angle.value);
                 if angle.plain {
                     value
                 } else {
@@ -165,34 +165,34 @@ fn write(statement: &Statement, depth: usize, lines: &mut Vec<String>) {
             }
             line(format!("let angles = n.angles([{}]);", values.join(", ")));
         }
-        Statement::SinCos {
+        CodeStatement::SinCos {
             sine,
             cosine,
             angle,
-            asked,
+            requested: asked,
         } => {
             let name = |name: &Option<String>| match name {
-                Some(name) => Rust.name(name),
+                Some(name) => RustSyntax.name(name),
                 None => "_".to_owned(),
             };
             let value = match asked {
                 Some(k) => format!("n.sin_cos_of(&angles, {k})"),
-                None => format!("n.sin_cos({})", Rust.term(angle)),
+                None => format!("n.sin_cos({})", RustSyntax.operand_text(angle)),
             };
             line(format!("let ({}, {}) = {value};", name(sine), name(cosine)));
         }
-        Statement::Guard(check) => line(match check {
-            Check::Reachable(value) => format!("n.reachable({})?;", Rust.term(value)),
-            Check::Regular(value, size) => {
-                format!("n.regular({}, {})?;", Rust.term(value), Rust.term(size))
+        CodeStatement::Guard(check) => line(match check {
+            PoseCheck::Reachable(value) => format!("n.reachable({})?;", RustSyntax.operand_text(value)),
+            PoseCheck::Regular(value, size) => {
+                format!("n.regular({}, {})?;", RustSyntax.operand_text(value), RustSyntax.operand_text(size))
             }
-            Check::Finite(value) => format!("n.finite({})?;", Rust.term(value)),
+            PoseCheck::Finite(value) => format!("n.finite({})?;", RustSyntax.operand_text(value)),
         }),
-        Statement::Put { output, value } => {
-            line(format!("n.put({output}, {});", Rust.term(value)));
+        CodeStatement::Put { output, value } => {
+            line(format!("n.put({output}, {});", RustSyntax.operand_text(value)));
         }
-        Statement::Group { statements, handed } => {
-            let names: Vec<String> = handed.iter().map(|name| Rust.name(name)).collect();
+        CodeStatement::Group { statements, exported: handed } => {
+            let names: Vec<String> = handed.iter().map(|name| RustSyntax.name(name)).collect();
             let names = names.join(", ");
             if handed.is_empty() {
                 line("{".to_owned());
@@ -213,7 +213,7 @@ fn write(statement: &Statement, depth: usize, lines: &mut Vec<String>) {
 }
 
 /// A number without a suffix.
-pub(super) fn number(value: f64) -> TokenStream {
+pub(super) fn number_token(value: f64) -> TokenStream {
     let magnitude = Literal::f64_unsuffixed(value.abs());
     if value.is_sign_negative() {
         quote! { -#magnitude }

@@ -11,21 +11,21 @@ const DEEPEST: usize = 32;
 
 /// Type of a field.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum Type {
-    Number(Number),
+pub(super) enum RosFieldType {
+    Number(RosNumberType),
     Text,
     /// Seconds and nanoseconds, of which the seconds of a duration have a sign; those of a time in ROS 1 have none.
     Time {
         is_signed: bool,
     },
-    Message(Rc<Definition>),
+    Message(Rc<RosMessageDefinition>),
     /// As many as are given, or as the message says.
-    List(Box<Type>, Option<usize>),
+    List(Box<RosFieldType>, Option<usize>),
 }
 
 /// Types of numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Number {
+pub(super) enum RosNumberType {
     Bool,
     I8,
     U8,
@@ -41,18 +41,18 @@ pub(super) enum Number {
 
 /// A message: its fields in their order.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Definition {
-    pub(super) fields: Vec<(String, Type)>,
+pub(super) struct RosMessageDefinition {
+    pub(super) fields: Vec<(String, RosFieldType)>,
 }
 
 /// Whose rules hold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Ros {
+pub(super) enum RosVersion {
     One,
     Two,
 }
 
-impl Number {
+impl RosNumberType {
     const NAMES: [(&'static str, Self); 14] = [
         ("bool", Self::Bool),
         ("boolean", Self::Bool),
@@ -70,9 +70,9 @@ impl Number {
         ("double", Self::F64),
     ];
 
-    fn named(name: &str, ros: Ros) -> Option<Self> {
+    fn from_name(name: &str, ros: RosVersion) -> Option<Self> {
         match (name, ros) {
-            ("byte", Ros::One) => return Some(Self::I8),
+            ("byte", RosVersion::One) => return Some(Self::I8),
             ("byte" | "char" | "octet", _) => return Some(Self::U8),
             _ => {}
         }
@@ -100,8 +100,8 @@ impl Number {
 /// The definition of the message `name` in `text`, with those that it needs.
 ///
 /// Fails when one of them is missing or cannot be read.
-pub(super) fn read(name: &str, text: &str, ros: Ros) -> Result<Rc<Definition>, String> {
-    let own = plain(name);
+pub(super) fn parse_definition(name: &str, text: &str, ros: RosVersion) -> Result<Rc<RosMessageDefinition>, String> {
+    let own = short_type_name(name);
     let mut texts = BTreeMap::new();
     let (mut current, mut lines) = (own.clone(), Vec::new());
     for line in text.lines() {
@@ -113,33 +113,33 @@ pub(super) fn read(name: &str, text: &str, ros: Ros) -> Result<Rc<Definition>, S
             lines.clear();
             current = String::new();
         } else if let (true, Some(name)) = (current.is_empty(), trimmed.strip_prefix("MSG:")) {
-            current = plain(name.trim());
+            current = short_type_name(name.trim());
         } else {
             lines.push(trimmed);
         }
     }
     texts.entry(current).or_insert(lines);
-    let mut reader = Reader {
+    let mut reader = RosDefinitionParser {
         texts,
         done: BTreeMap::new(),
         ros,
     };
-    reader.definition(&own, 0)
+    reader.parse_message(&own, 0)
 }
 
 /// `package/Name`, however much stands between.
-fn plain(name: &str) -> String {
+fn short_type_name(name: &str) -> String {
     name.replace("/msg/", "/")
 }
 
-struct Reader<'a> {
+struct RosDefinitionParser<'a> {
     texts: BTreeMap<String, Vec<&'a str>>,
-    done: BTreeMap<String, Rc<Definition>>,
-    ros: Ros,
+    done: BTreeMap<String, Rc<RosMessageDefinition>>,
+    ros: RosVersion,
 }
 
-impl Reader<'_> {
-    fn definition(&mut self, name: &str, depth: usize) -> Result<Rc<Definition>, String> {
+impl RosDefinitionParser<'_> {
+    fn parse_message(&mut self, name: &str, depth: usize) -> Result<Rc<RosMessageDefinition>, String> {
         if let Some(done) = self.done.get(name) {
             return Ok(done.clone());
         }
@@ -147,11 +147,11 @@ impl Reader<'_> {
             return Err(format!("`{name}` holds itself"));
         }
         let Some(lines) = self.texts.get(name).cloned() else {
-            return match well_known(name) {
+            return match well_known_definition(name) {
                 Some(text) => {
                     let lines = text.lines().collect();
                     self.texts.insert(name.to_owned(), lines);
-                    self.definition(name, depth)
+                    self.parse_message(name, depth)
                 }
                 None => Err(format!("the file does not define `{name}`")),
             };
@@ -176,19 +176,19 @@ impl Reader<'_> {
             if end == 0 {
                 return Err(format!("the line `{line}` of `{name}` cannot be read"));
             }
-            fields.push((rest[..end].to_owned(), self.kind(kind, name, depth)?));
+            fields.push((rest[..end].to_owned(), self.parse_field_type(kind, name, depth)?));
         }
-        let definition = Rc::new(Definition { fields });
+        let definition = Rc::new(RosMessageDefinition { fields });
         self.done.insert(name.to_owned(), definition.clone());
         Ok(definition)
     }
 
-    fn kind(&mut self, text: &str, within: &str, depth: usize) -> Result<Type, String> {
+    fn parse_field_type(&mut self, text: &str, within: &str, depth: usize) -> Result<RosFieldType, String> {
         if let Some((of, length)) = text
             .strip_suffix(']')
             .and_then(|text| text.rsplit_once('['))
         {
-            let of = self.kind(of, within, depth)?;
+            let of = self.parse_field_type(of, within, depth)?;
             let length = match length {
                 "" => None,
                 most if most.starts_with("<=") => None,
@@ -198,22 +198,22 @@ impl Reader<'_> {
                         .map_err(|_| format!("`{text}` in `{within}` has no length"))?,
                 ),
             };
-            return Ok(Type::List(Box::new(of), length));
+            return Ok(RosFieldType::List(Box::new(of), length));
         }
         let bare = text.split("<=").next().unwrap_or(text);
-        if let Some(number) = Number::named(bare, self.ros) {
-            return Ok(Type::Number(number));
+        if let Some(number) = RosNumberType::from_name(bare, self.ros) {
+            return Ok(RosFieldType::Number(number));
         }
         match (bare, self.ros) {
-            ("string", _) => return Ok(Type::Text),
+            ("string", _) => return Ok(RosFieldType::Text),
             ("wstring", _) => {
                 return Err(format!("`{within}` holds a `wstring`, which is not read"));
             }
-            ("time", Ros::One) => return Ok(Type::Time { is_signed: false }),
-            ("duration", Ros::One) => return Ok(Type::Time { is_signed: true }),
+            ("time", RosVersion::One) => return Ok(RosFieldType::Time { is_signed: false }),
+            ("duration", RosVersion::One) => return Ok(RosFieldType::Time { is_signed: true }),
             _ => {}
         }
-        let full = match plain(bare) {
+        let full = match short_type_name(bare) {
             header if header == "Header" => "std_msgs/Header".to_owned(),
             full if full.contains('/') => full,
             short => {
@@ -222,14 +222,14 @@ impl Reader<'_> {
             }
         };
         if full == "builtin_interfaces/Time" || full == "builtin_interfaces/Duration" {
-            return Ok(Type::Time { is_signed: true });
+            return Ok(RosFieldType::Time { is_signed: true });
         }
-        Ok(Type::Message(self.definition(&full, depth + 1)?))
+        Ok(RosFieldType::Message(self.parse_message(&full, depth + 1)?))
     }
 }
 
 /// Messages that are everywhere, for files that do not say what is in them, as rosbag2 wrote until 2023.
-fn well_known(name: &str) -> Option<&'static str> {
+fn well_known_definition(name: &str) -> Option<&'static str> {
     let found = WELL_KNOWN.iter().find(|(known, _)| *known == name);
     found.map(|(_, text)| *text)
 }

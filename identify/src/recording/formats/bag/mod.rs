@@ -11,17 +11,17 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use indexmap::IndexMap;
 
-use crate::recording::column::Field;
-use crate::recording::error::Fault;
-use crate::recording::intake::{Flow, Intake};
-use crate::recording::join::{Part, joined};
-use crate::recording::notes::Note;
+use crate::recording::column::SampleField;
+use crate::recording::error::RecordingFault;
+use crate::recording::intake::{IntakeFlow, SampleIntake};
+use crate::recording::join::{JoinPart, join_parts};
+use crate::recording::notes::RecordingNote;
 use crate::recording::tables::{ColumnInfo, TableInfo};
-use crate::recording::{ReadOptions, Recording};
-use crate::words::list;
+use crate::recording::{ReadOptions, SignalRecording};
+use crate::words::backquoted_list;
 
-use definition::Ros;
-use message::{Content, Reader};
+use definition::RosVersion;
+use message::{RosMessageContent, RosMessageReader};
 
 /// More forms of messages than any topic has, such as sets of joints that speak on it in turns.
 const MOST_LAYOUTS: usize = 64;
@@ -35,17 +35,17 @@ const ARRIVAL: usize = 8;
 const EXACT: i64 = 1 << 53;
 
 /// What is taken of a log while its messages go by.
-pub(super) struct Bag<'a> {
-    topics: Vec<Topic>,
+pub(super) struct BagCollector<'a> {
+    topics: Vec<BagTopic>,
     /// Columns whose numbers are kept.
     is_kept: &'a dyn Fn(&str) -> bool,
-    kept: usize,
-    most: usize,
-    content: Content,
+    kept_numbers: usize,
+    max_numbers: usize,
+    content: RosMessageContent,
 }
 
 /// How the messages of a topic are written.
-pub(super) struct Encoding<'a> {
+pub(super) struct BagEncoding<'a> {
     /// `cdr`, `ros1`, or what is not read.
     pub(super) messages: &'a str,
     /// `ros2msg`, `ros1msg`, or what is not read.
@@ -53,20 +53,20 @@ pub(super) struct Encoding<'a> {
     pub(super) text: &'a str,
 }
 
-struct Topic {
+struct BagTopic {
     name: String,
     kind: String,
     /// What reads its messages, or why they are left aside.
-    reader: Result<Reader, String>,
+    reader: Result<RosMessageReader, String>,
     columns: IndexMap<String, TopicColumn>,
-    layouts: Vec<Layout>,
+    layouts: Vec<BagMessageLayout>,
     shapes: BTreeMap<Vec<u8>, usize>,
-    messages: Vec<Arrival>,
+    messages: Vec<MessageArrival>,
     count: usize,
 }
 
 /// A form of messages, and what is known of those that have it.
-struct Layout {
+struct BagMessageLayout {
     /// Its columns by their places.
     places: Vec<usize>,
     /// Whether numbers of it are kept.
@@ -87,7 +87,7 @@ struct TopicColumn {
 
 /// One message, beside its numbers.
 #[derive(Clone, Copy)]
-struct Arrival {
+struct MessageArrival {
     layout: usize,
     /// Times of its arrival and in it, ns.
     log: i64,
@@ -95,7 +95,7 @@ struct Arrival {
 }
 
 /// Columns of a topic that are in the same messages.
-struct Table {
+struct BagTable {
     topic: String,
     columns: Vec<(String, &'static str, Option<Vec<f64>>)>,
     /// Times of the messages whose numbers are kept, ns.
@@ -106,22 +106,22 @@ struct Table {
     span: Option<(i64, i64)>,
 }
 
-impl<'a> Bag<'a> {
+impl<'a> BagCollector<'a> {
     fn new(is_kept: &'a dyn Fn(&str) -> bool, most: usize) -> Self {
         Self {
             topics: Vec::new(),
             is_kept,
-            kept: 0,
-            most,
-            content: Content::default(),
+            kept_numbers: 0,
+            max_numbers: most,
+            content: RosMessageContent::default(),
         }
     }
 
     /// A topic, to which [`Bag::message`] refers by the number that comes back.
-    pub(super) fn topic(&mut self, name: &str, kind: &str, encoding: &Encoding<'_>) -> usize {
+    pub(super) fn register_topic(&mut self, name: &str, kind: &str, encoding: &BagEncoding<'_>) -> usize {
         let ros = match (encoding.messages, encoding.definition) {
-            ("cdr", "ros2msg" | "") => Ok(Ros::Two),
-            ("ros1", "ros1msg") => Ok(Ros::One),
+            ("cdr", "ros2msg" | "") => Ok(RosVersion::Two),
+            ("ros1", "ros1msg") => Ok(RosVersion::One),
             ("cdr" | "ros1", other) => {
                 Err(format!("its definition is `{other}`, which is not read"))
             }
@@ -130,11 +130,11 @@ impl<'a> Bag<'a> {
             )),
         };
         let reader = ros.and_then(|ros| {
-            let definition = definition::read(kind, encoding.text, ros)?;
-            Ok(Reader::new(definition, ros))
+            let definition = definition::parse_definition(kind, encoding.text, ros)?;
+            Ok(RosMessageReader::new(definition, ros))
         });
         let name = name.strip_prefix('/').unwrap_or(name);
-        self.topics.push(Topic {
+        self.topics.push(BagTopic {
             name: name.to_owned(),
             kind: kind.to_owned(),
             reader,
@@ -150,7 +150,7 @@ impl<'a> Bag<'a> {
     /// Takes a message that arrived at `log`, ns.
     ///
     /// Fails when it cannot be read although others of its topic could, and when more numbers would be kept than allowed.
-    pub(super) fn message(&mut self, topic: usize, log: i64, bytes: &[u8]) -> Result<(), Fault> {
+    pub(super) fn take_message(&mut self, topic: usize, log: i64, bytes: &[u8]) -> Result<(), RecordingFault> {
         let topic = &mut self.topics[topic];
         topic.count += 1;
         let Ok(reader) = &topic.reader else {
@@ -158,7 +158,7 @@ impl<'a> Bag<'a> {
         };
         let layout = reader
             .read(bytes, &mut self.content)
-            .and_then(|()| topic.layout(bytes, &self.content, self.is_kept));
+            .and_then(|()| topic.layout_of_message(bytes, &self.content, self.is_kept));
         let layout = match layout {
             Ok(layout) => layout,
             Err(says) if topic.count == 1 => {
@@ -166,9 +166,9 @@ impl<'a> Bag<'a> {
                 return Ok(());
             }
             Err(says) => {
-                return Err(Fault::Format {
+                return Err(RecordingFault::Format {
                     format: "a log of ROS messages",
-                    says: format!(
+                    message: format!(
                         "message {} of `{}` cannot be read: {says}; is the file complete, and the definition its own?",
                         topic.count, topic.name
                     ),
@@ -178,8 +178,8 @@ impl<'a> Bag<'a> {
         let form = &mut topic.layouts[layout];
         let stamp = self.content.stamp;
         form.count += 1;
-        extend(&mut form.log, log);
-        extend(&mut form.stamp, stamp.unwrap_or(0));
+        extend_span(&mut form.log, log);
+        extend_span(&mut form.stamp, stamp.unwrap_or(0));
         form.has_stamps &= stamp.is_some_and(|stamp| stamp != 0);
         if !form.is_kept {
             return Ok(());
@@ -187,13 +187,13 @@ impl<'a> Bag<'a> {
         for (place, value) in form.places.iter().zip(&self.content.numbers) {
             if let Some(values) = &mut topic.columns[*place].values {
                 values.push(*value);
-                self.kept += 1;
+                self.kept_numbers += 1;
             }
         }
-        topic.messages.push(Arrival { layout, log, stamp });
-        self.kept += ARRIVAL;
-        if self.kept > self.most {
-            return Err(Fault::TooLarge {
+        topic.messages.push(MessageArrival { layout, log, stamp });
+        self.kept_numbers += ARRIVAL;
+        if self.kept_numbers > self.max_numbers {
+            return Err(RecordingFault::TooLarge {
                 line: topic.count as u64,
                 samples: topic.count,
                 columns: topic.columns.len(),
@@ -203,17 +203,17 @@ impl<'a> Bag<'a> {
         Ok(())
     }
 
-    fn tables(self) -> Vec<Table> {
-        self.topics.into_iter().flat_map(Topic::tables).collect()
+    fn tables(self) -> Vec<BagTable> {
+        self.topics.into_iter().flat_map(BagTopic::tables).collect()
     }
 }
 
-impl Topic {
+impl BagTopic {
     /// The form of a message whose numbers and shape are known.
-    fn layout(
+    fn layout_of_message(
         &mut self,
         bytes: &[u8],
-        content: &Content,
+        content: &RosMessageContent,
         is_kept: &dyn Fn(&str) -> bool,
     ) -> Result<usize, String> {
         if let Some(known) = self.shapes.get(&content.shape) {
@@ -253,7 +253,7 @@ impl Topic {
             for place in &places {
                 self.columns[*place].layouts.insert(self.layouts.len());
             }
-            self.layouts.push(Layout {
+            self.layouts.push(BagMessageLayout {
                 is_kept: places
                     .iter()
                     .any(|place| self.columns[*place].values.is_some()),
@@ -276,7 +276,7 @@ impl Topic {
     }
 
     /// Its columns, those of the same messages together; messages in the order in which they arrived.
-    fn tables(self) -> Vec<Table> {
+    fn tables(self) -> Vec<BagTable> {
         let mut tables: IndexMap<BTreeSet<usize>, Vec<(String, TopicColumn)>> = IndexMap::new();
         for (name, column) in self.columns {
             tables
@@ -286,13 +286,13 @@ impl Topic {
         }
         // Publishers that know no time leave it at zero.
         let has_stamps = self.layouts.iter().all(|layout| layout.has_stamps);
-        let time_of = |one: &Arrival| match one.stamp {
+        let time_of = |one: &MessageArrival| match one.stamp {
             Some(stamp) if has_stamps => stamp,
             _ => one.log,
         };
         let mut all = Vec::new();
         for (layouts, columns) in tables {
-            let messages: Vec<&Arrival> = self
+            let messages: Vec<&MessageArrival> = self
                 .messages
                 .iter()
                 .filter(|one| layouts.contains(&one.layout))
@@ -305,10 +305,10 @@ impl Topic {
             for (first, last) in
                 forms().filter_map(|form| if has_stamps { form.stamp } else { form.log })
             {
-                extend(&mut span, first);
-                extend(&mut span, last);
+                extend_span(&mut span, first);
+                extend_span(&mut span, last);
             }
-            all.push(Table {
+            all.push(BagTable {
                 samples: forms().map(|form| form.count).sum(),
                 span,
                 topic: self.name.clone(),
@@ -325,21 +325,21 @@ impl Topic {
 }
 
 /// Shows all messages of a log to a [`Bag`].
-pub(super) type Show<'a> = &'a mut dyn FnMut(&mut Bag<'_>) -> Result<(), Fault>;
+pub(super) type BagReplay<'a> = &'a mut dyn FnMut(&mut BagCollector<'_>) -> Result<(), RecordingFault>;
 
 /// The recording of a log: the columns that are needed, joined on time.
-pub(super) fn read(show: Show<'_>, file: &str, options: &ReadOptions) -> Result<Recording, Fault> {
-    let is_kept = |name: &str| options.needs(name);
-    let mut bag = Bag::new(&is_kept, options.most_numbers);
+pub(super) fn read(show: BagReplay<'_>, file: &str, options: &ReadOptions) -> Result<SignalRecording, RecordingFault> {
+    let is_kept = |name: &str| options.is_column_needed(name);
+    let mut bag = BagCollector::new(&is_kept, options.max_numbers);
     show(&mut bag)?;
     let tables = bag.tables();
-    let mut intake = Intake::new(names_of(&tables), options)?;
+    let mut intake = SampleIntake::new(names_of(&tables), options)?;
     let mut parts = Vec::new();
     let mut place = 1;
     for table in tables {
         let mut columns = Vec::new();
         for (_, _, values) in table.columns {
-            if let Some(values) = values.filter(|_| intake.reads(place)) {
+            if let Some(values) = values.filter(|_| intake.is_place_needed(place)) {
                 columns.push((place, values));
             }
             place += 1;
@@ -352,9 +352,9 @@ pub(super) fn read(show: Show<'_>, file: &str, options: &ReadOptions) -> Result<
         .map(|part| part.0.clone())
         .collect();
     if !late.is_empty() {
-        intake.note(Note::info(format!(
+        intake.note(RecordingNote::info(format!(
             "Messages of {} in {file} bear no time of their own: the time is that of their arrival.",
-            list(&late)
+            backquoted_list(&late)
         )));
     }
     let times = || parts.iter().flat_map(|part| &part.2);
@@ -364,22 +364,22 @@ pub(super) fn read(show: Show<'_>, file: &str, options: &ReadOptions) -> Result<
     } else {
         times().copied().min().unwrap_or(0)
     };
-    let parts = parts.into_iter().map(|(name, _, time, columns)| Part {
+    let parts = parts.into_iter().map(|(name, _, time, columns)| JoinPart {
         name,
         time: time.iter().map(|t| seconds(t.wrapping_sub(zero))).collect(),
         columns,
     });
-    let Some(together) = joined(parts.collect(), &mut |note| intake.note(note))? else {
-        return Err(Fault::NoSamples);
+    let Some(together) = join_parts(parts.collect(), &mut |note| intake.note(note))? else {
+        return Err(RecordingFault::NoSamples);
     };
-    let mut sample = vec![Field::Number(0.0); intake.width()];
+    let mut sample = vec![SampleField::Number(0.0); intake.width()];
     for (k, time) in together.time.iter().enumerate() {
-        sample[0] = Field::finite(*time);
+        sample[0] = SampleField::finite(*time);
         for (place, values) in &together.columns {
-            sample[*place] = Field::finite(values[k]);
+            sample[*place] = SampleField::finite(values[k]);
         }
         let text = |_: usize| "NaN or infinite".to_owned();
-        if intake.take(k as u64 + 1, &sample, &text)? == Flow::Stop {
+        if intake.take_sample(k as u64 + 1, &sample, &text)? == IntakeFlow::Stop {
             break;
         }
     }
@@ -387,15 +387,15 @@ pub(super) fn read(show: Show<'_>, file: &str, options: &ReadOptions) -> Result<
 }
 
 /// Names of the columns of a log, the time in front.
-pub(super) fn names(show: Show<'_>) -> Result<Vec<String>, Fault> {
-    let mut bag = Bag::new(&|_| false, usize::MAX);
+pub(super) fn names(show: BagReplay<'_>) -> Result<Vec<String>, RecordingFault> {
+    let mut bag = BagCollector::new(&|_| false, usize::MAX);
     show(&mut bag)?;
     Ok(names_of(&bag.tables()))
 }
 
 /// The topics of a log.
-pub(super) fn tables(show: Show<'_>) -> Result<Vec<TableInfo>, Fault> {
-    let mut bag = Bag::new(&|_| false, usize::MAX);
+pub(super) fn tables(show: BagReplay<'_>) -> Result<Vec<TableInfo>, RecordingFault> {
+    let mut bag = BagCollector::new(&|_| false, usize::MAX);
     show(&mut bag)?;
     let mut found = Vec::new();
     for topic in bag.topics {
@@ -458,14 +458,14 @@ pub(super) fn tables(show: Show<'_>) -> Result<Vec<TableInfo>, Fault> {
     Ok(found)
 }
 
-fn names_of(tables: &[Table]) -> Vec<String> {
+fn names_of(tables: &[BagTable]) -> Vec<String> {
     let names = tables.iter().flat_map(|table| &table.columns);
     let names = names.map(|(name, _, _)| name.clone());
     std::iter::once("t".to_owned()).chain(names).collect()
 }
 
 /// Widens a span of times to hold another one.
-fn extend(span: &mut Option<(i64, i64)>, time: i64) {
+fn extend_span(span: &mut Option<(i64, i64)>, time: i64) {
     let (first, last) = span.unwrap_or((time, time));
     *span = Some((first.min(time), last.max(time)));
 }
