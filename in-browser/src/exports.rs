@@ -3,7 +3,7 @@
 
 use std::cell::RefCell;
 
-use modelmill_workbench::Desk;
+use modelmill_workbench::RequestHandler;
 
 #[link(wasm_import_module = "mill")]
 unsafe extern "C" {
@@ -13,15 +13,15 @@ unsafe extern "C" {
     safe fn goes(start: *const u8, length: usize);
 }
 
-struct State {
-    desk: Desk,
+struct BrowserState {
+    desk: RequestHandler,
     given: Vec<u8>,
     answer: String,
 }
 
 thread_local! {
-    static STATE: RefCell<State> = RefCell::new(State {
-        desk: Desk::new(|| seconds(), |told| {
+    static STATE: RefCell<BrowserState> = RefCell::new(BrowserState {
+        desk: RequestHandler::new(|| seconds(), |told| {
             let told = told.to_string();
             goes(told.as_ptr(), told.len());
         }),
@@ -43,8 +43,8 @@ pub extern "C" fn reserve(length: usize) -> *mut u8 {
 #[unsafe(no_mangle)]
 pub extern "C" fn put(name: usize) {
     STATE.with_borrow_mut(|state| {
-        let (name, bytes) = split(&state.given, name);
-        state.desk.put(&name, bytes);
+        let (name, bytes) = split_input(&state.given, name);
+        state.desk.add_file(&name, bytes);
     });
 }
 
@@ -52,8 +52,8 @@ pub extern "C" fn put(name: usize) {
 #[unsafe(no_mangle)]
 pub extern "C" fn ask(question: usize) -> usize {
     STATE.with_borrow_mut(|state| {
-        let (question, body) = split(&state.given, question);
-        state.answer = state.desk.ask(&question, body);
+        let (question, body) = split_input(&state.given, question);
+        state.answer = state.desk.answer_request(&question, body);
         state.answer.len()
     })
 }
@@ -64,7 +64,7 @@ pub extern "C" fn answer() -> *const u8 {
     STATE.with_borrow(|state| state.answer.as_ptr())
 }
 
-fn split(given: &[u8], head: usize) -> (String, &[u8]) {
+fn split_input(given: &[u8], head: usize) -> (String, &[u8]) {
     let (head, rest) = given.split_at(head.min(given.len()));
     (String::from_utf8_lossy(head).into_owned(), rest)
 }

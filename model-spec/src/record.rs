@@ -54,7 +54,7 @@ macro_rules! record {
         #[allow(dead_code)] // Remarks, for example, are there for people and for the schema.
         pub(crate) struct $name {
             /// The place of the table.
-            pub(crate) span: $crate::diagnostic::Span,
+            pub(crate) span: $crate::diagnostic::SourceSpan,
             $( $(#[doc = $doc])* pub(crate) $field: Option<$type>, )*
             /// True if something in the table was faulty, so that what seems to be missing may be there.
             pub(crate) faulty: bool,
@@ -66,15 +66,15 @@ macro_rules! record {
 
             /// Reads a table; every fault is reported, and what is sound comes back.
             pub(crate) fn from_table(
-                table: &$crate::document::Table,
-                span: $crate::diagnostic::Span,
-                log: &mut $crate::diagnostic::Log,
+                table: &$crate::document::TomlTable,
+                span: $crate::diagnostic::SourceSpan,
+                log: &mut $crate::diagnostic::DiagnosticLog,
             ) -> Self {
                 let n_errors = log.n_errors();
                 $crate::record::check_keys(table, Self::KEYS, $title, log);
                 Self {
                     span,
-                    $( $field: $crate::record::field::<$type>(
+                    $( $field: $crate::record::read_field::<$type>(
                         table,
                         $key,
                         $crate::record::need!($need).then_some(Self::KEYS),
@@ -87,12 +87,12 @@ macro_rules! record {
             }
         }
 
-        impl $crate::record::Read for $name {
+        impl $crate::record::SchemaValue for $name {
             const EXPECTED: &'static str = concat!("a table: ", $title);
             const EXAMPLE: &'static str = concat!("{ ", $crate::record::first!($($key),*), " = ... }");
 
-            fn read(node: &$crate::document::Node, log: &mut $crate::diagnostic::Log) -> Option<Self> {
-                let $crate::document::Value::Table(table) = &node.value else {
+            fn read(node: &$crate::document::TomlNode, log: &mut $crate::diagnostic::DiagnosticLog) -> Option<Self> {
+                let $crate::document::TomlValue::Table(table) = &node.value else {
                     return $crate::record::wrong_type::<Self>(node, log);
                 };
                 Some(Self::from_table(table, node.span, log))
@@ -109,7 +109,7 @@ macro_rules! record {
                 let mut properties = serde_json::Map::new();
                 let mut required: Vec<&str> = Vec::new();
                 $(
-                    let schema = $crate::record::described(
+                    let schema = $crate::record::with_description(
                         generator.subschema_for::<$type>(), concat!($($doc, "\n"),*));
                     properties.insert($key.to_owned(), schema);
                     if $crate::record::need!($need) {

@@ -13,12 +13,12 @@ macro_rules! words {
             $($(#[$says])* $variant),*
         }
 
-        impl $crate::record::Read for $name {
+        impl $crate::record::SchemaValue for $name {
             const EXPECTED: &'static str = $expected;
             const EXAMPLE: &'static str = concat!("\"", $crate::record::first!($($word),*), "\"");
 
-            fn read(node: &$crate::document::Node, log: &mut $crate::diagnostic::Log) -> Option<Self> {
-                let $crate::document::Value::Text { text, .. } = &node.value else {
+            fn read(node: &$crate::document::TomlNode, log: &mut $crate::diagnostic::DiagnosticLog) -> Option<Self> {
+                let $crate::document::TomlValue::Text { text, .. } = &node.value else {
                     return $crate::record::wrong_type::<Self>(node, log);
                 };
                 match text.as_str() {

@@ -20,7 +20,7 @@ pub struct ExportedRobot {
 /// Writes a model file that was read from `path` with its nominal values as a URDF or MJCF. Nothing is derived for it.
 ///
 /// Fails when the format does not know how a joint or a lumped mass of the model is.
-pub fn description(path: &str, loaded: &LoadedModel, format: DescriptionFormat) -> Outcome<ExportedRobot> {
+pub fn description(path: &str, loaded: &LoadedModel, format: Format) -> Outcome<ExportedRobot> {
     let exported = modelmill_reduction::export(&loaded.mechanism, format)
         .map_err(|error| Error::input(format!("{path}: {error}")))?;
     Ok(ExportedRobot {
@@ -34,7 +34,7 @@ impl Model {
     /// what messages call it.
     ///
     /// Fails when a fit has base parameters only, since these say nothing of single bodies, and as [`description`] does.
-    pub fn export(&self, format: DescriptionFormat, fit: Option<(&FitFile, &str)>) -> Outcome<ExportedRobot> {
+    pub fn export(&self, format: Format, fit: Option<(&FitFile, &str)>) -> Outcome<ExportedRobot> {
         let Some((fit, file)) = fit else {
             return description(&self.path, &self.loaded, format);
         };

@@ -143,7 +143,7 @@ macro_rules! functions {
 
 macro_rules! terms {
     ($($term:ident)*) => {$(
-        impl<V: Value> $term<V> {
+        impl<V: ProgramValue> $term<V> {
             /// Its value.
             #[allow(clippy::inline_always, reason = "an instruction at most")]
             #[inline(always)]
@@ -168,7 +168,7 @@ macro_rules! terms {
         }
 
         #[allow(clippy::inline_always, reason = "one instruction")]
-        impl<V: Value> Neg for $term<V> {
+        impl<V: ProgramValue> Neg for $term<V> {
             type Output = Var<V>;
             #[inline(always)]
             fn neg(self) -> Var<V> {
@@ -183,7 +183,7 @@ terms! { Var DeferredProduct }
 macro_rules! operators {
     ($($left:ident $operator:ident::$method:ident $right:ident = $output:ident, |$a:ident, $b:ident| $result:expr;)*) => {$(
         #[allow(clippy::inline_always, reason = "an instruction or two")]
-        impl<V: Value> $operator<$right<V>> for $left<V> {
+        impl<V: ProgramValue> $operator<$right<V>> for $left<V> {
             type Output = $output<V>;
             #[inline(always)]
             fn $method(self, other: $right<V>) -> $output<V> {
@@ -217,26 +217,26 @@ macro_rules! with_numbers {
     ($($term:ident)*) => {$(
         with_numbers! { $term Add::add = Var, |a, b| a + b }
         with_numbers! { $term Sub::sub = Var, |a, b| a - b }
-        with_numbers! { $term Mul::mul = Product, |a, b| a * b }
+        with_numbers! { $term Mul::mul = DeferredProduct, |a, b| a * b }
         with_numbers! { $term Div::div = Var, |a, b| a / b }
     )*};
     ($term:ident $operator:ident::$method:ident = $output:ident, |$a:ident, $b:ident| $result:expr) => {
         #[allow(clippy::inline_always, reason = "an instruction or two")]
-        impl<V: Value> $operator<f64> for $term<V> {
+        impl<V: ProgramValue> $operator<f64> for $term<V> {
             type Output = $output<V>;
             #[inline(always)]
             fn $method(self, other: f64) -> $output<V> {
-                let ($a, $b) = (self, Var(self.0.like(other)));
+                let ($a, $b) = (self, Var(self.0.number_like(other)));
                 $result
             }
         }
 
         #[allow(clippy::inline_always, reason = "an instruction or two")]
-        impl<V: Value> $operator<$term<V>> for f64 {
+        impl<V: ProgramValue> $operator<$term<V>> for f64 {
             type Output = $output<V>;
             #[inline(always)]
             fn $method(self, other: $term<V>) -> $output<V> {
-                let ($a, $b) = (Var(other.0.like(self)), other);
+                let ($a, $b) = (Var(other.0.number_like(self)), other);
                 $result
             }
         }

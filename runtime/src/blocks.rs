@@ -70,10 +70,10 @@ macro_rules! line {
             }
         }
 
-        impl Line<$float> for $name {
+        impl CacheLine<$float> for $name {
             const LENGTH: usize = $length;
             #[inline]
-            fn filled(x: $float) -> Self {
+            fn splat(x: $float) -> Self {
                 Self([x; $length])
             }
         }
@@ -135,19 +135,19 @@ impl<T: BlockScalar> VectorWidth<T> for ScalarWidth {
 
 #[cfg(not(feature = "std"))]
 mod singly {
-    use super::{BlockError, Blocks, Job, Line32, Line64, Singly};
+    use super::{BlockError, BlockScalar, Line32, Line64, ScalarWidth, VectorJob};
 
     impl BlockScalar for f64 {
         type Line = Line64;
-        fn run<J: VectorJob<Self>>(job: J) -> Result<(), BlockError> {
-            job.with(ScalarWidth)
+        fn run_job<J: VectorJob<Self>>(job: J) -> Result<(), BlockError> {
+            job.run_vectors(ScalarWidth)
         }
     }
 
     impl BlockScalar for f32 {
         type Line = Line32;
-        fn run<J: VectorJob<Self>>(job: J) -> Result<(), BlockError> {
-            job.with(ScalarWidth)
+        fn run_job<J: VectorJob<Self>>(job: J) -> Result<(), BlockError> {
+            job.run_vectors(ScalarWidth)
         }
     }
 }

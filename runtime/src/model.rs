@@ -278,7 +278,7 @@ macro_rules! program {
     ($item:ident, $owner:ident, $method:ident, $names:expr, $inputs:expr, $outputs:expr) => {
         struct $item<'a, T>(&'a $owner<T>);
 
-        impl<T: $crate::Real> $crate::blocks::Program<T, $inputs, $outputs> for $item<'_, T> {
+        impl<T: $crate::Real> $crate::blocks::StateProgram<T, $inputs, $outputs> for $item<'_, T> {
             const NAMES: [&'static str; $inputs] = $names;
 
             #[inline(always)]
@@ -286,9 +286,9 @@ macro_rules! program {
                 &self,
                 numbers: &N,
                 inputs: [$crate::Var<N::Value>; $inputs],
-                outputs: &mut impl $crate::Outputs<N::Value>,
+                outputs: &mut impl $crate::OutputSink<N::Value>,
             ) -> Result<(), $crate::PoseError> {
-                self.0.$method(&mut $crate::Running {
+                self.0.$method(&mut $crate::ProgramRun {
                     numbers,
                     inputs,
                     outputs,
@@ -353,8 +353,8 @@ macro_rules! record {
 
             /// The same as variables of a program.
             #[inline(always)]
-            fn on<N: $crate::Numbers<Scalar = T>>(&self, n: &N) -> $record<$crate::Var<N::Value>> {
-                $record { $($field: n.of(self.$field)),+ }
+            fn as_variables<N: $crate::Numbers<Scalar = T>>(&self, n: &N) -> $record<$crate::Var<N::Value>> {
+                $record { $($field: n.broadcast(self.$field)),+ }
             }
         }
     };
@@ -370,7 +370,7 @@ macro_rules! record {
 #[macro_export]
 macro_rules! read {
     ($n:ident, $array:expr; $($name:ident = $k:literal),+ $(,)?) => {
-        $(let $name = $n.of($array[$k]);)+
+        $(let $name = $n.broadcast($array[$k]);)+
     };
 }
 
@@ -552,12 +552,12 @@ macro_rules! forces_of_many {
         $crate::forces_of_many!(@ |model| Forces(model), inputs);
     };
     (followed) => {
-        $crate::forces_of_many!(@ |model| $crate::Followed(Forces(model), &model.model), {
+        $crate::forces_of_many!(@ |model| $crate::ContinuationProgram(Forces(model), &model.model), {
             |states: &States<'a, T>| inputs_with_passive(states, &[&[]; N_PASSIVE])
         });
     };
     (@ |$model:ident| $program:expr, $inputs:tt) => {
-        impl<T: $crate::blocks::Blocks> InverseDynamics<T> {
+        impl<T: $crate::blocks::BlockScalar> InverseDynamics<T> {
             /// [`Self::forces`] at many states, in the widest vectors of the machine if the runtime has its feature `std`.
             ///
             /// One array per drive, as long as those of the states.
@@ -570,7 +570,7 @@ macro_rules! forces_of_many {
                 states: &States<'a, T>,
                 outputs: &mut [&mut [T]; N_DRIVES],
             ) -> Result<(), $crate::blocks::BlockError> {
-                $crate::ready(self.input)?;
+                $crate::check_block_input(self.input)?;
                 let $model = self;
                 $crate::blocks::fill_columns(&$program, &$inputs(states), outputs)
             }
@@ -587,7 +587,7 @@ macro_rules! forces_of_many {
             where
                 T: Send + Sync,
             {
-                $crate::ready(self.input)?;
+                $crate::check_block_input(self.input)?;
                 let $model = self;
                 $crate::blocks::fill_columns_in_parallel(&$program, &$inputs(states), outputs)
             }
@@ -601,9 +601,9 @@ macro_rules! forces_of_many {
             pub fn forces_in_blocks<'a>(
                 &self,
                 states: &States<'a, T>,
-                visit: impl FnMut($crate::blocks::Block<'_, T::Line, N_DRIVES>),
+                visit: impl FnMut($crate::blocks::StateBlock<'_, T::Line, N_DRIVES>),
             ) -> Result<(), $crate::blocks::BlockError> {
-                $crate::ready(self.input)?;
+                $crate::check_block_input(self.input)?;
                 let $model = self;
                 $crate::blocks::visit_blocks(&$program, &$inputs(states), visit)
             }
@@ -621,12 +621,12 @@ macro_rules! regressor_of_many {
         $crate::regressor_of_many!(@ |model| Regressor(model), inputs);
     };
     (followed) => {
-        $crate::regressor_of_many!(@ |model| $crate::Followed(Regressor(model), model), {
+        $crate::regressor_of_many!(@ |model| $crate::ContinuationProgram(Regressor(model), model), {
             |states: &States<'a, T>| inputs_with_passive(states, &[&[]; N_PASSIVE])
         });
     };
     (@ |$model:ident| $program:expr, $inputs:tt) => {
-        impl<T: $crate::blocks::Blocks> Model<T> {
+        impl<T: $crate::blocks::BlockScalar> Model<T> {
             /// [`Self::regressor`] at many states, in the widest vectors of the machine if the runtime has its feature
             /// `std`.
             ///
@@ -640,7 +640,7 @@ macro_rules! regressor_of_many {
                 states: &States<'a, T>,
                 outputs: &mut [T],
             ) -> Result<(), $crate::blocks::BlockError> {
-                $crate::ready(self.input)?;
+                $crate::check_block_input(self.input)?;
                 let ($model, inputs) = (self, $inputs(states));
                 let n = $crate::blocks::n_states(&$program, &inputs)?;
                 let mut columns = $crate::blocks::columns_of(outputs, n)?;
@@ -659,7 +659,7 @@ macro_rules! regressor_of_many {
             where
                 T: Send + Sync,
             {
-                $crate::ready(self.input)?;
+                $crate::check_block_input(self.input)?;
                 let ($model, inputs) = (self, $inputs(states));
                 let n = $crate::blocks::n_states(&$program, &inputs)?;
                 let mut columns = $crate::blocks::columns_of(outputs, n)?;
@@ -675,9 +675,9 @@ macro_rules! regressor_of_many {
             pub fn regressor_in_blocks<'a>(
                 &self,
                 states: &States<'a, T>,
-                visit: impl FnMut($crate::blocks::Block<'_, T::Line, { N_DRIVES * N_BASE }>),
+                visit: impl FnMut($crate::blocks::StateBlock<'_, T::Line, { N_DRIVES * N_BASE }>),
             ) -> Result<(), $crate::blocks::BlockError> {
-                $crate::ready(self.input)?;
+                $crate::check_block_input(self.input)?;
                 let $model = self;
                 $crate::blocks::visit_blocks(&$program, &$inputs(states), visit)
             }

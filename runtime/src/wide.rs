@@ -87,12 +87,12 @@ macro_rules! wide {
             }
 
             #[inline(always)]
-            fn hold(&self, mask: S::$mask) {
+            fn mask_lanes(&self, mask: S::$mask) {
                 self.regular.set(self.simd.$and(self.regular.get(), mask));
             }
 
             #[inline(always)]
-            fn all_regular(&self) -> bool {
+            fn is_all_regular(&self) -> bool {
                 let irregular = self.simd.$not(self.regular.get());
                 self.simd.$first(irregular) >= S::$lanes
             }
@@ -100,13 +100,13 @@ macro_rules! wide {
 
         impl<S: Simd> $value<S> {
             #[inline(always)]
-            fn with(self, v: S::$floats) -> Self {
+            fn with_vector(self, v: S::$floats) -> Self {
                 Self { simd: self.simd, v }
             }
 
             /// A function that has no vector form, lane by lane.
             #[inline(always)]
-            fn each(self, f: impl Fn($float) -> $float) -> Self {
+            fn map_lanes(self, f: impl Fn($float) -> $float) -> Self {
                 let mut line = [0.0; $line::LENGTH];
                 if let Some(to) = S::$of_slice_mut(&mut line).0.first_mut() {
                     *to = self.v;
@@ -115,49 +115,49 @@ macro_rules! wide {
                     *x = f(*x);
                 }
                 let first = S::$of_slice(&line).0.first();
-                first.map_or(self, |v| self.with(*v))
+                first.map_or(self, |v| self.with_vector(*v))
             }
         }
 
-        impl<S: Simd> Value for $value<S> {
+        impl<S: Simd> ProgramValue for $value<S> {
             #[inline(always)]
-            fn like(self, x: f64) -> Self {
-                self.with(self.simd.$splat(<$float as Real>::from_f64(x)))
+            fn number_like(self, x: f64) -> Self {
+                self.with_vector(self.simd.$splat(<$float as Real>::from_f64(x)))
             }
             #[inline(always)]
             fn plus_product(self, a: Self, b: Self) -> Self {
-                self.with(self.simd.$fused(a.v, b.v, self.v))
+                self.with_vector(self.simd.$fused(a.v, b.v, self.v))
             }
             #[inline(always)]
             fn product_less(self, a: Self, b: Self) -> Self {
-                self.with(self.simd.$fused(a.v, b.v, self.simd.$neg(self.v)))
+                self.with_vector(self.simd.$fused(a.v, b.v, self.simd.$neg(self.v)))
             }
             #[inline(always)]
             fn less_product(self, a: Self, b: Self) -> Self {
-                self.with(self.simd.$fused_less(a.v, b.v, self.v))
+                self.with_vector(self.simd.$fused_less(a.v, b.v, self.v))
             }
             #[inline(always)]
             fn sqrt(self) -> Self {
-                self.with(self.simd.$sqrt(self.v))
+                self.with_vector(self.simd.$sqrt(self.v))
             }
             #[inline(always)]
             fn abs(self) -> Self {
-                self.with(self.simd.$abs(self.v))
+                self.with_vector(self.simd.$abs(self.v))
             }
             #[inline(always)]
             fn sign(self) -> Self {
                 let simd = self.simd;
                 let (zero, one) = (simd.$splat(0.0), simd.$splat(1.0));
                 let below = simd.$select(simd.$less(self.v, zero), simd.$splat(-1.0), self.v);
-                self.with(simd.$select(simd.$greater(self.v, zero), one, below))
+                self.with_vector(simd.$select(simd.$greater(self.v, zero), one, below))
             }
             #[inline(always)]
             fn tanh(self) -> Self {
-                self.each(Real::tanh)
+                self.map_lanes(Real::tanh)
             }
             #[inline(always)]
             fn exp(self) -> Self {
-                self.each(Real::exp)
+                self.map_lanes(Real::exp)
             }
             #[inline(always)]
             fn atan2(self, x: Self) -> Self {
@@ -166,7 +166,7 @@ macro_rules! wide {
                     *to = x.v;
                 }
                 let at = Cell::new(0);
-                self.each(|y| {
+                self.map_lanes(|y| {
                     let k = at.replace(at.get() + 1);
                     Real::atan2(y, line.get(k).copied().unwrap_or_default())
                 })
@@ -178,32 +178,32 @@ macro_rules! wide {
             type Value = $value<S>;
 
             #[inline(always)]
-            fn of(&self, x: $float) -> Var<$value<S>> {
+            fn broadcast(&self, x: $float) -> Var<$value<S>> {
                 Var(self.value(self.simd.$splat(x)))
             }
             #[inline(always)]
             fn sin_cos(&self, angle: impl Term<$value<S>>) -> (Var<$value<S>>, Var<$value<S>>) {
                 let angle = angle.get();
                 let (simd, largest) = (self.simd, <$float as Real>::from_f64(LARGEST_ANGLE));
-                self.hold(simd.$less(simd.$abs(angle.v), simd.$splat(largest)));
+                self.mask_lanes(simd.$less(simd.$abs(angle.v), simd.$splat(largest)));
                 let (sin, cos) = angle.sin_cos();
                 (Var(sin), Var(cos))
             }
             #[inline(always)]
-            fn angles<const N: usize>(&self, angles: [Var<$value<S>>; N]) -> Angles<$value<S>, N> {
+            fn angles<const N: usize>(&self, angles: [Var<$value<S>>; N]) -> AngleBatch<$value<S>, N> {
                 let (simd, largest) = (self.simd, <$float as Real>::from_f64(LARGEST_ANGLE));
                 // What is no number may be lost in the larger of two; inputs are looked at before.
                 let mut size = simd.$splat(0.0);
                 for angle in angles {
                     size = simd.$max(size, simd.$abs(angle.0.v));
                 }
-                self.hold(simd.$less(size, simd.$splat(largest)));
-                Angles { sines: angles, cosines: angles }
+                self.mask_lanes(simd.$less(size, simd.$splat(largest)));
+                AngleBatch { sines: angles, cosines: angles }
             }
             #[inline(always)]
             fn sin_cos_of<const N: usize>(
                 &self,
-                angles: &Angles<$value<S>, N>,
+                angles: &AngleBatch<$value<S>, N>,
                 k: usize,
             ) -> (Var<$value<S>>, Var<$value<S>>) {
                 let (sin, cos) = angles.sines[k].0.sin_cos();
@@ -211,20 +211,20 @@ macro_rules! wide {
             }
             #[inline(always)]
             fn reachable(&self, x: impl Term<$value<S>>) -> Result<(), PoseError> {
-                self.hold(self.simd.$at_least(x.get().v, self.simd.$splat(0.0)));
+                self.mask_lanes(self.simd.$at_least(x.get().v, self.simd.$splat(0.0)));
                 Ok(())
             }
             #[inline(always)]
             fn regular(&self, x: impl Term<$value<S>>, size: impl Term<$value<S>>) -> Result<(), PoseError> {
                 let share = self.simd.$splat(<$float as Real>::singular());
                 let limit = self.simd.$mul(share, size.get().v);
-                self.hold(self.simd.$greater(self.simd.$abs(x.get().v), limit));
+                self.mask_lanes(self.simd.$greater(self.simd.$abs(x.get().v), limit));
                 Ok(())
             }
             #[inline(always)]
             fn finite(&self, x: impl Term<$value<S>>) -> Result<(), PoseError> {
                 let infinite = self.simd.$splat(<$float>::INFINITY);
-                self.hold(self.simd.$less(self.simd.$abs(x.get().v), infinite));
+                self.mask_lanes(self.simd.$less(self.simd.$abs(x.get().v), infinite));
                 Ok(())
             }
         }
@@ -236,7 +236,7 @@ macro_rules! wide {
             simd: S,
         }
 
-        impl<S: Simd, const OUTPUTS: usize> Outputs<$value<S>> for $put<'_, S, OUTPUTS> {
+        impl<S: Simd, const OUTPUTS: usize> OutputSink<$value<S>> for $put<'_, S, OUTPUTS> {
             #[inline(always)]
             fn put(&mut self, k: usize, value: impl Term<$value<S>>) {
                 let _ = self.simd;
@@ -249,9 +249,9 @@ macro_rules! wide {
         #[derive(Clone, Copy)]
         struct $vectors<S>(S);
 
-        impl<S: Simd> Vectors<$float> for $vectors<S> {
+        impl<S: Simd> VectorWidth<$float> for $vectors<S> {
             #[inline(always)]
-            fn line<P, const INPUTS: usize, const OUTPUTS: usize>(
+            fn run_line<P, const INPUTS: usize, const OUTPUTS: usize>(
                 self,
                 program: &P,
                 inputs: &[&[$float]; INPUTS],
@@ -259,7 +259,7 @@ macro_rules! wide {
                 outputs: &mut [$line; OUTPUTS],
             ) -> bool
             where
-                P: Program<$float, INPUTS, OUTPUTS>,
+                P: StateProgram<$float, INPUTS, OUTPUTS>,
             {
                 let simd = self.0;
                 let mut regular = true;
@@ -278,28 +278,28 @@ macro_rules! wide {
                             sum = simd.$add(sum, simd.$abs(*v));
                         }
                     }
-                    numbers.hold(simd.$less(sum, simd.$splat(<$float as Real>::largest())));
+                    numbers.mask_lanes(simd.$less(sum, simd.$splat(<$float as Real>::largest())));
                     let lines = &mut *outputs;
                     let mut put = $put { lines, part, simd };
                     regular &= program.run(&numbers, values, &mut put).is_ok();
-                    regular &= numbers.all_regular();
+                    regular &= numbers.is_all_regular();
                 }
                 regular
             }
         }
 
-        impl<J: Job<$float>> WithSimd for Chosen<J, $float> {
+        impl<J: VectorJob<$float>> WithSimd for DispatchedJob<J, $float> {
             type Output = Result<(), BlockError>;
             #[inline(always)]
             fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
-                self.0.with($vectors(simd))
+                self.0.run_vectors($vectors(simd))
             }
         }
 
-        impl Blocks for $float {
+        impl BlockScalar for $float {
             type Line = $line;
-            fn run<J: Job<Self>>(job: J) -> Result<(), BlockError> {
-                vectors().dispatch(Chosen(job, core::marker::PhantomData))
+            fn run_job<J: VectorJob<Self>>(job: J) -> Result<(), BlockError> {
+                widest_vectors().dispatch(DispatchedJob(job, core::marker::PhantomData))
             }
         }
     };

@@ -43,7 +43,7 @@ pub(crate) struct GenerateArgs {
     /// Model file (TOML)
     pub(crate) model: PathBuf,
     /// Write the source to this file instead of standard output; with --language c99, c or python, files to this folder
-    #[arg(long, value_name = "FILE.rs|DIR", required_if_eq_any(in_folders()))]
+    #[arg(long, value_name = "FILE.rs|DIR", required_if_eq_any(languages_in_folders()))]
     pub(crate) out: Option<PathBuf>,
     /// With the equation of motion: mass matrix, velocity terms, gravity, forward dynamics
     #[arg(long)]
@@ -55,7 +55,7 @@ pub(crate) struct GenerateArgs {
     #[arg(long)]
     pub(crate) self_test: bool,
     /// What to make: a Rust module, sources of plain C99, or a crate that builds a C library with its header or a Python module
-    #[arg(long, value_parser = languages(), default_value = Language::default().name())]
+    #[arg(long, value_parser = languages(), default_value = CodeLanguage::default().name())]
     pub(crate) language: CodeLanguage,
 }
 

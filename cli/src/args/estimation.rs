@@ -57,7 +57,7 @@ pub(crate) enum WeightsArg {
 pub(crate) struct StandstillArgs {
     /// Leave an equation out of the fit while its drive is slower than this part of its fastest, for at rest the
     /// friction takes any value; 0.01 is usual
-    #[arg(long, value_name = "PART", value_parser = parse_part)]
+    #[arg(long, value_name = "PART", value_parser = parse_fraction)]
     pub(crate) standstill: Option<f64>,
 }
 

@@ -54,7 +54,7 @@ pub(crate) struct ExciteArgs {
     /// Limits beside those of the model file, or in their place: a coordinate (`theta1=1.5:2.1`), its rate
     /// (`theta1_d=1.2`) or acceleration (`theta1_dd=4`), the force of a drive (`spindle_left=1500`), a point
     /// (`R3m.x=0.2:0.7`), or `singularity=0.3`; may be repeated
-    #[arg(long, value_name = "NAME=RANGE", value_delimiter = ',', value_parser = Limit::parse, allow_hyphen_values = true)]
+    #[arg(long, value_name = "NAME=RANGE", value_delimiter = ',', value_parser = TrajectoryLimit::parse, allow_hyphen_values = true)]
     pub(crate) limits: Vec<TrajectoryLimit>,
     /// What is made small
     #[arg(long, value_enum, default_value = "condition")]

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use modelmill::export::DescriptionFormat;
+use modelmill::export::Format as DescriptionFormat;
 
 use super::drawing::parse_value;
 

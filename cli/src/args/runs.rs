@@ -32,7 +32,7 @@ pub(crate) struct RunsArgs {
     #[arg(long, value_name = "RUN", required = true, num_args = 1..)]
     pub(crate) data: Vec<PathBuf>,
     /// Fit all runs at once, in which these are each run's own, separated by commas, e.g. `payload@flange,friction`
-    #[arg(long, value_name = "WHAT", value_delimiter = ',', value_parser = PerRun::parse)]
+    #[arg(long, value_name = "WHAT", value_delimiter = ',', value_parser = PerRunSelection::parse)]
     per_run: Vec<PerRunSelection>,
     /// A run carried a load of known mass, in kg, from which the scales of all measured forces follow; may be repeated
     #[arg(long, value_name = "RUN=MASS@BODY", value_parser = KnownLoad::parse)]

@@ -13,14 +13,14 @@ use modelmill::recording::RecordingOptions;
 pub(crate) struct SeparateArgs {
     /// Instead of exciting the base parameters, make this effect differ most from those of --from. Values of its
     /// parameters and constants in SI units follow the places: `coulomb_friction@motor:Fc=25.9`
-    #[arg(long, value_name = "KIND@PLACE,...[:NAME=VALUE]", value_parser = Named::parse, requires = "from",
+    #[arg(long, value_name = "KIND@PLACE,...[:NAME=VALUE]", value_parser = NamedEffect::parse, requires = "from",
           conflicts_with = "criterion")]
     pub(crate) separate: Option<NamedEffect>,
     /// What it may be taken for; may be repeated. Constants without a value are fitted like parameters
-    #[arg(long, value_name = "KIND@PLACE,...", value_parser = Named::parse, requires = "separate")]
+    #[arg(long, value_name = "KIND@PLACE,...", value_parser = NamedEffect::parse, requires = "separate")]
     pub(crate) from: Vec<NamedEffect>,
     /// An effect that is there in either case and that the model file lacks; may be repeated
-    #[arg(long, value_name = "KIND@PLACE,...[:NAME=VALUE]", value_parser = Named::parse, requires = "separate")]
+    #[arg(long, value_name = "KIND@PLACE,...[:NAME=VALUE]", value_parser = NamedEffect::parse, requires = "separate")]
     pub(crate) beside: Vec<NamedEffect>,
     /// Standard deviation of the noise in the forces, in N or N m, against which the difference is held
     #[arg(long, value_name = "SIZE", value_parser = parse_noise, requires = "separate", allow_negative_numbers = true)]

@@ -15,7 +15,7 @@ const UNBINDABLE_NAMES: [&str; 41] = [
     "Some",
     "Ok",
     "Err",
-    "One",
+    "ScalarNumbers",
     "Var",
     "ACTIVE",
     "BASE_PARAMETERS",

@@ -79,7 +79,7 @@ pub struct FitParameter {
     /// The value that the model file's nominal values give.
     pub nominal: Option<f64>,
     /// Left away for what is identified.
-    #[serde(default, skip_serializing_if = "Status::is_identified")]
+    #[serde(default, skip_serializing_if = "ParameterStatus::is_identified")]
     pub status: ParameterStatus,
 }
 

@@ -92,14 +92,14 @@ impl VariantLimits {
                 ];
                 for (name, range, values) in ranges {
                     if let Some(range) = range {
-                        self.record_use(m, &name, Some(range), used_fraction(values, range));
+                        self.record_use(m, &name, Some(range), used_share_of_range(values, range));
                     }
                 }
             }
             for (drive, range) in &mechanism.limits.forces {
                 let name = &mechanism.drives[drive.0].name;
                 let values = &forces[m][drive.0];
-                self.record_use(m, name, Some(*range), used_fraction(values, *range));
+                self.record_use(m, name, Some(*range), used_share_of_range(values, *range));
             }
             self.add_poses(m, model, &states[m])?;
         }
@@ -176,7 +176,7 @@ impl VariantLimits {
 }
 
 /// The part of a range that values use, from its middle.
-fn used_fraction(values: &[f64], [low, high]: [f64; 2]) -> f64 {
+fn used_share_of_range(values: &[f64], [low, high]: [f64; 2]) -> f64 {
     let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
     let far = values.iter().map(|v| (v - middle).abs() / half);
     far.fold(0.0, f64::max)

@@ -1,7 +1,7 @@
 //! What is not exact is found and sized: each number here is worked out by hand.
 
 use modelmill_boundary::files::MemoryFiles;
-use modelmill_reduction::{ReductionFinding, PlanarReduction, plan, plan_for, reduce, sampled_forces};
+use modelmill_reduction::{ReductionFinding, PlanarReduction, plan, default_plan, reduce, sampled_forces};
 use modelmill_rig::Rig;
 
 fn rig(text: &str) -> Rig {

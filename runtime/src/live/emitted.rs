@@ -1,6 +1,6 @@
 //! What an emitted module offers of a watch.
 
-/// The struct `Watch` of an emitted module: its own model, and [`Watch`](crate::live::Watch) of its own size.
+/// The struct `Watch` of an emitted module: its own model, and [`Watch`](crate::live::ParameterWatch) of its own size.
 ///
 /// In scope are `Model`, `Geometry`, `State`, `N_BASE` and `N_DRIVES`.
 #[macro_export]
@@ -13,7 +13,7 @@ macro_rules! watch {
         pub struct Watch<T> {
             model: Model<T>,
             /// The estimators and the test, whatever the model is.
-            pub live: $crate::live::Watch<T, N_BASE, N_DRIVES>,
+            pub live: $crate::live::ParameterWatch<T, N_BASE, N_DRIVES>,
         }
 
         impl<T: Real> Watch<T> {
@@ -25,7 +25,7 @@ macro_rules! watch {
             ) -> Self {
                 Self {
                     model: Model::new(geometry),
-                    live: $crate::live::Watch::new(base, options),
+                    live: $crate::live::ParameterWatch::new(base, options),
                 }
             }
 
@@ -40,7 +40,7 @@ macro_rules! watch {
                 &mut self,
                 state: &State<T>,
                 forces: &[T; N_DRIVES],
-            ) -> Result<&$crate::live::Verdict<T, N_BASE>, PoseError> {
+            ) -> Result<&$crate::live::WatchVerdict<T, N_BASE>, PoseError> {
                 let rows = self.model.regressor(state)?;
                 Ok(self.live.step(&rows, forces))
             }

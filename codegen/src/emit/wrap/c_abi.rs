@@ -141,7 +141,7 @@ fn items(face: &LanguageBinding<'_>) -> TokenStream {
         }
     };
     let prepared = quote! {
-        let Some(prepared) = (unsafe { prepared(dynamics) }) else {
+        let Some(prepared) = (unsafe { prepared_model(dynamics) }) else {
             return NOT_PREPARED;
         };
     };
@@ -252,13 +252,13 @@ fn items(face: &LanguageBinding<'_>) -> TokenStream {
             room: [u64; #words],
         }
 
-        struct Prepared {
+        struct PreparedModel {
             model: model::Model<f64>,
             dynamics: model::InverseDynamics<f64>,
             #equation_field
         }
 
-        const _: () = assert!(core::mem::size_of::<Prepared>() <= #words * 8 && core::mem::align_of::<Prepared>() <= 8);
+        const _: () = assert!(core::mem::size_of::<PreparedModel>() <= #words * 8 && core::mem::align_of::<PreparedModel>() <= 8);
 
         #(#records)*
 
@@ -313,9 +313,9 @@ fn items(face: &LanguageBinding<'_>) -> TokenStream {
             Some(unsafe { core::slice::from_raw_parts_mut(to, n.checked_mul(columns)?) })
         }
 
-        unsafe fn prepared<'a>(dynamics: *const #dynamics) -> Option<&'a Prepared> {
+        unsafe fn prepared_model<'a>(dynamics: *const #dynamics) -> Option<&'a PreparedModel> {
             let dynamics = unsafe { dynamics.as_ref() }?;
-            (dynamics.ready == READY).then(|| unsafe { &*dynamics.room.as_ptr().cast::<Prepared>() })
+            (dynamics.ready == READY).then(|| unsafe { &*dynamics.room.as_ptr().cast::<PreparedModel>() })
         }
 
         #[unsafe(no_mangle)]
@@ -367,13 +367,13 @@ fn items(face: &LanguageBinding<'_>) -> TokenStream {
                 return NULL_POINTER;
             }
             let geometry = self::geometry(geometry);
-            let prepared = Prepared {
+            let prepared = PreparedModel {
                 model: model::Model::new(&geometry),
                 dynamics: model::InverseDynamics::new(&geometry, base),
                 #equation_init
             };
             unsafe {
-                (&raw mut (*dynamics).room).cast::<Prepared>().write(prepared);
+                (&raw mut (*dynamics).room).cast::<PreparedModel>().write(prepared);
                 (&raw mut (*dynamics).ready).write(READY);
             }
             OK
@@ -445,7 +445,7 @@ fn single_state_function(face: &LanguageBinding<'_>, one: &WrappedFunction, near
         pub unsafe extern "C" fn #name(
             dynamics: *const #dynamics, #(#names: *const f64,)* #passive_argument output: *mut f64,
         ) -> i32 {
-            let Some(prepared) = (unsafe { prepared(dynamics) }) else {
+            let Some(prepared) = (unsafe { prepared_model(dynamics) }) else {
                 return NOT_PREPARED;
             };
             let (#(Some(#names)),*) = (#(unsafe { array::<#sizes>(#names) }),*) else {

@@ -127,7 +127,7 @@ fn items(face: &LanguageBinding<'_>) -> TokenStream {
         #(#records)*
 
         /// Values with some replaced by name.
-        fn replaced<const N: usize>(
+        fn with_replacements<const N: usize>(
             mut values: [f64; N], names: &[&str], by: Option<BTreeMap<String, f64>>,
         ) -> PyResult<[f64; N]> {
             for (name, value) in by.unwrap_or_default() {
@@ -142,25 +142,25 @@ fn items(face: &LanguageBinding<'_>) -> TokenStream {
 
         fn geometry_of(by: Option<BTreeMap<String, f64>>) -> PyResult<model::Geometry<f64>> {
             let names = model::CONSTANTS.map(|c| c.name);
-            Ok(geometry(&replaced(geometry_values(), &names, by)?))
+            Ok(geometry(&with_replacements(geometry_values(), &names, by)?))
         }
 
         fn value_error(text: String) -> PyErr {
             PyValueError::new_err(text)
         }
 
-        fn of_pose(error: PoseError) -> PyErr {
+        fn pose_error(error: PoseError) -> PyErr {
             value_error(error.to_string())
         }
 
         /// How many states arrays hold, and whether results have an axis for them.
-        struct Many {
+        struct BatchShape {
             n: usize,
             axis: bool,
         }
 
-        impl Many {
-            fn of(arrays: &[(&PyReadonlyArrayDyn<'_, f64>, &str, usize)]) -> PyResult<Self> {
+        impl BatchShape {
+            fn from_arrays(arrays: &[(&PyReadonlyArrayDyn<'_, f64>, &str, usize)]) -> PyResult<Self> {
                 let shape = arrays.first().map_or(&[][..], |a| a.0.shape());
                 let axis = shape.len() == 2;
                 let n = if axis { shape[1] } else { 1 };
@@ -183,7 +183,7 @@ fn items(face: &LanguageBinding<'_>) -> TokenStream {
 
             fn error(&self, error: BlockError) -> PyErr {
                 match error {
-                    BlockError::At { reason, .. } if !self.axis => of_pose(reason),
+                    BlockError::At { reason, .. } if !self.axis => pose_error(reason),
                     other => value_error(other.to_string()),
                 }
             }
@@ -256,8 +256,8 @@ fn items(face: &LanguageBinding<'_>) -> TokenStream {
         }
 
         /// Results of one state after the other, entry by entry, without Python's lock.
-        fn computed(
-            py: Python<'_>, many: &Many, entries: usize, at: impl Fn(usize) -> Result<Vec<f64>, PoseError> + Sync,
+        fn compute_results(
+            py: Python<'_>, many: &BatchShape, entries: usize, at: impl Fn(usize) -> Result<Vec<f64>, PoseError> + Sync,
         ) -> PyResult<Vec<f64>> {
             let n = many.n;
             let done = py.detach(|| {
@@ -274,8 +274,8 @@ fn items(face: &LanguageBinding<'_>) -> TokenStream {
         }
 
         /// An array of results for Python.
-        fn shaped<'py>(
-            py: Python<'py>, many: &Many, values: &[f64], shape: &[usize],
+        fn shape_results<'py>(
+            py: Python<'py>, many: &BatchShape, values: &[f64], shape: &[usize],
         ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
             PyArray1::from_slice(py, values).reshape(many.shape(shape))
         }
@@ -289,7 +289,7 @@ fn items(face: &LanguageBinding<'_>) -> TokenStream {
             py: Python<'py>, parameters: Option<BTreeMap<String, f64>>, geometry: Option<BTreeMap<String, f64>>,
         ) -> PyResult<Bound<'py, PyArray1<f64>>> {
             let names = model::PARAMETERS.map(|c| c.name);
-            let values = replaced(parameters_values(), &names, parameters)?;
+            let values = with_replacements(parameters_values(), &names, parameters)?;
             let base = model::base_parameters(&geometry_of(geometry)?, &self::parameters(&values))
                 .map_err(|special| value_error(special.to_string()))?;
             Ok(PyArray1::from_slice(py, &base))
@@ -329,7 +329,7 @@ fn arrays(parts: &[(Ident, usize)]) -> TokenStream {
     let (names, sizes): (Vec<_>, Vec<usize>) = parts.iter().map(|(name, n)| (name, *n)).unzip();
     let texts: Vec<String> = names.iter().map(ToString::to_string).collect();
     quote! {
-        let many = Many::of(&[#((&#names, #texts, #sizes)),*])?;
+        let many = BatchShape::from_arrays(&[#((&#names, #texts, #sizes)),*])?;
         let n = many.n;
         #(let #names = columns::<#sizes>(slice(&#names, #texts)?, n);)*
     }
@@ -384,7 +384,7 @@ fn single_state_function(face: &LanguageBinding<'_>, one: &WrappedFunction) -> T
     let results = one.parts.iter().map(|part| {
         let (from, shape) = (at, part.shape.iter().map(|count| count.n));
         at += part.n_entries();
-        quote! { shaped(py, &many, &values[#from * n..#at * n], &[#(#shape),*])? }
+        quote! { shape_results(py, &many, &values[#from * n..#at * n], &[#(#shape),*])? }
     });
     let results: Vec<TokenStream> = results.collect();
     let one_array = quote! { Bound<'py, PyArrayDyn<f64>> };
@@ -413,7 +413,7 @@ fn single_state_function(face: &LanguageBinding<'_>, one: &WrappedFunction) -> T
         ) -> PyResult<#kind> {
             #arrays
             let owner = #owner;
-            let values = computed(py, &many, #entries, |sample| {
+            let values = compute_results(py, &many, #entries, |sample| {
                 let state = model::State { #(#fields),* };
                 let found = owner.#method(&state #forces)?;
                 Ok([#(#values),*].concat())

@@ -80,7 +80,7 @@ pub(super) fn dynamics(derivation: &Derivation, scope: &NameScope, dynamics: &Dy
         output: Some(output),
         // The Jacobian stands behind the bias in its program.
         results: (name == "bias").then(|| ResultConversion {
-            from_type: quote! { Linearised<T, N_ACTIVE, N_DRIVES> },
+            from_type: quote! { Linearisation<T, N_ACTIVE, N_DRIVES> },
             conversion: quote! { found.values },
         }),
     });
@@ -121,7 +121,7 @@ fn forward_dynamics(derivation: &Derivation, dynamics: &DynamicsPrograms) -> Tok
             #doc
             pub fn forward(&self, state: &State<T>, forces: &[T; N_DRIVES]) -> Result<[T; N_ACTIVE], PoseError> {
                 let matrix = self.mass_matrix(state)?;
-                let bias: Linearised<T, N_ACTIVE, N_DRIVES> = at(&Bias(self), inputs(state))?;
+                let bias: Linearisation<T, N_ACTIVE, N_DRIVES> = run_checked(&Bias(self), inputs(state))?;
                 accelerations(matrix, &bias, forces, &DRIVES)
             }
         };
@@ -167,8 +167,8 @@ fn forward_dynamics(derivation: &Derivation, dynamics: &DynamicsPrograms) -> Tok
             forces: &[T; N_DRIVES],
             passive: &[T; N_PASSIVE],
         ) -> Result<[T; N_ACTIVE], PoseError> {
-            let matrix = at(&MassMatrix(self), #of_matrix)?;
-            let bias: Linearised<T, N_ACTIVE, N_DRIVES> = at(&Bias(self), #of_bias)?;
+            let matrix = run_checked(&MassMatrix(self), #of_matrix)?;
+            let bias: Linearisation<T, N_ACTIVE, N_DRIVES> = run_checked(&Bias(self), #of_bias)?;
             accelerations(matrix, &bias, forces, &DRIVES)
         }
     }

@@ -284,7 +284,7 @@ fn base_parameters(derivation: &Derivation, scope: &NameScope) -> TokenStream {
         pub fn base_parameters<T: Real>(
             #geometry: &Geometry<T>, #parameters: &Parameters<T>,
         ) -> Result<[T; N_BASE], SpecialGeometry> {
-            let n = &One::<T>::new();
+            let n = &ScalarNumbers::<T>::new();
             #given
             #written
             Ok(values![#(#names),*])

@@ -86,12 +86,12 @@ pub(super) fn newton<'a>(derivation: &'a Derivation, scope: &NameScope) -> Optio
                 q: &[T; N_ACTIVE],
                 passive: &[T; N_PASSIVE],
             ) -> ([T; N_PASSIVE], [[T; N_PASSIVE]; N_PASSIVE]) {
-                let found: Linearised<T, N_PASSIVE, N_PASSIVE> = plainly(&Gaps(self), pose(q, passive));
+                let found: Linearisation<T, N_PASSIVE, N_PASSIVE> = run_unchecked(&Gaps(self), pose(q, passive));
                 (found.values, found.jacobian)
             }
 
             fn scales(&self, q: &[T; N_ACTIVE], passive: &[T; N_PASSIVE]) -> Scales<[T; N_ACTIVE], [T; N_PASSIVE]> {
-                plainly(&LoopScales(self), pose(q, passive))
+                run_unchecked(&LoopScales(self), pose(q, passive))
             }
         }
 
@@ -145,7 +145,7 @@ pub(super) fn newton<'a>(derivation: &'a Derivation, scope: &NameScope) -> Optio
                 #scale_field
             },
             inits: quote! { nominal: Err(PoseError::OutOfReach), #scale_init },
-            finish: quote! { model.nominal = settle(&model, &model.nominal_active(), &[#(#nominal_passive),*]); },
+            finish: quote! { model.nominal = solve_passive(&model, &model.nominal_active(), &[#(#nominal_passive),*]); },
             methods,
         },
     })

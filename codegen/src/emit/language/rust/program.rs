@@ -151,7 +151,7 @@ impl ProgramStruct<'_> {
         let given = self.input_bindings(&once.read, false);
         let begin = has_once.then(|| {
             let statements = statements(&once.statements());
-            quote! { let n = &One::<T>::new(); #given #statements }
+            quote! { let n = &ScalarNumbers::<T>::new(); #given #statements }
         });
         let once_init = has_once.then(|| quote! { once: values![#(#kept),*], });
         let (parameters, prepares) = (self.preparation.parameter_tokens(), format!(" {}", self.prepares));
@@ -264,7 +264,7 @@ impl ProgramStruct<'_> {
             .iter()
             .map(|atom| RustSyntax.name(self.scope.input_name(*atom)));
         let inputs: Vec<String> = inputs.collect();
-        let end = format!("] = self.pose.at(&*n, [{}])?;", inputs.join(", "));
+        let end = format!("] = self.pose.evaluate_at(&*n, [{}])?;", inputs.join(", "));
         line_tokens(&fill_lines("let [", called, &end))
     }
 
@@ -283,9 +283,9 @@ impl ProgramStruct<'_> {
             /// A pose out of reach or singular, or an input that is no number or too large.
         };
         let run = |inputs: TokenStream| match &function.results {
-            None => quote! { at(&#item(self), #inputs) },
+            None => quote! { run_checked(&#item(self), #inputs) },
             Some(ResultConversion { from_type: of, conversion: made }) => quote! {
-                let found: #of = at(&#item(self), #inputs)?;
+                let found: #of = run_checked(&#item(self), #inputs)?;
                 Ok(#made)
             },
         };
@@ -427,7 +427,7 @@ pub(super) fn parameter_bindings(
         });
         let rest = (wanted.len() < names.len()).then(|| quote! { , .. });
         let record = format_ident!("{record}");
-        quote! { let #record { #(#fields),* #rest } = #from.on(n); }
+        quote! { let #record { #(#fields),* #rest } = #from.as_variables(n); }
     };
     let constants = record("Geometry", &constants, Atom::Constant, geometry);
     let physical = record("Parameters", &physical, Atom::Parameter, parameters);
@@ -475,7 +475,7 @@ pub(super) fn pose(derivation: &Derivation, scope: &NameScope) -> TokenStream {
     );
     let written_once = statements(&pose.once.statements());
     let begin = (!pose.once.kept.is_empty())
-        .then(|| quote! { let n = &One::<T>::new(); #given_once #written_once });
+        .then(|| quote! { let n = &ScalarNumbers::<T>::new(); #given_once #written_once });
     let names: Vec<Ident> = pose.once.kept.iter().map(|name| field_identifier(name)).collect();
     let n_kept = Literal::usize_unsuffixed(names.len());
     let read = parameter_bindings(
@@ -512,7 +512,7 @@ pub(super) fn pose(derivation: &Derivation, scope: &NameScope) -> TokenStream {
             }
 
             #[inline(always)]
-            fn at<N: Numbers<Scalar = T>>(
+            fn evaluate_at<N: Numbers<Scalar = T>>(
                 &self,
                 n: &N,
                 q: [Var<N::Value>; #n_inputs],
@@ -536,5 +536,5 @@ pub(super) fn single_value(derivation: &Derivation, scope: &NameScope, program: 
     let once = statements(&routine.once);
     let result = routine.results.first().map(|result| RustSyntax.operand_text(result));
     let result: TokenStream = result.unwrap_or_default().parse().unwrap_or_default();
-    quote! { { let n = &One::<T>::new(); #given #once (#result).get() } }
+    quote! { { let n = &ScalarNumbers::<T>::new(); #given #once (#result).get() } }
 }

@@ -30,7 +30,7 @@ pub(super) fn reactions(
         quote! { ::modelmill_runtime::Wrench { force: #force, moment: #moment } }
     });
     let loops = reactions.loops.iter().map(|closed| three(&closed.force));
-    let made = quote! { Transmitted { joints: [#(#joints),*], loops: [#(#loops),*] } };
+    let made = quote! { ReactionForces { joints: [#(#joints),*], loops: [#(#loops),*] } };
     let n_outputs = Literal::usize_unsuffixed(program.outputs.len());
     let function = ProgramMethod {
         program,
@@ -42,7 +42,7 @@ pub(super) fn reactions(
         ),
         inputs: ProgramStateInputs::Motion,
         outputs: names(reactions),
-        output: Some(quote! { Transmitted<T> }),
+        output: Some(quote! { ReactionForces<T> }),
         results: Some(ResultConversion {
             from_type: quote! { [T; #n_outputs] },
             conversion: made,
@@ -72,7 +72,7 @@ pub(super) fn reactions(
 
         /// What the joints transmit at one state.
         #[derive(Clone, Copy, Debug, PartialEq)]
-        pub struct Transmitted<T> {
+        pub struct ReactionForces<T> {
             /// What each of [`JOINTS`] transmits to the side away from the base, N and N m, drive and friction in it
             /// included: along the axes that the frame's steps reach behind the joint (those of the frame, if nothing
             /// follows), the moment about the origin reached there.
@@ -125,9 +125,9 @@ fn tables(reactions: &ReactionPrograms) -> TokenStream {
         pub const N_JOINTS: usize = #n_joints;
         /// Number of loops whose forces are told.
         pub const N_LOOPS: usize = #n_loops;
-        /// Joints, from the base outwards, in the order of [`Transmitted::joints`].
+        /// Joints, from the base outwards, in the order of [`ReactionForces::joints`].
         pub const JOINTS: [::modelmill_runtime::Joint; N_JOINTS] = [#(#joints),*];
-        /// Loops, in the order of [`Transmitted::loops`].
+        /// Loops, in the order of [`ReactionForces::loops`].
         pub const LOOPS: [::modelmill_runtime::ClosedLoop; N_LOOPS] = [#(#loops),*];
     }
 }

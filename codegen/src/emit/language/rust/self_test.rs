@@ -77,7 +77,7 @@ pub(super) fn self_test(derivation: &Derivation, scope: &NameScope) -> TokenStre
     });
     let scale = scale.map(|scale| quote! { let scale = #scale; });
     let load = uses_load(derivation)
-        .then(|| quote! { load: ::core::array::from_fn(|_| random.between(-50.0, 50.0)), });
+        .then(|| quote! { load: ::core::array::from_fn(|_| random.uniform(-50.0, 50.0)), });
     quote! {
         /// Number of products of parameters.
         pub const N_PRODUCTS: usize = #n_products;
@@ -101,15 +101,15 @@ pub(super) fn self_test(derivation: &Derivation, scope: &NameScope) -> TokenStre
             let mut draw = ::modelmill_runtime::Random::new(2);
             #[allow(unused_mut)]
             let mut parameters = Parameters::<f64>::default();
-            #(parameters.#fields = draw.near(parameters.#fields);)*
+            #(parameters.#fields = draw.perturb(parameters.#fields);)*
             let products = [#(#values),*];
             let base = base_parameters(geometry, &parameters)?;
             let dynamics = InverseDynamics::new(geometry, &base);
             ::modelmill_runtime::self_test::<N_PRODUCTS, N_BASE>(&products, &base, |random, reach, show| {
                 let state = State {
-                    q: ::core::array::from_fn(|k| nominal[k] + reach * reaches[k] * random.between(-1.0, 1.0)),
-                    qd: ::core::array::from_fn(|k| units[k] * random.between(-2.0, 2.0)),
-                    qdd: ::core::array::from_fn(|k| units[k] * random.between(-8.0, 8.0)),
+                    q: ::core::array::from_fn(|k| nominal[k] + reach * reaches[k] * random.uniform(-1.0, 1.0)),
+                    qd: ::core::array::from_fn(|k| units[k] * random.uniform(-2.0, 2.0)),
+                    qdd: ::core::array::from_fn(|k| units[k] * random.uniform(-8.0, 8.0)),
                     #load
                 };
                 let (h, h_min, forces) =
