@@ -5,7 +5,7 @@ use std::path::Path;
 
 use modelmill::diagnose::Question;
 use modelmill::identify::Estimation;
-use modelmill::print::Words;
+use modelmill::print::LibrarySpelling;
 use modelmill::recording::Reading;
 use modelmill::{Model, Outcome, report};
 
@@ -46,7 +46,7 @@ fn main() -> Outcome {
     write("spidermill-completed.toml", better.text())?;
     write(
         "what-the-model-lacks.html",
-        &report::page(&findings, &Words)?,
+        &report::page(&findings, &LibrarySpelling)?,
     )
 }
 

@@ -35,7 +35,7 @@ impl Recording {
             return Err(self.fault(Fault::TooFewSamples {
                 have: time.len(),
                 need: Way::Butterworth { order }.need(),
-                purpose: "preparing derivatives from positions",
+                purpose: "preparing derivatives from positions".into(),
             }));
         }
         let design = |cutoff: f64| {
@@ -51,7 +51,7 @@ impl Recording {
             return Err(self.fault(Fault::TooFewSamples {
                 have: time.len(),
                 need,
-                purpose: "preparing derivatives from positions",
+                purpose: "preparing derivatives from positions".into(),
             }));
         }
         let found = series_of(time, columns, preparation);
@@ -145,7 +145,7 @@ impl Recording {
                     self.fault(Fault::TooFewSamples {
                         have: time.len(),
                         need: way.need(),
-                        purpose: "smoothing at this cut-off",
+                        purpose: "smoothing at this cut-off".into(),
                     })
                 })
             })

@@ -3,6 +3,8 @@
 //!
 //! Columns come from where the diagnosis has them, so that kinds of one's own are told apart like all others.
 
+use modelmill_boundary::message;
+use modelmill_boundary::text::{OptionName, Remedy};
 use modelmill_identify::diagnose::{Candidate, Choice, Column, Effect, Sign, white_noise};
 use modelmill_identify::excite::separate::{Question, Separation, fit, separation};
 use modelmill_identify::excite::{Motion, Plant};
@@ -71,9 +73,12 @@ impl Pair {
             .collect();
         for (k, one) in all.iter().enumerate() {
             if all[..k].iter().any(|known| is_same(known, one)) {
-                return Err(Error::input(format!(
-                    "{} is named twice; option `separate`, option `from` and option `beside` take different effects",
-                    words::effect(&one.effect)
+                return Err(Error::input(message!(
+                    "{} is named twice; {}, {} and {} take different effects",
+                    words::effect(&one.effect),
+                    Remedy::option(OptionName::Separate),
+                    Remedy::option(OptionName::From),
+                    Remedy::option(OptionName::Beside)
                 )));
             }
         }
@@ -447,7 +452,7 @@ fn recording(plant: &ModelPlant<'_>, motion: &Motion) -> Option<Stretch> {
         },
         variance: None,
         weights: None,
-        maps_from_degrees: String::new(),
+        maps_from_degrees: Vec::new(),
         faults: Vec::new(),
         load: None,
     })

@@ -3,6 +3,8 @@
 
 use std::fmt::Write as _;
 
+use modelmill_boundary::message;
+use modelmill_boundary::text::{Message, OptionName, Remedy, RemedySpelling};
 use modelmill_identify::Note;
 use modelmill_identify::diagnose::Effect;
 use modelmill_identify::excite::{CoordinateLimits, Options, random_motions};
@@ -119,13 +121,16 @@ pub(crate) fn ask(
         }
         if all.iter().all(|one| one.figures.is_mimicked()) {
             let rival = words::effect(pair.rivals[k].effect());
-            note(Note::warning(format!(
+            note(Note::warning(message!(
                 "no motion tells {name} from {rival}, which can say all that it says beside the base parameters{}; it is left \
                  out",
                 if pair.beside().next().is_some() {
-                    " and the effects of option `beside`"
+                    message!(
+                        " and the effects of {}",
+                        Remedy::option(OptionName::Beside)
+                    )
                 } else {
-                    ""
+                    Message::new()
                 }
             )));
             continue;
@@ -271,7 +276,12 @@ impl Separated {
     }
 
     /// For people.
-    pub fn text(&self, evaluations: usize, random: usize) -> Vec<String> {
+    pub fn text(
+        &self,
+        evaluations: usize,
+        random: usize,
+        spelling: &dyn RemedySpelling,
+    ) -> Vec<String> {
         let pair = &self.asked.pair;
         let mut lines = vec![format!("  tells {}", self.asked.words())];
         let beside: Vec<Effect> = pair.beside().cloned().collect();
@@ -356,7 +366,7 @@ impl Separated {
             "  {says}; {} were evaluated",
             count(evaluations, "trajectory", "trajectories")
         ));
-        lines.extend(self.remarks());
+        lines.extend(self.remarks(spelling));
         lines
     }
 
@@ -365,7 +375,7 @@ impl Separated {
     }
 
     /// What the figures mean.
-    fn remarks(&self) -> Vec<String> {
+    fn remarks(&self, spelling: &dyn RemedySpelling) -> Vec<String> {
         let pair = &self.asked.pair;
         let mut lines = indented(&match (pair.noise(), self.periods()) {
             (Some(noise), Some(periods)) => format!(
@@ -378,7 +388,12 @@ impl Separated {
                     "no more than one period".to_owned()
                 }
             ),
-            _ => "With option `noise` = `SIZE`, or option `data` = `RUN`, it says how many periods it takes.".to_owned(),
+            _ => message!(
+                "With {}, or {}, it says how many periods it takes.",
+                Remedy::option(OptionName::Noise).with_value("SIZE"),
+                Remedy::option(OptionName::Data).with_value("RUN")
+            )
+            .spell(spelling),
         });
         for k in &self.asked.which {
             let rival = &pair.rivals[*k];

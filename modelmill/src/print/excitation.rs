@@ -5,6 +5,7 @@ use serde_json::{Map, Value, json};
 
 use crate::excite::plant::used;
 use crate::excite::{Excited, Separated};
+use crate::print::RemedySpelling;
 use crate::text::Style;
 use crate::text::table::{Align, count, number, significant, table};
 
@@ -61,7 +62,7 @@ impl Excited {
     }
 
     /// The same for people.
-    pub fn text(&self, style: Style) -> String {
+    pub fn text(&self, style: Style, spelling: &dyn RemedySpelling) -> String {
         let found = &self.found;
         let mut lines = vec![style.bold(&format!(
             "{}: {} of {} s",
@@ -70,7 +71,7 @@ impl Excited {
             self.options.period
         ))];
         if let Some(separated) = &self.separated {
-            lines.extend(separated.text(found.evaluations, found.random));
+            lines.extend(separated.text(found.evaluations, found.random, spelling));
         } else {
             lines.extend(self.conditions());
         }

@@ -5,7 +5,7 @@ use serde_json::{Map, Value, json};
 
 use super::laws;
 use crate::diagnose::{Estimate, Findings, words};
-use crate::print::Spelling;
+use crate::print::{OptionName, Remedy, StepSpelling, notes};
 use crate::text::Style;
 use crate::text::table::{Align, number, percent, significant, table};
 
@@ -14,7 +14,7 @@ const NAMED: usize = 6;
 
 impl Findings {
     /// All that was found as one JSON object; `spelling` says how its reader asks for what it advises.
-    pub fn json(&self, spelling: &dyn Spelling) -> Value {
+    pub fn json(&self, spelling: &dyn StepSpelling) -> Value {
         let diagnosis = &self.diagnosis;
         let channels = self.channels();
         let model = &self.before.model;
@@ -28,7 +28,7 @@ impl Findings {
                     "probability": missing.probability,
                     "indistinguishable_from": missing.indistinguishable_from,
                     "separate_by": missing.separate_by,
-                    "separate_command": separation.and_then(|asked| spelling.separate(model, asked)),
+                    "separate_command": separation.and_then(|asked| spelling.spell_separation(model, asked)),
                 })
             })
             .collect();
@@ -94,7 +94,7 @@ impl Findings {
             "laws": laws::laws(&self.laws, model, spelling),
             "parameters_off_nominal": off,
             "unexplained": unexplained,
-            "data": self.notes,
+            "data": notes(&self.notes, spelling),
             "where": self.regions,
             "with_nominal_parameters": self.with_nominal.as_ref().map(|held| {
                 json!({
@@ -109,7 +109,7 @@ impl Findings {
     }
 
     /// The answer for people, line by line.
-    pub fn text(&self, style: Style, spelling: &dyn Spelling) -> Vec<String> {
+    pub fn text(&self, style: Style, spelling: &dyn StepSpelling) -> Vec<String> {
         let diagnosis = &self.diagnosis;
         let channels = self.channels();
         let verdict = words::verdict(diagnosis, channels, self.judged);
@@ -155,7 +155,7 @@ impl Findings {
         self.untold_text(style, &mut lines);
         self.off_text(style, spelling, &mut lines);
         let mut next: Vec<String> = (self.to_add().iter())
-            .map(|entry| spelling.add(&self.before.model, entry))
+            .map(|entry| spelling.spell_effect(&self.before.model, entry))
             .collect();
         next.extend(self.beside_the_file().map(str::to_owned));
         if !next.is_empty() {
@@ -167,7 +167,8 @@ impl Findings {
             && !says.is_empty()
         {
             lines.push(format!(
-                "  The model with what was found cannot be made: {says}"
+                "  The model with what was found cannot be made: {}",
+                says.spell(spelling)
             ));
         }
         lines
@@ -212,7 +213,7 @@ impl Findings {
     }
 
     /// What was found, with values and doubles.
-    fn missing_text(&self, style: Style, spelling: &dyn Spelling, lines: &mut Vec<String>) {
+    fn missing_text(&self, style: Style, spelling: &dyn StepSpelling, lines: &mut Vec<String>) {
         if self.missing.is_empty() {
             return;
         }
@@ -253,7 +254,7 @@ impl Findings {
                     lines.extend(wrapped.iter().map(|line| style.dim(&format!("    {line}"))));
                 }
                 if let Some(asked) = &found.separation
-                    && let Some(command) = spelling.separate(&self.before.model, asked)
+                    && let Some(command) = spelling.spell_separation(&self.before.model, asked)
                 {
                     lines.push("    Motion that tells them apart is sought by".to_owned());
                     lines.push(format!("      {command}"));
@@ -317,7 +318,7 @@ impl Findings {
     }
 
     /// Parameters that differ from what the file says.
-    fn off_text(&self, style: Style, spelling: &dyn Spelling, lines: &mut Vec<String>) {
+    fn off_text(&self, style: Style, spelling: &dyn StepSpelling, lines: &mut Vec<String>) {
         if self.off_nominal.is_empty() {
             return;
         }
@@ -362,7 +363,8 @@ impl Findings {
                 .iter()
                 .map(|line| format!("  {line}")),
         );
-        lines.push(format!("  ({} tells more.)", spelling.held()));
+        let held = Remedy::option(OptionName::Held).spell(spelling);
+        lines.push(format!("  ({held} tells more.)"));
     }
 }
 

@@ -1,9 +1,11 @@
 //! Physical parameters as JSON and for people.
 
+use modelmill_boundary::message;
 use modelmill_identify::interpret::{Interpretation, Physical};
 use serde_json::{Map, Value, json};
 
 use crate::interpret::Interpreted;
+use crate::print::{OptionName, Remedy, RemedySpelling};
 use crate::text::Style;
 use crate::text::table::{Align, count, number, significant, table};
 
@@ -59,7 +61,7 @@ impl Interpreted {
     }
 
     /// The same for people.
-    pub fn text(&self, style: Style) -> String {
+    pub fn text(&self, style: Style, spelling: &dyn RemedySpelling) -> String {
         let solutions = self.solutions();
         let unknowns = count(
             self.unknown.len(),
@@ -95,10 +97,11 @@ impl Interpreted {
             lines.push(format!("  {says}."));
         }
         if !self.directions().is_empty() {
-            lines.push(
-                "  Hold one parameter of each line at its nominal value, that is, leave it out of option `unknown`."
-                    .to_owned(),
+            let how = message!(
+                "  Hold one parameter of each line at its nominal value, that is, leave it out of {}.",
+                Remedy::option(OptionName::Unknown)
             );
+            lines.push(how.spell(spelling));
         }
         if let (Interpretation::Exact { .. }, []) = (&self.found, solutions) {
             lines.push(

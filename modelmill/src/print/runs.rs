@@ -3,13 +3,14 @@
 use modelmill_identify::ParameterInfo;
 use serde_json::{Value, json};
 
+use crate::print::RemedySpelling;
 use crate::runs::{ChangePoint, Changed, Compared, Fitted, OneRun, SharedFit, Valued, What};
 use crate::text::Style;
 use crate::text::table::{Align, count, table, with_deviation};
 
 impl Compared {
     /// All that was found as one JSON object.
-    pub fn json(&self) -> Value {
+    pub fn json(&self, spelling: &dyn RemedySpelling) -> Value {
         let later = || self.runs.iter().enumerate().skip(1);
         let moved =
             later().flat_map(|(k, run)| run.moved.iter().map(move |p| self.moved_json(k, *p)));
@@ -17,7 +18,7 @@ impl Compared {
         let changes =
             all.flat_map(|(k, run)| run.changes.iter().map(move |one| change_json([0, k], one)));
         let unread = self.unread.iter();
-        let unread = unread.map(|one| json!({ "file": one.file, "says": one.error.to_string() }));
+        let unread = unread.map(|one| json!({ "file": one.file, "says": one.error.spell(spelling) }));
         let runs = self.runs.iter().map(|run| {
             json!({
                 "file": run.file,

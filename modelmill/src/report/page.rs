@@ -9,14 +9,14 @@ use modelmill_identify::diagnose::Verdict;
 use super::{Findings, curves, keys, ladder, maps, regions, spectrum, tables, words};
 use crate::compare::Places;
 use crate::error::Outcome;
-use crate::print::{Spelling, laws as told};
+use crate::print::{StepSpelling, laws as told};
 use crate::text::svg::escape;
 use crate::text::table::percent;
 
 /// The page's text; `spelling` says how its reader asks for what it advises.
 ///
 /// Fails only when whoever watches stops it.
-pub fn page(findings: &Findings, spelling: &dyn Spelling) -> Outcome<String> {
+pub fn page(findings: &Findings, spelling: &dyn StepSpelling) -> Outcome<String> {
     let last = findings.last();
     let equations = last.model.equations(Format::Html)?.text;
     let name = &findings.before.model.name;
@@ -131,7 +131,7 @@ fn the_ladder(findings: &Findings) -> String {
     )
 }
 
-fn found(findings: &Findings, spelling: &dyn Spelling) -> String {
+fn found(findings: &Findings, spelling: &dyn StepSpelling) -> String {
     let mut html = effects(findings, spelling);
     if !findings.laws.is_empty() {
         html.push_str(&laws(findings, spelling));
@@ -140,7 +140,7 @@ fn found(findings: &Findings, spelling: &dyn Spelling) -> String {
 }
 
 /// Laws that would explain what is left.
-fn laws(findings: &Findings, spelling: &dyn Spelling) -> String {
+fn laws(findings: &Findings, spelling: &dyn StepSpelling) -> String {
     let model = &findings.before.model;
     let mut html = format!(
         "<h3>Which law would explain what is left</h3>\n<p>{}</p>\n",
@@ -164,7 +164,7 @@ fn laws(findings: &Findings, spelling: &dyn Spelling) -> String {
         }
         match &law.entry {
             Some(entry) => {
-                let command = spelling.add_from(model, &entry.effect, told::LIBRARY);
+                let command = spelling.spell_effect_of_library(model, &entry.effect, told::LIBRARY);
                 let _ = writeln!(
                     html,
                     "<p>As a library, <code>{}</code>, and with it:</p>\n<pre class=\"commands\"><code>{}</code></pre>\n\
@@ -182,7 +182,7 @@ fn laws(findings: &Findings, spelling: &dyn Spelling) -> String {
     html
 }
 
-fn effects(findings: &Findings, spelling: &dyn Spelling) -> String {
+fn effects(findings: &Findings, spelling: &dyn StepSpelling) -> String {
     if findings.to_add().is_empty() {
         if let Some(says) = findings.beside_the_file() {
             return format!("{}<p>{says}</p>\n", tables::effects(findings));
@@ -203,16 +203,16 @@ fn effects(findings: &Findings, spelling: &dyn Spelling) -> String {
         let _ = writeln!(
             html,
             "<p class=\"alias\">The model with these effects could not be made: {}</p>",
-            escape(&spelling.text(says))
+            escape(&says.spell(spelling))
         );
     }
     let model = &findings.before.model;
     let mut commands: Vec<String> = findings
         .to_add()
         .iter()
-        .map(|entry| spelling.add(model, entry))
+        .map(|entry| spelling.spell_effect(model, entry))
         .collect();
-    commands.push(spelling.identify(model));
+    commands.push(spelling.spell_identification(model));
     let _ = writeln!(
         html,
         "<p>Add it to the model file, which keeps its comments, and identify again:</p>\n<pre class=\"commands\"><code>{}</code></pre>",

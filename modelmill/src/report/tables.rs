@@ -8,7 +8,7 @@ use modelmill_identify::{FitParameter, Severity, Status};
 use super::draw::attribute;
 use super::units::{force_unit, pretty};
 use super::{Findings, Version, words};
-use crate::print::Spelling;
+use crate::print::StepSpelling;
 use crate::text::svg::escape;
 use crate::text::table::{percent, significant};
 
@@ -335,7 +335,7 @@ pub(crate) fn parameters(version: &Version) -> String {
 }
 
 /// Recordings and what was done to them.
-pub(crate) fn data(findings: &Findings, spelling: &dyn Spelling) -> String {
+pub(crate) fn data(findings: &Findings, spelling: &dyn StepSpelling) -> String {
     let rows: Vec<Vec<Cell>> = findings
         .before
         .runs
@@ -378,7 +378,7 @@ pub(crate) fn data(findings: &Findings, spelling: &dyn Spelling) -> String {
         let _ = writeln!(
             html,
             "<li class=\"{class}\">{word}{}</li>",
-            escape(&spelling.text(&note.says))
+            escape(&note.says.spell(spelling))
         );
     }
     html.push_str("</ul>\n");

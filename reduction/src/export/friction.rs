@@ -1,6 +1,8 @@
 //! Effects that descriptions of robots know: friction, inertia of drives and springs of joints and tendons, and elements
 //! between two points.
 
+use modelmill_boundary::message;
+use modelmill_boundary::text::Message;
 use modelmill_spec::{DriveKind, Effect, Mechanics, Mechanism, Place, PointIdx};
 
 use super::Format;
@@ -35,7 +37,7 @@ pub(super) struct Friction {
 pub(super) fn friction(
     mechanism: &Mechanism,
     format: Format,
-    remarks: &mut Vec<String>,
+    remarks: &mut Vec<Message>,
 ) -> Friction {
     let mut found = Friction {
         joints: vec![Passive::default(); mechanism.coordinates.len()],
@@ -49,7 +51,7 @@ pub(super) fn friction(
         }
         if !said(mechanism, effect, format, &mut found) {
             let places: Vec<String> = effect.places.iter().map(|p| name(mechanism, *p)).collect();
-            remarks.push(format!(
+            remarks.push(message!(
                 "`{}` at {} is left out: {} has nothing like it",
                 effect.kind,
                 places.join(", "),

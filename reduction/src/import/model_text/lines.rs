@@ -2,6 +2,8 @@
 
 use std::fmt::Write as _;
 
+use modelmill_boundary::message;
+
 use super::super::chain::Chain;
 use super::super::closing::Closed;
 use super::super::description::StraightDrive;
@@ -109,7 +111,7 @@ impl Build<'_> {
                 self.has_surplus = true;
                 kept.push(line);
             } else {
-                self.remarks.push(format!(
+                self.remarks.push(message!(
                     "line {}: `{}` pulls what other drives move already, and is left out",
                     line.line, line.name
                 ));
@@ -177,7 +179,7 @@ impl Build<'_> {
                 ("drive_inertia", "Ia", line.armature),
             ] {
                 if value != 0.0 && self.has_surplus {
-                    self.remarks.push(format!(
+                    self.remarks.push(message!(
                         "{kind} of `{place}` is left out: there are more drives than freedoms"
                     ));
                 } else if value != 0.0 {
@@ -200,7 +202,7 @@ impl Build<'_> {
         if self.has_surplus && !forces.is_empty() {
             forces.clear();
             self.remarks.push(
-                "limits of forces are left out: there are more drives than freedoms".to_owned(),
+                "limits of forces are left out: there are more drives than freedoms".into(),
             );
         }
     }
