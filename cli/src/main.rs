@@ -16,6 +16,7 @@ use modelmill::{Error, Host};
 
 use args::{Cli, Command};
 use failure::{Failure, Outcome};
+use flags::FlagSpelling;
 use terminal::progress::Terminal;
 
 fn main() -> ExitCode {
@@ -38,9 +39,10 @@ fn main() -> ExitCode {
         Err(failure) => {
             match &failure {
                 Failure::Library(Error::Model(faults)) => {
-                    terminal::say(faults.render(terminal::errors_in_colour()).trim_end());
+                    let in_colour = terminal::errors_in_colour();
+                    terminal::say(faults.render_spelled(in_colour, &FlagSpelling).trim_end());
                 }
-                Failure::Library(error) => terminal::error(&error.to_string()),
+                Failure::Library(error) => terminal::error(&error.spell(&FlagSpelling)),
                 Failure::Input(says) | Failure::Usage(says) => terminal::error(says),
                 Failure::BrokenPipe => {}
             }

@@ -39,7 +39,7 @@ fn main() -> Outcome {
     let folder = std::env::temp_dir();
     let write = |name: &str, text: &str| {
         let path = folder.join(name);
-        std::fs::write(&path, text).map_err(modelmill::Error::input)?;
+        std::fs::write(&path, text).map_err(|error| modelmill::Error::input(error.to_string()))?;
         println!("{}", path.display());
         Ok(())
     };

@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
+use modelmill::print::LibrarySpelling;
 use modelmill::recording::{Reading, Recording};
 use modelmill::variants::{Crossing, DriveVariants, Variants};
 use modelmill::{Model, Severity, along};
@@ -280,7 +281,7 @@ fn figures_are_those_of_evaluated_forces() {
         let of_columns: f64 = terms.map(|term| (term.share - term.by_value).abs()).sum();
         assert!(of_columns > 1e-3, "{of_columns}");
     }
-    let json = found.json();
+    let json = found.json(&LibrarySpelling);
     let first = &json["drives"][0];
     assert_eq!(
         first["after"]["peak"].as_f64(),

@@ -3,8 +3,10 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use modelmill::Host;
-use modelmill::print::{Spelling, Words};
+use modelmill::diagnose::Separation;
+use modelmill::edit::NewEffect;
+use modelmill::print::{CommandName, LibrarySpelling, OptionSetting, RemedySpelling, StepSpelling};
+use modelmill::{Host, Model};
 use serde::Deserialize;
 use serde_json::json;
 
@@ -76,7 +78,7 @@ impl Desk {
             ..Options::default()
         };
         let shelf = Arc::new(self.shelf.clone());
-        let opened = Sitting::open(&Host::new(), options, Arc::new(Plain), shelf);
+        let opened = Sitting::open(&Host::new(), options, Arc::new(PageSpelling), shelf);
         let sitting = Arc::new(opened.map_err(|error| error.to_string())?);
         let told = sitting.view();
         self.sitting = Some(sitting);
@@ -84,32 +86,41 @@ impl Desk {
     }
 }
 
-/// Plain words, where there is no command line.
-struct Plain;
+/// Words for a page without a command line: panes of the workbench where one does it, else the library's.
+struct PageSpelling;
 
-impl Spelling for Plain {
-    fn add(&self, model: &modelmill::Model, effect: &modelmill::edit::NewEffect) -> String {
-        Words.add(model, effect)
+impl RemedySpelling for PageSpelling {
+    fn spell_options(&self, settings: &[OptionSetting]) -> String {
+        LibrarySpelling.spell_options(settings)
     }
 
-    fn identify(&self, model: &modelmill::Model) -> String {
-        Words.identify(model)
-    }
-
-    fn separate(
-        &self,
-        model: &modelmill::Model,
-        separation: &modelmill::diagnose::Separation,
-    ) -> Option<String> {
-        Words.separate(model, separation)
-    }
-
-    fn held(&self) -> String {
-        Words.held()
+    fn spell_command(&self, command: CommandName) -> String {
+        match command {
+            CommandName::Check => "pane `Mechanism`".to_owned(),
+            CommandName::Diagnose => "pane `Diagnosis`".to_owned(),
+            CommandName::Excite => "pane `Excitation`".to_owned(),
+            CommandName::Adopt | CommandName::Evaluate | CommandName::Identify => {
+                LibrarySpelling.spell_command(command)
+            }
+        }
     }
 }
 
-impl Commands for Plain {
+impl StepSpelling for PageSpelling {
+    fn spell_effect(&self, model: &Model, effect: &NewEffect) -> String {
+        LibrarySpelling.spell_effect(model, effect)
+    }
+
+    fn spell_identification(&self, model: &Model) -> String {
+        LibrarySpelling.spell_identification(model)
+    }
+
+    fn spell_separation(&self, model: &Model, separation: &Separation) -> Option<String> {
+        LibrarySpelling.spell_separation(model, separation)
+    }
+}
+
+impl Commands for PageSpelling {
     fn same(&self, _: Step) -> Option<String> {
         None
     }

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use modelmill::excite::Request;
-use modelmill::print::Spelling;
+use modelmill::print::StepSpelling;
 use modelmill::recording::Reading;
 use serde::Deserialize;
 
@@ -28,7 +28,7 @@ pub struct Options {
 }
 
 /// What a reader is told that does the same without the workbench.
-pub trait Commands: Spelling + Send + Sync {
+pub trait Commands: StepSpelling + Send + Sync {
     /// Does what a pane of the workbench does; `None` where nothing else does.
     fn same(&self, step: Step) -> Option<String>;
 

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use modelmill::model::Changes;
+use modelmill::print::RemedySpelling;
 use modelmill::recording::Recording;
 use modelmill::variants::Variants;
 use modelmill::{Error, Host, Model, Outcome};
@@ -60,6 +61,7 @@ impl Variant {
         &self,
         before: &Model,
         after: &Model,
+        spelling: &dyn RemedySpelling,
         read: impl FnOnce() -> Outcome<Read>,
         after_read: impl FnOnce() -> Outcome<Arc<Read>>,
     ) -> Outcome<Value> {
@@ -73,12 +75,12 @@ impl Variant {
             if runs[0].is_empty() {
                 return Ok(Value::Null);
             }
-            Ok(Variants::along([before, after], [&runs[0], &runs[1]])?.json())
+            Ok(Variants::along([before, after], [&runs[0], &runs[1]])?.json(spelling))
         })();
         match along {
             Ok(along) => told["along"] = along,
             Err(Error::Cancelled) => return Err(Error::Cancelled),
-            Err(error) => told["refused"] = json!(error.to_string()),
+            Err(error) => told["refused"] = json!(error.spell(spelling)),
         }
         Ok(told)
     }

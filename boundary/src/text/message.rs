@@ -11,6 +11,7 @@ use std::cell::RefCell;
 use std::fmt::{self, Write as _};
 
 use super::remedy::{LibrarySpelling, Remedy, RemedySpelling};
+use crate::files::FileError;
 
 /// A text for people with typed remedies in it.
 ///
@@ -119,6 +120,12 @@ impl From<&str> for Message {
 impl From<&String> for Message {
     fn from(text: &String) -> Self {
         text.clone().into()
+    }
+}
+
+impl From<FileError> for Message {
+    fn from(error: FileError) -> Self {
+        error.to_string().into()
     }
 }
 

@@ -6,12 +6,12 @@ use modelmill::diagnose::Question;
 use crate::args::DiagnoseArgs;
 use crate::commands;
 use crate::failure::Outcome;
-use crate::flags::Flags;
+use crate::flags::CommandLineSpelling;
 use crate::terminal;
 
 /// Prints what is missing, or that nothing is, or that nothing known explains it.
 pub(crate) fn run(host: &Host, args: &DiagnoseArgs) -> Outcome {
-    let flags = Flags::from_args(&args.ask);
+    let flags = CommandLineSpelling::from_args(&args.ask);
     let question = Question {
         held: args.ask.held(),
         ..Question::default()

@@ -61,7 +61,7 @@ pub(crate) fn run(host: &Host, args: &GenerateArgs) -> Outcome {
 fn module(target: Option<&Target>, files: &[EmittedFile]) -> Outcome {
     for file in files {
         let Some(target) = target else {
-            return terminal::print_as_is(&file.text);
+            return terminal::print(&file.text);
         };
         target.write(&file.text)?;
         terminal::note(&format!(

@@ -36,6 +36,7 @@ use modelmill::{Host, Model};
 
 use crate::args::{AskArgs, ParameterSource};
 use crate::failure::{Failure, Outcome};
+use crate::flags::FlagSpelling;
 use crate::terminal;
 
 /// Reads and derives a model file; warnings go to standard error.
@@ -56,7 +57,8 @@ pub(crate) fn derived(host: &Host, path: &str, loaded: Loaded) -> Outcome<Model>
 pub(crate) fn load(host: &Host, path: &Path) -> Outcome<Loaded> {
     let loaded = load_quietly(host, path)?;
     if !loaded.warnings.is_empty() {
-        terminal::say(loaded.render(terminal::errors_in_colour()).trim_end());
+        let text = loaded.render_spelled(terminal::errors_in_colour(), &FlagSpelling);
+        terminal::say(text.trim_end());
     }
     Ok(loaded)
 }

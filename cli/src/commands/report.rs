@@ -9,7 +9,7 @@ use modelmill::report::page;
 use crate::args::ReportArgs;
 use crate::commands;
 use crate::failure::Outcome;
-use crate::flags::Flags;
+use crate::flags::CommandLineSpelling;
 use crate::output::{self, Target};
 use crate::terminal;
 
@@ -28,7 +28,7 @@ pub(crate) fn run(host: &Host, args: &ReportArgs) -> Outcome {
         again_with_nominal: false,
     };
     let findings = commands::diagnose(host, &args.ask, question)?;
-    target.write(&page(&findings, &Flags::from_args(&args.ask))?)?;
+    target.write(&page(&findings, &CommandLineSpelling::from_args(&args.ask))?)?;
     let says = words::verdict(&findings.diagnosis, findings.channels(), findings.judged);
     terminal::print(&format!(
         "{}\n\nThe page is {}.",

@@ -9,6 +9,7 @@ use modelmill::runs::Unread;
 
 use crate::args::runs::RunsArgs;
 use crate::failure::{Failure, Outcome};
+use crate::flags::FlagSpelling;
 use crate::output::{self, Target};
 use crate::{commands, terminal};
 
@@ -53,14 +54,16 @@ pub(crate) fn run(host: &Host, args: &RunsArgs) -> Outcome {
     });
     let found = model.runs(recordings, &args.asked())?;
     match &written {
-        Some((target, Form::Page)) => target.write(&runs_page(&found))?,
-        Some((target, Form::Json)) => target.write(&format!("{:#}\n", found.json()))?,
+        Some((target, Form::Page)) => target.write(&runs_page(&found, &FlagSpelling))?,
+        Some((target, Form::Json)) => {
+            target.write(&format!("{:#}\n", found.json(&FlagSpelling)))?;
+        }
         None => {}
     }
     if args.json {
-        return terminal::print_json(&found.json());
+        return terminal::print_json(&found.json(&FlagSpelling));
     }
-    terminal::print(&found.text(terminal::style()))?;
+    terminal::print(&found.text(terminal::style(), &FlagSpelling))?;
     match &written {
         Some((target, _)) => terminal::print(&format!("Written to {}.", target.path().display())),
         None => Ok(()),

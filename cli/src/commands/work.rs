@@ -1,6 +1,5 @@
 //! `work`: the workbench in the browser.
 
-use std::borrow::Cow;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -8,7 +7,7 @@ use std::sync::Arc;
 use modelmill::diagnose::Separation;
 use modelmill::edit::NewEffect;
 use modelmill::files::Kind;
-use modelmill::print::Spelling;
+use modelmill::print::{CommandName, OptionSetting, RemedySpelling, StepSpelling};
 use modelmill::{Host, Model};
 use modelmill_workbench::{Commands, Excitation, Options, Step, serve};
 use serde_json::json;
@@ -16,7 +15,7 @@ use serde_json::json;
 use crate::args::work::WorkArgs;
 use crate::commands;
 use crate::failure::{Failure, Outcome};
-use crate::flags::{Flags, libraries, quoted};
+use crate::flags::{CommandLineSpelling, libraries, quoted};
 use crate::terminal;
 
 /// Serves the page until the program is stopped.
@@ -68,7 +67,7 @@ pub(crate) fn run(host: &Host, args: &WorkArgs) -> Outcome {
 
 /// The workbench's steps as command lines.
 struct Spelled {
-    flags: Flags,
+    flags: CommandLineSpelling,
     model: String,
     data: String,
     check: String,
@@ -87,7 +86,7 @@ impl Spelled {
             paths.iter().map(path).collect()
         };
         Self {
-            flags: Flags::new(&args.data, &args.check, &args.preparation.reading()),
+            flags: CommandLineSpelling::new(&args.data, &args.check, &args.preparation.reading()),
             model: name(&args.model),
             data: named("data", &args.data),
             check: named("check", &args.check),
@@ -172,29 +171,31 @@ impl Commands for Spelled {
 /// Where the commands of the page let a trajectory go.
 const TRAJECTORY: &str = "excitation.csv";
 
-impl Spelling for Spelled {
-    fn add(&self, model: &Model, effect: &NewEffect) -> String {
-        self.flags.add(model, effect)
+impl RemedySpelling for Spelled {
+    fn spell_options(&self, settings: &[OptionSetting]) -> String {
+        self.flags.spell_options(settings)
     }
 
-    fn add_from(&self, model: &Model, effect: &NewEffect, library: &str) -> String {
-        self.flags.add_from(model, effect, library)
+    fn spell_command(&self, command: CommandName) -> String {
+        self.flags.spell_command(command)
+    }
+}
+
+impl StepSpelling for Spelled {
+    fn spell_effect(&self, model: &Model, effect: &NewEffect) -> String {
+        self.flags.spell_effect(model, effect)
     }
 
-    fn identify(&self, model: &Model) -> String {
-        self.flags.identify(model)
+    fn spell_effect_of_library(&self, model: &Model, effect: &NewEffect, library: &str) -> String {
+        self.flags.spell_effect_of_library(model, effect, library)
     }
 
-    fn separate(&self, model: &Model, separation: &Separation) -> Option<String> {
-        self.flags.separate(model, separation)
+    fn spell_identification(&self, model: &Model) -> String {
+        self.flags.spell_identification(model)
     }
 
-    fn held(&self) -> String {
-        self.flags.held()
-    }
-
-    fn text<'a>(&self, text: &'a str) -> Cow<'a, str> {
-        self.flags.text(text)
+    fn spell_separation(&self, model: &Model, separation: &Separation) -> Option<String> {
+        self.flags.spell_separation(model, separation)
     }
 }
 

@@ -11,7 +11,7 @@ use modelmill::{Note, Severity};
 use modelmill_boundary::text;
 
 use crate::failure::{Failure, Outcome};
-use crate::flags::{spelled, spelled_in};
+use crate::flags::FlagSpelling;
 
 /// Whether the user allows colours at all: `NO_COLOR` (no-color.org) and dumb terminals forbid them.
 fn colours_allowed() -> bool {
@@ -39,11 +39,6 @@ pub(crate) fn errors_in_colour() -> bool {
 
 /// Writes the result of a command to standard output, with one line feed at its end.
 pub(crate) fn print(text: &str) -> Outcome {
-    print_as_is(&spelled(text))
-}
-
-/// Writes data and code, in which nothing is advised, to standard output, with one line feed at its end.
-pub(crate) fn print_as_is(text: &str) -> Outcome {
     let text = text::terminal(text, colours_allowed() && io::stdout().is_terminal());
     let mut out = io::stdout().lock();
     let end = if text.ends_with('\n') { "" } else { "\n" };
@@ -58,13 +53,12 @@ pub(crate) fn print_as_is(text: &str) -> Outcome {
 
 /// Prints one JSON object to standard output.
 pub(crate) fn print_json(value: &serde_json::Value) -> Outcome {
-    print_as_is(&text::json(&format!("{:#}", spelled_in(value))))
+    print(&text::json(&format!("{value:#}")))
 }
 
 /// Writes to standard error; who does not read it is not bothered.
 pub(crate) fn say(text: &str) {
-    let text = spelled(text);
-    let text = text::terminal(&text, errors_in_colour());
+    let text = text::terminal(text, errors_in_colour());
     let _ = writeln!(io::stderr(), "{text}");
 }
 
@@ -82,9 +76,10 @@ pub(crate) fn note(text: &str) {
 
 /// A remark of the library on standard error.
 pub(crate) fn remark(note: &Note) {
+    let says = note.says.spell(&FlagSpelling);
     match note.severity {
-        Severity::Warning => warn(&note.says),
-        Severity::Info => self::note(&note.says),
+        Severity::Warning => warn(&says),
+        Severity::Info => self::note(&says),
     }
 }
 

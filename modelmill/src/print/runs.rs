@@ -117,7 +117,7 @@ impl Compared {
     }
 
     /// The same for people.
-    pub fn text(&self, style: Style) -> String {
+    pub fn text(&self, style: Style, spelling: &dyn RemedySpelling) -> String {
         let [first, later @ ..] = &self.runs[..] else {
             return String::new();
         };
@@ -148,7 +148,8 @@ impl Compared {
         }
         for one in &self.unread {
             lines.push(String::new());
-            lines.push(format!("{} gave no answer: {}", one.file, one.error));
+            let why = one.error.spell(spelling);
+            lines.push(format!("{} gave no answer: {why}", one.file));
         }
         lines.push(String::new());
         lines.join("\n")

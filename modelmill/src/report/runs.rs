@@ -9,6 +9,7 @@ use super::draw::{Axis, LEFT, Picture, RIGHT, WIDTH, range, with_room};
 use super::page::end;
 use super::tables::{Cell, table};
 use super::units::pretty;
+use crate::print::RemedySpelling;
 use crate::runs::{Changed, Compared, Fitted, SharedFit};
 use crate::text::svg::escape;
 use crate::text::table::{count, significant};
@@ -18,8 +19,8 @@ const HEIGHT: f64 = 170.0;
 /// How many standard deviations a bar reaches up and down.
 const BARS: f64 = 2.0;
 
-/// The page's text.
-pub fn runs_page(compared: &Compared) -> String {
+/// The page's text, with advice in the words of whoever reads it.
+pub fn runs_page(compared: &Compared, spelling: &dyn RemedySpelling) -> String {
     let title = format!("{}: what changed between runs", compared.model);
     let mut page = pages::begin(&title);
     page.push_str(&summary(compared));
@@ -39,7 +40,7 @@ pub fn runs_page(compared: &Compared) -> String {
         "Base parameters over the runs",
         parameters(compared),
     ));
-    sections.push(("runs", "The runs", runs(compared)));
+    sections.push(("runs", "The runs", runs(compared, spelling)));
     for (id, title, html) in sections {
         let _ = write!(
             page,
@@ -290,7 +291,7 @@ pub fn over_runs(
     )
 }
 
-fn runs(compared: &Compared) -> String {
+fn runs(compared: &Compared, spelling: &dyn RemedySpelling) -> String {
     let mut rows: Vec<Vec<Cell>> = (compared.runs.iter().enumerate())
         .map(|(k, run)| {
             vec![
@@ -302,7 +303,7 @@ fn runs(compared: &Compared) -> String {
         })
         .collect();
     rows.extend(compared.unread.iter().map(|one| {
-        let says = Cell::text(&format!("gave no answer: {}", one.error));
+        let says = Cell::text(&format!("gave no answer: {}", one.error.spell(spelling)));
         vec![Cell::text(""), Cell::text(&one.file), Cell::text(""), says]
     }));
     table(

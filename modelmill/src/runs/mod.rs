@@ -16,6 +16,7 @@ mod sums;
 
 use std::borrow::Borrow;
 
+use modelmill_boundary::message;
 use modelmill_identify::changes::{Change, Moments, Runs, Search, search, within};
 use modelmill_identify::diagnose::Column;
 use modelmill_identify::{Note, ParameterInfo};
@@ -214,12 +215,12 @@ fn alone(first: &str, unread: &[Unread]) -> Error {
         [] => Error::options(format!(
             "{first} is the only recording; what changed is told between two or more, the first of which is how things were"
         )),
-        [one, ..] => Error::input(format!(
+        [one, ..] => Error::input(message!(
             "no recording but {first} gave an answer; {} of {} did not, as {}: {}",
             unread.len(),
             unread.len() + 1,
             one.file,
-            one.error
+            one.error.message()
         )),
     }
 }

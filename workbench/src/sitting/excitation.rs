@@ -187,7 +187,8 @@ impl Sitting {
             significant(found.found.start, 4),
             found.found.random
         ));
-        told["notes"] = json!(found.notes);
+        let notes = found.notes.iter();
+        told["notes"] = notes.map(|note| note.json(&*self.commands)).collect();
         Ok(Planned {
             told,
             csv: found.csv(),

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use modelmill::compare::Compared;
 use modelmill::diagnose::{Findings, Held, Question, words};
-use modelmill::print::{Spelling, edit};
+use modelmill::print::{StepSpelling, edit};
 use modelmill::recording::{Reading, Recording};
 use modelmill::report::page;
 use modelmill::{Host, Model, along, bundled};
@@ -16,7 +16,7 @@ use modelmill_recordings::{PLAIN, Runs, WITH_RODS};
 
 use crate::args::TourArgs;
 use crate::failure::{Failure, Outcome};
-use crate::flags::{Flags, quoted};
+use crate::flags::{CommandLineSpelling, quoted};
 use crate::output;
 use crate::terminal;
 
@@ -125,20 +125,20 @@ impl Place {
     }
 
     /// How the command line asks for the same.
-    fn flags(&self, runs: &Runs) -> Flags {
+    fn flags(&self, runs: &Runs) -> CommandLineSpelling {
         let [fit, check] = [runs.fit.0, runs.check.0].map(|name| self.path(name));
-        Flags::new(&[fit], &[check], &Reading::default())
+        CommandLineSpelling::new(&[fit], &[check], &Reading::default())
     }
 
     /// Writes the model with what was found beside the one it came from; the commands for it, and the difference.
-    fn add(&self, findings: &Findings, flags: &Flags) -> Outcome<Option<(Vec<String>, String)>> {
+    fn add(&self, findings: &Findings, flags: &CommandLineSpelling) -> Outcome<Option<(Vec<String>, String)>> {
         let Some(edited) = &findings.edited else {
             return Ok(None);
         };
         self.write(EDITED, &edited.text)?;
         let model = &findings.before.model;
         let commands = findings.entries.iter();
-        let commands = commands.map(|entry| flags.add(model, entry)).collect();
+        let commands = commands.map(|entry| flags.spell_effect(model, entry)).collect();
         let names = ["spidermill.toml", EDITED];
         let difference = edit::difference(model.text(), &edited.text, names);
         let coloured = edit::coloured(&difference, terminal::style());
