@@ -7,13 +7,13 @@ use pyo3::sync::PyOnceLock;
 use pyo3::types::PyType;
 use serde_json::{Value, json};
 
-use crate::spelling::spelled;
+use crate::spelling::PythonSpelling;
 
 /// An exception `modelmill.ModelmillError` that says `says`; `diagnostics` is a list of objects.
 pub(crate) fn raised(py: Python<'_>, says: &str, diagnostics: &Value) -> PyErr {
     static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
     let class = CLASS.import(py, "modelmill._errors", "ModelmillError");
-    let made = class.and_then(|class| class.call1((spelled(says), diagnostics.to_string())));
+    let made = class.and_then(|class| class.call1((says, diagnostics.to_string())));
     match made {
         Ok(error) => PyErr::from_value(error),
         Err(error) => error,
@@ -22,7 +22,7 @@ pub(crate) fn raised(py: Python<'_>, says: &str, diagnostics: &Value) -> PyErr {
 
 /// An exception that says what is wrong with what was given.
 pub(crate) fn refused(py: Python<'_>, says: &str) -> PyErr {
-    let diagnostics = json!([{ "severity": "error", "says": spelled(says) }]);
+    let diagnostics = json!([{ "severity": "error", "says": says }]);
     raised(py, says, &diagnostics)
 }
 
@@ -30,10 +30,11 @@ pub(crate) fn refused(py: Python<'_>, says: &str) -> PyErr {
 pub(crate) fn of_library(py: Python<'_>, error: &Error) -> PyErr {
     match error {
         Error::Model(faults) => {
-            let told = print::faults(faults);
-            raised(py, faults.render(false).trim_end(), &told["diagnostics"])
+            let told = print::faults(faults, &PythonSpelling);
+            let says = faults.render_spelled(false, &PythonSpelling);
+            raised(py, says.trim_end(), &told["diagnostics"])
         }
         Error::Cancelled => PyKeyboardInterrupt::new_err(error.to_string()),
-        other => refused(py, &other.to_string()),
+        other => refused(py, &other.spell(&PythonSpelling)),
     }
 }

@@ -24,4 +24,6 @@ mod _core {
     use crate::results::{Excited, Found, Recorded};
     #[pymodule_export]
     use crate::rigs::{Simulated, reduce, simulate};
+    #[pymodule_export]
+    use crate::spelling::advised_names;
 }

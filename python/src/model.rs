@@ -23,7 +23,7 @@ use crate::arrays::rows;
 use crate::errors::refused;
 use crate::options::{self, EstimationOptions, ExcitationOptions, ReadingOptions, Says};
 use crate::results::{Excited, Found, Recorded, Remarks, Source, remarks};
-use crate::spelling::{self, spelled};
+use crate::spelling::PythonSpelling;
 use crate::work::{Listener, at_once, work};
 
 /// States whose functions are computed in this thread, without looking for interrupts.
@@ -249,7 +249,7 @@ impl CoreModel {
     #[getter]
     fn notes(&self) -> Remarks {
         let of_file = self.model.loaded.warnings.iter();
-        let of_file = of_file.map(|one| ("warning", spelled(&one.message).into_owned()));
+        let of_file = of_file.map(|one| ("warning", one.message.clone()));
         of_file.chain(remarks(&self.model.notes)).collect()
     }
 
@@ -283,7 +283,7 @@ impl CoreModel {
     fn check(&self, py: Python<'_>) -> PyResult<Found> {
         let checked = self.work(py, None, || self.model.check())?;
         Ok(Found::new(
-            &checked.json(),
+            &checked.json(&PythonSpelling),
             &checked.text(Style::PLAIN),
             Remarks::new(),
         ))
@@ -396,7 +396,8 @@ impl CoreModel {
         self.work(py, progress.as_ref(), || {
             let found = self.model.compare(&borrowed(&data), &values)?;
             let text = found.text(name, Style::PLAIN);
-            Ok(Found::new(&found.json(name)?, &text, remarks(&found.notes)))
+            let json = found.json(name, &PythonSpelling)?;
+            Ok(Found::new(&json, &text, remarks(&found.notes)))
         })
     }
 
@@ -425,8 +426,9 @@ impl CoreModel {
             let found = self
                 .model
                 .identify_with(&data, &instruments, &check, &estimation)?;
-            let text = found.text(&self.model, Style::PLAIN);
-            let told = Found::new(&found.json(&self.model)?, &text, remarks(&found.notes));
+            let text = found.text(&self.model, Style::PLAIN, &PythonSpelling);
+            let json = found.json(&self.model, &PythonSpelling)?;
+            let told = Found::new(&json, &text, remarks(&found.notes));
             Ok(told.with_values(found.values()))
         })
     }
@@ -448,7 +450,7 @@ impl CoreModel {
             let found = self
                 .model
                 .diagnose(&borrowed(&data), &borrowed(&check), &question)?;
-            let spelling = spelling::Python;
+            let spelling = PythonSpelling;
             let text = found.text(Style::PLAIN, &spelling).join("\n");
             let better = match found.entries.as_slice() {
                 [] => None,
@@ -481,9 +483,10 @@ impl CoreModel {
         }
         self.work(py, progress.as_ref(), || {
             let found = self.model.runs(all, &what)?;
-            let text = found.text(Style::PLAIN);
-            let told = Found::new(&found.json(), &text, remarks(&found.notes));
-            Ok(told.with_page(runs_page(&found)))
+            let text = found.text(Style::PLAIN, &PythonSpelling);
+            let json = found.json(&PythonSpelling);
+            let told = Found::new(&json, &text, remarks(&found.notes));
+            Ok(told.with_page(runs_page(&found, &PythonSpelling)))
         })
     }
 
@@ -561,7 +564,7 @@ impl CoreModel {
             let found = self
                 .model
                 .interpret(&self.fit(fit, name)?, name, &unknown)?;
-            let text = found.text(Style::PLAIN);
+            let text = found.text(Style::PLAIN, &PythonSpelling);
             Ok(Found::new(&found.json(), &text, remarks(&found.notes)))
         })
     }
@@ -618,7 +621,7 @@ impl CoreModel {
             if !runs[0].is_empty() {
                 let [first, second] = [&runs[0], &runs[1]].map(|runs| borrowed(runs));
                 let variants = Variants::along(models, [&first, &second])?;
-                object["along"] = variants.json();
+                object["along"] = variants.json(&PythonSpelling);
                 text = format!("{text}\n\n{}", variants.text(Style::PLAIN));
                 notes = remarks(&variants.notes);
             }

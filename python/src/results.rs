@@ -10,7 +10,7 @@ use pyo3::prelude::*;
 use serde_json::Value;
 
 use crate::model::CoreModel;
-use crate::spelling::{spelled, spelled_in};
+use crate::spelling::PythonSpelling;
 
 /// Remarks: severity and text.
 pub(crate) type Remarks = Vec<(&'static str, String)>;
@@ -21,7 +21,7 @@ pub(crate) fn remarks<'a>(notes: impl IntoIterator<Item = &'a Note>) -> Remarks 
             Severity::Warning => "warning",
             Severity::Info => "info",
         };
-        (severity, spelled(&note.says).into_owned())
+        (severity, note.says.spell(&PythonSpelling))
     };
     notes.into_iter().map(one).collect()
 }
@@ -98,8 +98,8 @@ pub(crate) struct Found {
 impl Found {
     pub(crate) fn new(json: &Value, text: &str, notes: Remarks) -> Self {
         Self {
-            json: spelled_in(json).to_string(),
-            text: spelled(text).into_owned(),
+            json: json.to_string(),
+            text: text.to_owned(),
             notes,
             ..Self::default()
         }
@@ -164,12 +164,13 @@ pub(crate) struct Excited {
 impl Excited {
     #[getter]
     fn json(&self) -> String {
-        spelled_in(&self.found.json()).to_string()
+        self.found.json().to_string()
     }
 
     #[getter]
     fn text(&self) -> String {
-        spelled(&self.found.text(modelmill::text::style::Style::PLAIN)).into_owned()
+        let plain = modelmill::text::style::Style::PLAIN;
+        self.found.text(plain, &PythonSpelling)
     }
 
     #[getter]
