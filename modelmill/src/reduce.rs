@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
+use modelmill_boundary::files::Memory;
 use modelmill_boundary::message;
 use modelmill_boundary::text::{OptionName, Remedy};
-use modelmill_boundary::files::Memory;
 use modelmill_codegen::{Evaluator, States};
 use modelmill_reduction::{Reduction, sampled_forces};
 use modelmill_rig::{Rig, State};
@@ -81,7 +81,8 @@ fn compare(rig: &Rig, reduction: &Reduction) -> Outcome<Vec<Compared>> {
     let derivation = modelmill_codegen::derive(&loaded.mechanism)
         .map_err(|error| Error::derivation("the reduced model", error))?;
     let mechanism = &derivation.mechanism;
-    let sampled = sampled_forces(rig, POSES.0, POSES.1).map_err(|error| Error::input(error.to_string()))?;
+    let sampled =
+        sampled_forces(rig, POSES.0, POSES.1).map_err(|error| Error::input(error.to_string()))?;
     // Coordinates and drives by name: their order in the model may be another.
     let active = mechanism
         .coordinates

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
+use modelmill_boundary::files::Kind;
 use modelmill_boundary::message;
 use modelmill_boundary::text::{CommandName, Remedy};
-use modelmill_boundary::files::Kind;
 use modelmill_identify::{ReadOptions, Recording, RecordingFile};
 use modelmill_rig::{Rig, Run, Samples, SimulationError, Trajectory, TrajectoryError};
 

@@ -210,7 +210,10 @@ fn one_run_alone_is_refused() {
     assert!(error.to_string().contains("nowhere.csv"), "{error}");
     let found = runs(vec![Ok(&one), unread(), Ok(&one)]).expect("an answer");
     assert_eq!((found.runs.len(), found.unread.len()), (2, 1));
-    assert_eq!(found.json(&LibrarySpelling)["unread"][0]["file"], "nowhere.csv");
+    assert_eq!(
+        found.json(&LibrarySpelling)["unread"][0]["file"],
+        "nowhere.csv"
+    );
 }
 
 const TOOL: &str = "\n[[part]]\nname = \"tool\"\non = \"link6\"\nmass = 2.8\ncentre = [0.03, -0.02, 0.08]\n\

@@ -417,7 +417,7 @@ fn effects_by_load_need_no_recorded_forces() {
         found
             .notes
             .iter()
-            .any(|note| note.says.contains("load_friction"))
+            .any(|note| note.says.in_library_words().contains("load_friction"))
     );
     assert!(found.errors.iter().all(Option::is_none));
 }
@@ -470,9 +470,10 @@ fn what_has_no_counterpart_is_said() {
     ]);
     let found = along(&before, &one, &recording("names", &[]));
     assert_eq!(found.drives.len(), 1);
-    let warned: Vec<&str> = (found.notes.iter())
-        .filter(|note| note.severity == Severity::Warning && note.says.starts_with("Left out"))
-        .map(|note| note.says.as_str())
+    let warned: Vec<String> = (found.notes.iter())
+        .filter(|note| note.severity == Severity::Warning)
+        .map(|note| note.says.in_library_words())
+        .filter(|says| says.starts_with("Left out"))
         .collect();
     assert!(
         warned.len() == 2 && warned[0].contains("boom") && warned[1].contains("elbow"),
@@ -497,10 +498,10 @@ fn what_nothing_drives_is_left_out() {
     let found = along(&loose, &loose.clone(), &recording("loose", &[]));
     assert_eq!(found.drives.len(), 1);
     assert!(
-        found
-            .notes
-            .iter()
-            .any(|note| note.says.starts_with("Nothing drives on_q2")),
+        found.notes.iter().any(|note| note
+            .says
+            .in_library_words()
+            .starts_with("Nothing drives on_q2")),
         "{:?}",
         found.notes
     );

@@ -130,7 +130,10 @@ fn argument(setting: &OptionSetting) -> String {
 #[pyfunction]
 pub(crate) fn advised_names() -> (Vec<&'static str>, Vec<&'static str>) {
     let mut keywords = Vec::new();
-    let mut methods: Vec<&str> = CommandName::ALL.iter().map(|c| method_of_command(*c)).collect();
+    let mut methods: Vec<&str> = CommandName::ALL
+        .iter()
+        .map(|c| method_of_command(*c))
+        .collect();
     for option in OptionName::ALL {
         match spelled_option(*option) {
             PythonName::Keyword(keyword) => keywords.push(keyword),

@@ -25,7 +25,10 @@ impl Log {
         let help = Message::from(help);
         self.0.push(Diagnostic {
             label: label.to_owned(),
-            help: Some(help).filter(|help| !help.is_empty()).into_iter().collect(),
+            help: Some(help)
+                .filter(|help| !help.is_empty())
+                .into_iter()
+                .collect(),
             ..fault(Some(span), message)
         });
     }

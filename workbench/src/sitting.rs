@@ -397,7 +397,9 @@ impl Sitting {
             let mut told = told::errors(&identified, &read, &*self.commands);
             told["afresh"] = json!(is_read);
             if with_places {
-                told["compared"] = model.compare(&fit, &model.nominal)?.json("nominal", &*self.commands)?;
+                told["compared"] = model
+                    .compare(&fit, &model.nominal)?
+                    .json("nominal", &*self.commands)?;
             }
             Ok(told)
         })()

@@ -28,7 +28,9 @@ pub(crate) fn run(host: &Host, args: &AddArgs) -> Outcome {
     let edited = host.edit(&path, old, &effect)?;
     let edited = elsewhere(host, edited, target.as_ref())?;
     if !edited.loaded.warnings.is_empty() {
-        let warnings = edited.loaded.render_spelled(terminal::errors_in_colour(), &FlagSpelling);
+        let warnings = edited
+            .loaded
+            .render_spelled(terminal::errors_in_colour(), &FlagSpelling);
         terminal::say(warnings.trim_end());
     }
     // What `check` would say beyond the file itself: whether the model can be derived.

@@ -28,7 +28,10 @@ pub(crate) fn run(host: &Host, args: &ReportArgs) -> Outcome {
         again_with_nominal: false,
     };
     let findings = commands::diagnose(host, &args.ask, question)?;
-    target.write(&page(&findings, &CommandLineSpelling::from_args(&args.ask))?)?;
+    target.write(&page(
+        &findings,
+        &CommandLineSpelling::from_args(&args.ask),
+    )?)?;
     let says = words::verdict(&findings.diagnosis, findings.channels(), findings.judged);
     terminal::print(&format!(
         "{}\n\nThe page is {}.",

@@ -33,7 +33,10 @@ fn names_of_files_stay_as_they_are() {
     assert_eq!(told["title"], "option `columns` = `q=x` option `data`");
     let text = printed(&["check", &path]);
     assert!(text.starts_with("verb `add`: sound"), "{text}");
-    assert!(text.contains("option `columns` = `q=x` option `data`"), "{text}");
+    assert!(
+        text.contains("option `columns` = `q=x` option `data`"),
+        "{text}"
+    );
     let missing = path.replace("add", "` `--map");
     let says = refused(1, &["check", &missing]);
     assert!(says.contains(&missing), "{says}");
@@ -76,7 +79,11 @@ fn pushed(name: &str) -> String {
         _ => format!("{line}\n"),
     };
     let path = scratch(name);
-    std::fs::write(&path, text.lines().enumerate().map(push).collect::<String>()).unwrap();
+    std::fs::write(
+        &path,
+        text.lines().enumerate().map(push).collect::<String>(),
+    )
+    .unwrap();
     path
 }
 
@@ -127,15 +134,40 @@ fn advice_is_in_the_words_of_the_program() {
         &["identify", arm, "--data", degrees, "--json"],
         &["identify", mechanism, "--data", plain],
         &["identify", mechanism, "--data", plain, "--check", plain],
-        &["identify", arm, "--data", degrees, "--weights", "channels", "--instruments", "period=2"],
+        &[
+            "identify",
+            arm,
+            "--data",
+            degrees,
+            "--weights",
+            "channels",
+            "--instruments",
+            "period=2",
+        ],
         &["identify", arm, "--data", degrees, "--weights", "variance"],
         &["interpret", arm, "--fit", degrees, "--unknown", "m"],
         &["interpret", arm, "--fit", fit, "--unknown", "nothing"],
         &["report", arm, "--data", degrees, "--out", page],
-        &["runs", mechanism, "--data", plain, nameless, plain, "--out", runs],
+        &[
+            "runs", mechanism, "--data", plain, nameless, plain, "--out", runs,
+        ],
         &["excite", arm, "--out", trajectory],
-        &["simulate", arm, "--trajectory", degrees, "--out", trajectory],
-        &["export", arm, "--parameters", fit, "--out", &format!("{trajectory}.urdf")],
+        &[
+            "simulate",
+            arm,
+            "--trajectory",
+            degrees,
+            "--out",
+            trajectory,
+        ],
+        &[
+            "export",
+            arm,
+            "--parameters",
+            fit,
+            "--out",
+            &format!("{trajectory}.urdf"),
+        ],
     ];
     let mut all = String::new();
     for args in commands {
@@ -158,9 +190,23 @@ fn advice_is_in_the_words_of_the_program() {
     let html = std::fs::read_to_string(format!("{page}/report.html")).unwrap();
     program_words(&html, &[page]);
     for expected in [
-        "--between", "--check", "--cutoff", "--data", "--derivatives positions", "--leave-out-events", "--limits", "--map",
-        "--physical", "--skip-bad-samples", "--smoothing", "--unknown", "--weights", "`modelmill adopt`", "`modelmill diagnose`",
-        "`modelmill evaluate`", "`modelmill identify`",
+        "--between",
+        "--check",
+        "--cutoff",
+        "--data",
+        "--derivatives positions",
+        "--leave-out-events",
+        "--limits",
+        "--map",
+        "--physical",
+        "--skip-bad-samples",
+        "--smoothing",
+        "--unknown",
+        "--weights",
+        "`modelmill adopt`",
+        "`modelmill diagnose`",
+        "`modelmill evaluate`",
+        "`modelmill identify`",
     ] {
         assert!(all.contains(expected), "{expected}");
     }
@@ -168,7 +214,10 @@ fn advice_is_in_the_words_of_the_program() {
 
 #[track_caller]
 fn program_words(says: &str, args: &[&str]) {
-    for words in ["option `", "Option `", "options `", "verb `"].iter().chain(&LIBRARY_NAMES) {
+    for words in ["option `", "Option `", "options `", "verb `"]
+        .iter()
+        .chain(&LIBRARY_NAMES)
+    {
         let at = says.find(words);
         let excerpt = at.map(|at| says[at..].chars().take(120).collect::<String>());
         assert_eq!(excerpt, None, "{args:?}");

@@ -194,7 +194,11 @@ mod tests {
         );
         let repeated = recording(|i| 1.02e-3 * f64::from(i), true);
         assert!(
-            repeated.len() == 1 && repeated[0].says.in_library_words().contains("In 100 of 4000"),
+            repeated.len() == 1
+                && repeated[0]
+                    .says
+                    .in_library_words()
+                    .contains("In 100 of 4000"),
             "{repeated:?}"
         );
     }

@@ -428,7 +428,10 @@ mod tests {
         assert_eq!(runs.len(), 2);
         assert!(
             runs[0].notes[0].says.in_library_words().contains("1 gap")
-                && runs[0].notes[0].says.in_library_words().contains("after line 1251"),
+                && runs[0].notes[0]
+                    .says
+                    .in_library_words()
+                    .contains("after line 1251"),
             "{:?}",
             runs[0].notes
         );

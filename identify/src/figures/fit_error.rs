@@ -105,7 +105,9 @@ impl FitFileError {
                 nearest,
                 present,
             } => {
-                let nearest = nearest.as_ref().map(|near| format!(" (the closest is `{near}`)"));
+                let nearest = nearest
+                    .as_ref()
+                    .map(|near| format!(" (the closest is `{near}`)"));
                 message!(
                     "{file}: the model's parameter `{name}` is not in the fit{}, which holds {}; identify this model again",
                     nearest.unwrap_or_default(),

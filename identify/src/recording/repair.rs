@@ -52,7 +52,8 @@ impl Recording {
                 }
                 column.not_finite = None;
                 let prefix = format!("Column `{name}` of {} holds NaN", self.file);
-                self.notes.retain(|note| !note.says.in_library_words().starts_with(&prefix));
+                self.notes
+                    .retain(|note| !note.says.in_library_words().starts_with(&prefix));
                 let first = lost.iter().position(|lost| *lost).unwrap_or(0);
                 notes.push(Note::warning(format!(
                     "{n} of {} samples of {} lack the force of `{name}`, the first in {place} {}: positions there are kept, \

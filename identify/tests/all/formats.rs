@@ -205,7 +205,12 @@ fn only_the_time_that_is_asked_for_is_read() {
     };
     let recording = part((2.0, 12.0)).unwrap();
     assert!((9_999..=10_001).contains(&recording.samples()));
-    assert!(recording.notes()[0].says.in_library_words().contains("time stamps"));
+    assert!(
+        recording.notes()[0]
+            .says
+            .in_library_words()
+            .contains("time stamps")
+    );
     assert!(
         recording.notes()[1]
             .says

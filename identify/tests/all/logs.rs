@@ -192,7 +192,10 @@ fn datasets_of_all_types_are_read_right() {
         }
         let notes = recording.notes();
         assert!(
-            notes.iter().any(|note| note.says.in_library_words().contains("`calibration`") && note.says.in_library_words().contains("`operator`")),
+            notes.iter().any(
+                |note| note.says.in_library_words().contains("`calibration`")
+                    && note.says.in_library_words().contains("`operator`")
+            ),
             "{notes:?}"
         );
     }
@@ -248,7 +251,14 @@ fn messages_of_any_type_become_columns() {
         expected
     );
     assert!(
-        current.notes()[0].says.in_library_words().contains("`status`") && current.notes()[0].says.in_library_words().contains("arrival"),
+        current.notes()[0]
+            .says
+            .in_library_words()
+            .contains("`status`")
+            && current.notes()[0]
+                .says
+                .in_library_words()
+                .contains("arrival"),
         "{:?}",
         current.notes()
     );

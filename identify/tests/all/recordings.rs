@@ -304,7 +304,11 @@ fn time_must_increase_and_gaps_are_said() {
     let run = gap.states(&names(&["q"]), &[]).unwrap();
     assert_eq!(run.notes[0].severity, Severity::Warning);
     assert!(
-        run.notes[0].says.in_library_words().contains("1 gap ") && run.notes[0].says.in_library_words().contains("after line 4"),
+        run.notes[0].says.in_library_words().contains("1 gap ")
+            && run.notes[0]
+                .says
+                .in_library_words()
+                .contains("after line 4"),
         "{}",
         run.notes[0].says.in_library_words()
     );
@@ -341,9 +345,10 @@ fn missing_derivatives_are_prepared_and_said() {
         assert!(start > 0 && run.samples() == 400 - start - end);
         assert!(run.prepared.cutoff_chosen);
         assert!(
-            run.notes
-                .iter()
-                .any(|note| note.says.in_library_words().contains("chosen from the signal")),
+            run.notes.iter().any(|note| note
+                .says
+                .in_library_words()
+                .contains("chosen from the signal")),
             "{:?}",
             run.notes
         );
@@ -439,10 +444,10 @@ fn short_and_still_recordings_get_an_answer() {
     );
     let still = sine(&["still"]).states(&names(&["still"]), &[]).unwrap();
     assert!(
-        still
-            .notes
-            .iter()
-            .any(|note| note.says.in_library_words().contains("`still` does not move")),
+        still.notes.iter().any(|note| note
+            .says
+            .in_library_words()
+            .contains("`still` does not move")),
         "{:?}",
         still.notes
     );

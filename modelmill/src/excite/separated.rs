@@ -125,10 +125,7 @@ pub(crate) fn ask(
                 "no motion tells {name} from {rival}, which can say all that it says beside the base parameters{}; it is left \
                  out",
                 if pair.beside().next().is_some() {
-                    message!(
-                        " and the effects of {}",
-                        Remedy::option(OptionName::Beside)
-                    )
+                    message!(" and the effects of {}", Remedy::option(OptionName::Beside))
                 } else {
                     Message::new()
                 }

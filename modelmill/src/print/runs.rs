@@ -18,7 +18,8 @@ impl Compared {
         let changes =
             all.flat_map(|(k, run)| run.changes.iter().map(move |one| change_json([0, k], one)));
         let unread = self.unread.iter();
-        let unread = unread.map(|one| json!({ "file": one.file, "says": one.error.spell(spelling) }));
+        let unread =
+            unread.map(|one| json!({ "file": one.file, "says": one.error.spell(spelling) }));
         let runs = self.runs.iter().map(|run| {
             json!({
                 "file": run.file,

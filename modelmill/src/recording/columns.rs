@@ -115,9 +115,7 @@ fn together(mut faults: Vec<Error>) -> Option<Error> {
     let is_wrong_option = faults
         .iter()
         .any(|fault| matches!(fault, Error::Options(_)));
-    let lines = faults
-        .iter()
-        .map(|fault| message!("- {}", fault.message()));
+    let lines = faults.iter().map(|fault| message!("- {}", fault.message()));
     let says = message!(
         "{} mappings of columns are at fault:\n{}",
         faults.len(),

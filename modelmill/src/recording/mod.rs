@@ -12,9 +12,9 @@ mod smoother;
 use std::path::Path;
 use std::sync::Arc;
 
+use modelmill_boundary::files::Memory;
 use modelmill_boundary::message;
 use modelmill_boundary::text::{Message, OptionName, OptionSetting, Remedy};
-use modelmill_boundary::files::Memory;
 use modelmill_identify::diagnose::{Disturbance, Quantity};
 use modelmill_identify::{Note, PositionFault, Recording as Raw, RecordingFiles};
 

@@ -212,7 +212,8 @@ impl Stretch {
             ),
             PoseReason::Undefined => (
                 "a term of the model has no finite value at this state",
-                "look at the effects whose expressions hold quotients, roots or exponentials".into(),
+                "look at the effects whose expressions hold quotients, roots or exponentials"
+                    .into(),
             ),
             PoseReason::Singular => (
                 "the mechanism is singular at this pose, so that forces are not determined",

@@ -233,7 +233,9 @@ impl Build<'_> {
         } else {
             self.remarks.push(message!(
                 "line {}: `{}` is held at {} by a coupling",
-                joint.line, joint.name, follows.offset
+                joint.line,
+                joint.name,
+                follows.offset
             ));
             String::new()
         };
@@ -494,7 +496,8 @@ impl Build<'_> {
         if joint.damping != 0.0 || joint.armature != 0.0 || joint.friction != 0.0 {
             self.remarks.push(message!(
                 "line {}: damping, friction and armature of the free joint `{}` are left out",
-                joint.line, joint.name
+                joint.line,
+                joint.name
             ));
         }
         let frame = self.frame(own, None, *link, "", &text, Vec::new());

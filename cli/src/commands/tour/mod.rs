@@ -131,14 +131,20 @@ impl Place {
     }
 
     /// Writes the model with what was found beside the one it came from; the commands for it, and the difference.
-    fn add(&self, findings: &Findings, flags: &CommandLineSpelling) -> Outcome<Option<(Vec<String>, String)>> {
+    fn add(
+        &self,
+        findings: &Findings,
+        flags: &CommandLineSpelling,
+    ) -> Outcome<Option<(Vec<String>, String)>> {
         let Some(edited) = &findings.edited else {
             return Ok(None);
         };
         self.write(EDITED, &edited.text)?;
         let model = &findings.before.model;
         let commands = findings.entries.iter();
-        let commands = commands.map(|entry| flags.spell_effect(model, entry)).collect();
+        let commands = commands
+            .map(|entry| flags.spell_effect(model, entry))
+            .collect();
         let names = ["spidermill.toml", EDITED];
         let difference = edit::difference(model.text(), &edited.text, names);
         let coloured = edit::coloured(&difference, terminal::style());

@@ -113,7 +113,8 @@ impl Build<'_> {
             } else {
                 self.remarks.push(message!(
                     "line {}: `{}` pulls what other drives move already, and is left out",
-                    line.line, line.name
+                    line.line,
+                    line.name
                 ));
             }
         }
@@ -201,9 +202,8 @@ impl Build<'_> {
         }
         if self.has_surplus && !forces.is_empty() {
             forces.clear();
-            self.remarks.push(
-                "limits of forces are left out: there are more drives than freedoms".into(),
-            );
+            self.remarks
+                .push("limits of forces are left out: there are more drives than freedoms".into());
         }
     }
 }
