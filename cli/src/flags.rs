@@ -1,4 +1,4 @@
-//! How the command line asks for what the library advises.
+//! How the command line asks for what the library advises: options as flags, commands of the program, whole command lines.
 
 use std::borrow::Cow;
 use std::fmt::Write as _;
@@ -6,12 +6,10 @@ use std::path::PathBuf;
 
 use modelmill::diagnose::{NamedEffect, SeparationProposal};
 use modelmill::edit::NewEffect;
-use modelmill::print::AdviceFormatter;
+use modelmill::print::{CommandName, OptionName, OptionSetting, RemedySpelling, StepSpelling};
 use modelmill::recording::RecordingOptions;
 use modelmill::text::table::significant;
 use modelmill::{Host, Model};
-use modelmill_boundary::text::{self, AdviceItem};
-use serde_json::Value;
 
 use crate::args::DiagnosisArgs;
 
@@ -19,14 +17,14 @@ use crate::args::DiagnosisArgs;
 const DIGITS: usize = 5;
 
 /// The command line that asked, for texts that advise another one.
-pub(crate) struct CommandLineAdvice {
+pub(crate) struct CommandLineSpelling {
     /// The recordings, as the command line has them.
     recordings: String,
     /// The recordings of the fit with other names for their columns, where they need nothing else; what `excite` compares with.
     compared: String,
 }
 
-impl CommandLineAdvice {
+impl CommandLineSpelling {
     /// Recordings for fit and check, read as `reading` says.
     pub(crate) fn new(fit: &[PathBuf], check: &[PathBuf], reading: &RecordingOptions) -> Self {
         let named = |option: &str, paths: &[PathBuf]| -> Vec<String> {
@@ -60,18 +58,19 @@ impl CommandLineAdvice {
     }
 }
 
-impl AdviceFormatter for CommandLineAdvice {
-    fn add_effect(&self, model: &Model, effect: &NewEffect) -> String {
-        let mut command = add_command(&model.path, effect);
-        command.push_str(&library_flags_of_model(model));
+impl StepSpelling for CommandLineSpelling {
+    fn spell_effect(&self, model: &Model, effect: &NewEffect) -> String {
+        let mut add_command = add_command(&model.path, effect);
+        add_command.push_str(&library_flags_of_model(model));
         command
     }
 
-    fn add_effect_from_library(&self, model: &Model, effect: &NewEffect, library: &str) -> String {
-        format!("{} --library {}", self.add_effect(model, effect), quote_word(library))
+    fn spell_effect_of_library(&self, model: &Model, effect: &NewEffect, library: &str) -> String {
+        let effect = self.spell_effect(model, effect);
+        format!("{effect} --library {}", quote_word(library))
     }
 
-    fn identify(&self, model: &Model) -> String {
+    fn spell_identification(&self, model: &Model) -> String {
         format!(
             "modelmill identify {} {} --out fit.json",
             quote_word(&model.path),
@@ -79,7 +78,7 @@ impl AdviceFormatter for CommandLineAdvice {
         )
     }
 
-    fn separate_effects(&self, model: &Model, separation: &SeparationProposal) -> Option<String> {
+    fn spell_separation(&self, model: &Model, separation: &SeparationProposal) -> Option<String> {
         let mut command = format!(
             "modelmill excite {} --separate {}",
             quote_word(&model.path),
@@ -106,36 +105,46 @@ impl AdviceFormatter for CommandLineAdvice {
         );
         Some(command)
     }
+}
 
-    fn fix_parameters(&self) -> String {
-        "--held".to_owned()
+impl RemedySpelling for CommandLineSpelling {
+    fn spell_options(&self, settings: &[OptionSetting]) -> String {
+        FlagSpelling.spell_options(settings)
     }
 
-    fn format_text<'a>(&self, text: &'a str) -> Cow<'a, str> {
-        format_advice(text)
+    fn spell_command(&self, command: CommandName) -> String {
+        FlagSpelling.spell_command(command)
     }
 }
 
-/// Fields of the library's options whose flags are called otherwise.
-const FLAGS: [(&str, &str); 5] = [
-    ("band_hz", "band"),
-    ("columns", "map"),
-    ("cutoff_hz", "cutoff"),
-    ("loads", "load"),
-    ("source", "derivatives"),
-];
+/// Options as flags, and commands of the program.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct FlagSpelling;
 
-/// A text of the library with its options as flags and its verbs as commands.
-pub(crate) fn format_advice(text: &str) -> Cow<'_, str> {
-    let spelled = text::format_advice(text, |advised| match advised {
-        AdviceItem::Option(name, None) => format!("`{}`", flag(name)),
-        AdviceItem::Option(name, Some(value)) => format!("`{} {}`", flag(name), quote_value(value)),
-        AdviceItem::Verb(name) => format!("`modelmill {name}`"),
-    });
-    // Flags side by side are one piece of a command line.
-    match spelled {
-        Cow::Owned(text) => Cow::Owned(text.replace("` `--", " --")),
-        Cow::Borrowed(text) => Cow::Borrowed(text),
+impl RemedySpelling for FlagSpelling {
+    /// Flags side by side are one piece of a command line.
+    fn spell_options(&self, settings: &[OptionSetting]) -> String {
+        let one = |setting: &OptionSetting| match &setting.value {
+            None => flag(setting.name),
+            Some(value) => format!("{} {}", flag(setting.name), quote_value(value)),
+        };
+        let all: Vec<String> = settings.iter().map(one).collect();
+        format!("`{}`", all.join(" "))
+    }
+
+    fn spell_command(&self, command: CommandName) -> String {
+        format!("`modelmill {}`", command.name())
+    }
+}
+
+/// The flag of an option.
+fn flag(option: OptionName) -> String {
+    match option {
+        OptionName::Columns => "--map".to_owned(),
+        OptionName::CutoffHz => "--cutoff".to_owned(),
+        OptionName::Loads => "--load".to_owned(),
+        OptionName::Source => "--derivatives".to_owned(),
+        other => format!("--{}", other.name().replace('_', "-")),
     }
 }
 
@@ -147,29 +156,6 @@ fn quote_value(value: &str) -> Cow<'_, str> {
         Cow::Owned(format!("\"{value}\""))
     } else {
         Cow::Borrowed(value)
-    }
-}
-
-fn flag(field: &str) -> String {
-    let other = FLAGS.iter().find(|(ours, _)| *ours == field);
-    other.map_or_else(
-        || format!("--{}", field.replace('_', "-")),
-        |(_, flag)| format!("--{flag}"),
-    )
-}
-
-/// A JSON value with all its texts spelled as [`spelled`] does.
-pub(crate) fn format_advice_in_json(value: &Value) -> Value {
-    match value {
-        Value::String(text) => Value::String(format_advice(text).into_owned()),
-        Value::Array(values) => values.iter().map(format_advice_in_json).collect(),
-        Value::Object(members) => {
-            let members = members.iter();
-            members
-                .map(|(name, value)| (name.clone(), format_advice_in_json(value)))
-                .collect()
-        }
-        Value::Null | Value::Bool(_) | Value::Number(_) => value.clone(),
     }
 }
 
@@ -232,20 +218,25 @@ pub(crate) fn quote_word(word: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
-
     use clap::CommandFactory;
     use modelmill::edit::NewParameter;
+    use modelmill::print::Remedy;
+    use modelmill_boundary::message;
 
     use super::*;
     use crate::args::CommandLine;
 
     #[test]
-    fn options_of_texts_become_flags() {
-        let says = "map it: option `columns` = `q=q [deg]` option `columns` = `w=w/2`, or leave option `skip_bad_samples` \
-                    out; verb `identify` makes one";
+    fn options_become_flags() {
+        let maps = ["q=q [deg]", "w=w/2"].map(|map| OptionSetting::new(OptionName::Columns, map));
+        let says = message!(
+            "map it: {}, or leave {} out; {} makes one",
+            Remedy::options(maps),
+            Remedy::option(OptionName::SkipBadSamples),
+            Remedy::command(CommandName::Identify)
+        );
         assert_eq!(
-            format_advice(says),
+            says.spell(&FlagSpelling),
             "map it: `--map \"q=q [deg]\" --map \"w=w/2\"`, or leave `--skip-bad-samples` out; `modelmill identify` makes one"
         );
     }
@@ -263,58 +254,23 @@ mod tests {
         }
     }
 
-    /// Every option and verb that a text of the library names is a flag or a command of the program.
+    /// Every option and command that the library may advise is a flag or a command of the program.
     #[test]
-    fn what_texts_advise_exists() {
+    fn what_messages_advise_exists() {
         let commands: Vec<clap::Command> = CommandLine::command().get_subcommands().cloned().collect();
         let flags: Vec<String> = commands
             .iter()
             .flat_map(clap::Command::get_arguments)
             .filter_map(|a| Some(format!("--{}", a.get_long()?)))
             .collect();
-        let mut count = 0;
-        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-        for package in ["model-spec", "identify", "reduction", "modelmill"] {
-            for (file, text) in sources(&root.join(package).join("src")) {
-                text::format_advice(&text, |advised| {
-                    count += 1;
-                    match advised {
-                        AdviceItem::Option(name, _) => {
-                            let flag = flag(name);
-                            assert!(flags.contains(&flag), "{}: {flag}", file.display());
-                        }
-                        AdviceItem::Verb(verb) => {
-                            let is_verb = commands.iter().any(|c| c.get_name() == verb);
-                            assert!(is_verb, "{}: {verb}", file.display());
-                        }
-                    }
-                    String::new()
-                });
-                for line in text.lines().map(str::trim_start) {
-                    let names_a_flag = flags.iter().any(|flag| {
-                        let mut places = line.match_indices(flag.as_str());
-                        places.any(|(at, _)| !line[..at].ends_with('-'))
-                    });
-                    let is_text = !line.starts_with("//");
-                    assert!(!(is_text && names_a_flag), "{}: {line}", file.display());
-                }
-            }
+        for option in OptionName::ALL {
+            let flag = flag(*option);
+            assert!(flags.contains(&flag), "{flag}");
         }
-        assert!(count > 40, "{count}");
-    }
-
-    fn sources(folder: &Path) -> Vec<(PathBuf, String)> {
-        let mut found = Vec::new();
-        for entry in std::fs::read_dir(folder).unwrap() {
-            let path = entry.unwrap().path();
-            if path.is_dir() {
-                found.extend(sources(&path));
-            } else if path.extension().is_some_and(|e| e == "rs") {
-                let text = std::fs::read_to_string(&path).unwrap();
-                found.push((path, text));
-            }
+        for add_command in CommandName::ALL {
+            let name = add_command.name();
+            assert!(commands.iter().any(|c| c.get_name() == name), "{name}");
         }
-        found
     }
 
     #[test]

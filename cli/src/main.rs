@@ -16,6 +16,7 @@ use modelmill::{Error, Host};
 
 use args::{CommandLine, ProgramCommand};
 use failure::{CommandFailure, CommandOutcome};
+use flags::FlagSpelling;
 use terminal::progress::TerminalProgress;
 
 fn main() -> ExitCode {
@@ -38,9 +39,10 @@ fn main() -> ExitCode {
         Err(failure) => {
             match &failure {
                 CommandFailure::Library(Error::Model(faults)) => {
-                    terminal::print_to_stderr(faults.render(terminal::is_stderr_coloured()).trim_end());
+                    let in_colour = terminal::is_stderr_coloured();
+                    terminal::print_to_stderr(faults.render_spelled(in_colour, &FlagSpelling).trim_end());
                 }
-                CommandFailure::Library(error) => terminal::error(&error.to_string()),
+                CommandFailure::Library(error) => terminal::error(&error.spell(&FlagSpelling)),
                 CommandFailure::Input(says) | CommandFailure::Usage(says) => terminal::error(says),
                 CommandFailure::BrokenPipe => {}
             }

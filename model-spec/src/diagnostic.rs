@@ -8,6 +8,7 @@ use std::path::PathBuf;
 
 use annotate_snippets::renderer::DecorStyle;
 use annotate_snippets::{AnnotationKind, Group, Level, Origin, Renderer, Snippet};
+use modelmill_boundary::text::{Message, RemedySpelling};
 
 /// How many diagnostics are kept; a file with more has one cause behind them.
 const MOST_DIAGNOSTICS: usize = 100;
@@ -48,7 +49,7 @@ pub struct Diagnostic {
     /// Another place that explains the finding, such as a first definition.
     pub related: Option<(SourceSpan, String)>,
     /// What to do, one sentence each.
-    pub help: Vec<String>,
+    pub help: Vec<Message>,
 }
 
 impl Diagnostic {
@@ -99,7 +100,7 @@ impl Diagnostic {
 
     /// Says what to do.
     #[must_use]
-    pub(crate) fn help(mut self, help: impl Into<String>) -> Self {
+    pub(crate) fn help(mut self, help: impl Into<Message>) -> Self {
         self.help.push(help.into());
         self
     }
@@ -107,7 +108,7 @@ impl Diagnostic {
     /// Says what to do, if there is something to say.
     #[must_use]
     pub(crate) fn help_if(mut self, help: Option<String>) -> Self {
-        self.help.extend(help);
+        self.help.extend(help.map(Message::from));
         self
     }
 }
@@ -227,8 +228,13 @@ impl DiagnosticLog {
     }
 }
 
-/// Renders findings one below the other, with the text they mean.
-pub(crate) fn render(diagnostics: &[Diagnostic], sources: &SourceFiles, color: bool) -> String {
+/// Renders findings one below the other, with the text they mean and advice in the words of whoever reads it.
+pub(crate) fn render(
+    diagnostics: &[Diagnostic],
+    sources: &SourceFiles,
+    color: bool,
+    spelling: &dyn RemedySpelling,
+) -> String {
     let renderer = if color {
         Renderer::styled()
     } else {
@@ -237,7 +243,7 @@ pub(crate) fn render(diagnostics: &[Diagnostic], sources: &SourceFiles, color: b
     .decor_style(DecorStyle::Ascii);
     let mut text = String::new();
     for diagnostic in diagnostics {
-        text.push_str(&render_one(diagnostic, sources, &renderer));
+        text.push_str(&render_one(diagnostic, sources, &renderer, spelling));
         text.push_str("\n\n");
     }
     text.truncate(text.trim_end().len());
@@ -246,7 +252,14 @@ pub(crate) fn render(diagnostics: &[Diagnostic], sources: &SourceFiles, color: b
     modelmill_boundary::text::terminal(&text, color).into_owned()
 }
 
-fn render_one(diagnostic: &Diagnostic, sources: &SourceFiles, renderer: &Renderer) -> String {
+fn render_one(
+    diagnostic: &Diagnostic,
+    sources: &SourceFiles,
+    renderer: &Renderer,
+    spelling: &dyn RemedySpelling,
+) -> String {
+    let help = diagnostic.help.iter();
+    let help: Vec<String> = help.map(|help| help.spell(spelling)).collect();
     let level = match diagnostic.severity {
         DiagnosticSeverity::Error => Level::ERROR,
         DiagnosticSeverity::Warning => Level::WARNING,
@@ -272,12 +285,12 @@ fn render_one(diagnostic: &Diagnostic, sources: &SourceFiles, renderer: &Rendere
     if diagnostic.span.is_none() {
         // Without a snippet the renderer would begin the help by an empty margin.
         let mut text = renderer.render(&[group]);
-        for help in &diagnostic.help {
+        for help in &help {
             let _ = write!(text, "\n  = help: {help}");
         }
         return text;
     }
-    for help in &diagnostic.help {
+    for help in &help {
         group = group.element(Level::HELP.message(help.as_str()));
     }
     renderer.render(&[group])

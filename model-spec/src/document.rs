@@ -1,5 +1,7 @@
 //! One TOML text as a tree whose every value and key knows its place.
 
+use modelmill_boundary::message;
+use modelmill_boundary::text::{OptionName, Remedy};
 use toml::de::{DeTable, DeValue};
 
 use crate::diagnostic::{Diagnostic, DiagnosticLog, SourceSpan};
@@ -148,7 +150,10 @@ fn parse_closed(text: &str, file: usize, log: &mut DiagnosticLog) -> TomlTable {
             log.push(
                 Diagnostic::error(first, "this is no model file")
                     .label("expected TOML, such as `schema = 1`")
-                    .help("a recording goes where recordings are asked for (option `data`)"),
+                    .help(message!(
+                        "a recording goes where recordings are asked for ({})",
+                        Remedy::option(OptionName::Data)
+                    )),
             );
             return TomlTable::new();
         }

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use modelmill_boundary::files::{DiskFiles, FileError, FileFault, FileSource, normalise_path};
+use modelmill_boundary::text::{LibrarySpelling, RemedySpelling};
 
 use crate::build::build;
 use crate::diagnostic::{self, Diagnostic, DiagnosticLog, SourceFile, SourceFiles, SourceSpan};
@@ -44,10 +45,15 @@ pub(crate) struct FileEntries {
 impl LoadedModel {
     /// The warnings as text, with the places they mean; empty if there are none.
     pub fn render(&self, color: bool) -> String {
+        self.render_spelled(color, &LibrarySpelling)
+    }
+
+    /// [`Loaded::render`] with advice in the words of whoever reads it.
+    pub fn render_spelled(&self, color: bool, spelling: &dyn RemedySpelling) -> String {
         if self.warnings.is_empty() {
             return String::new();
         }
-        diagnostic::render(&self.warnings, &self.sources, color)
+        diagnostic::render(&self.warnings, &self.sources, color, spelling)
     }
 }
 
@@ -63,7 +69,12 @@ pub struct LoadFailure {
 impl LoadFailure {
     /// The findings as text, with the places they mean and what to do.
     pub fn render(&self, color: bool) -> String {
-        diagnostic::render(&self.diagnostics, &self.sources, color)
+        self.render_spelled(color, &LibrarySpelling)
+    }
+
+    /// [`Failure::render`] with advice in the words of whoever reads it.
+    pub fn render_spelled(&self, color: bool, spelling: &dyn RemedySpelling) -> String {
+        diagnostic::render(&self.diagnostics, &self.sources, color, spelling)
     }
 }
 

@@ -49,7 +49,7 @@ fn unreadable_file(error: &FileError, advice: &str) -> Diagnostic {
         span: None,
         label: String::new(),
         related: None,
-        help: vec![help.to_owned()],
+        help: vec![help.into()],
     }
 }
 

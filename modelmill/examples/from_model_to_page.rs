@@ -5,7 +5,7 @@ use std::path::Path;
 
 use modelmill::diagnose::DiagnosisOptions;
 use modelmill::identify::EstimatorOptions;
-use modelmill::print::PlainAdvice;
+use modelmill::print::LibrarySpelling;
 use modelmill::recording::RecordingOptions;
 use modelmill::{Model, Outcome, report};
 
@@ -39,14 +39,14 @@ fn main() -> Outcome {
     let folder = std::env::temp_dir();
     let write = |name: &str, text: &str| {
         let path = folder.join(name);
-        std::fs::write(&path, text).map_err(modelmill::Error::input)?;
+        std::fs::write(&path, text).map_err(|error| modelmill::Error::input(error.to_string()))?;
         println!("{}", path.display());
         Ok(())
     };
     write("spidermill-completed.toml", better.text())?;
     write(
         "what-the-model-lacks.html",
-        &report::page(&findings, &PlainAdvice)?,
+        &report::page(&findings, &LibrarySpelling)?,
     )
 }
 

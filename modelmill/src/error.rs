@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use modelmill_boundary::message;
+use modelmill_boundary::text::{LibrarySpelling, Message, RemedySpelling};
 use modelmill_codegen::DeriveError;
 use modelmill_identify::{
     FiguresError, FilterError, FitFileError, LeastSquaresError, RecordingError,
@@ -34,22 +36,22 @@ pub enum Error {
     /// A filter does not suit the recording.
     Filter(FilterError),
     /// Another fault of what the verb was given.
-    Input(String),
+    Input(Message),
     /// Options that contradict each other, or that the verb does not know.
-    Options(String),
+    Options(Message),
     /// The caller asked the verb to stop.
     Cancelled,
 }
 
 impl Error {
-    /// A fault of what the verb was given, from anything that can say what it is.
-    pub fn input(says: impl fmt::Display) -> Self {
-        Self::Input(says.to_string())
+    /// A fault of what the verb was given, from a text or a message that says what it is.
+    pub fn input(says: impl Into<Message>) -> Self {
+        Self::Input(says.into())
     }
 
     /// Options that make no sense together.
-    pub(crate) fn options(says: impl fmt::Display) -> Self {
-        Self::Options(says.to_string())
+    pub(crate) fn options(says: impl Into<Message>) -> Self {
+        Self::Options(says.into())
     }
 
     /// A mechanism that cannot be derived; `model` is what messages call its file.
@@ -59,21 +61,34 @@ impl Error {
             error: Box::new(error),
         }
     }
+
+    /// What is wrong, in the words of whoever reads it.
+    pub fn spell(&self, spelling: &dyn RemedySpelling) -> String {
+        match self {
+            Self::Model(failure) => failure.render_spelled(false, spelling),
+            other => other.message().spell(spelling),
+        }
+    }
+
+    /// What is wrong. That of a file without meaning is a text with snippets, in which [`Error::spell`] spells advice.
+    pub fn message(&self) -> Message {
+        match self {
+            Self::Model(failure) => failure.render(false).into(),
+            Self::Derivation { model, error } => message!("{model}: {error}"),
+            Self::Recording(error) => error.message(),
+            Self::Fit(error) => error.message(),
+            Self::LeastSquares(error) => error.to_string().into(),
+            Self::Figures(error) => error.to_string().into(),
+            Self::Filter(error) => error.to_string().into(),
+            Self::Input(says) | Self::Options(says) => says.clone(),
+            Self::Cancelled => "stopped before there was an answer, as was asked for".into(),
+        }
+    }
 }
 
 impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Model(failure) => failure.fmt(f),
-            Self::Derivation { model, error } => write!(f, "{model}: {error}"),
-            Self::Recording(error) => error.fmt(f),
-            Self::Fit(error) => error.fmt(f),
-            Self::LeastSquares(error) => error.fmt(f),
-            Self::Figures(error) => error.fmt(f),
-            Self::Filter(error) => error.fmt(f),
-            Self::Input(says) | Self::Options(says) => f.write_str(says),
-            Self::Cancelled => f.write_str("stopped before there was an answer, as was asked for"),
-        }
+        f.write_str(&self.spell(&LibrarySpelling))
     }
 }
 

@@ -1,5 +1,7 @@
 //! `export`: a model as a robot description of other programs.
 
+use modelmill_boundary::message;
+use modelmill_boundary::text::{OptionName, Remedy};
 use modelmill_identify::{FitFile, RecordingNote};
 use modelmill_spec::LoadedModel;
 
@@ -39,8 +41,9 @@ impl Model {
             return description(&self.path, &self.loaded, format);
         };
         if fit.physical_parameters().is_empty() {
-            return Err(Error::input(format!(
-                "{file} has base parameters only, and simulators need ten numbers of every body; identify with option `physical`"
+            return Err(Error::input(message!(
+                "{file} has base parameters only, and simulators need ten numbers of every body; identify with {}",
+                Remedy::option(OptionName::Physical)
             )));
         }
         let adopted = self.adopt(fit, file)?;

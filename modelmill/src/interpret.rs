@@ -1,5 +1,7 @@
 //! `interpret`: physical parameters from identified base parameters, the others held at their nominal values.
 
+use modelmill_boundary::message;
+use modelmill_boundary::text::{OptionName, Remedy};
 use modelmill_identify::interpret::{
     PhysicalInterpretation, PhysicalSolution, Polynomial, InterpretationProblem, exact_decimal, interpret,
 };
@@ -63,15 +65,17 @@ pub fn unknown_indices(model: &Model, names: &[String]) -> Outcome<Vec<usize>> {
     for name in names.iter().map(|name| name.trim()) {
         let Some(i) = parameters.iter().position(|p| p.name == name) else {
             let all: Vec<&str> = parameters.iter().map(|p| p.name.as_str()).collect();
-            return Err(Error::input(format!(
-                "option `unknown` = `{name}`: {} declares no such parameter; its parameters are {}",
+            return Err(Error::input(message!(
+                "{}: {} declares no such parameter; its parameters are {}",
+                Remedy::option(OptionName::Unknown).with_value(name),
                 model.path,
                 all.join(", ")
             )));
         };
         if found.contains(&i) {
-            return Err(Error::options(format!(
-                "option `unknown` names `{name}` twice; name each parameter once"
+            return Err(Error::options(message!(
+                "{} names `{name}` twice; name each parameter once",
+                Remedy::option(OptionName::Unknown)
             )));
         }
         found.push(i);

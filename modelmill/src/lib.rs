@@ -3,7 +3,7 @@
 //!
 //! The library owns no terminal, no path and no global. Files, libraries of effects and progress come from a [`Host`]; results
 //! are values; [`mod@print`] and [`report`] make text, JSON and pages of them. What a reader of a text is advised to do is spelled
-//! by a [`print::Spelling`], since a command line, a notebook and a Rust program ask for it in different words.
+//! by a [`print::StepSpelling`], since a command line, a notebook and a Rust program ask for it in different words.
 //!
 //! Units are SI throughout (m, rad, kg, s, N, N m); a recording or a model file may say otherwise of itself.
 //!
@@ -106,7 +106,7 @@
 //!
 //! ```
 //! use modelmill::diagnose::Question;
-//! use modelmill::print::Words;
+//! use modelmill::print::LibrarySpelling;
 //! use modelmill::recording::Reading;
 //! use modelmill::{Model, report};
 //!
@@ -118,7 +118,7 @@
 //!
 //! let better = model.with(&findings.entries)?;
 //! assert!(better.text().contains("rod_inertia"));
-//! assert!(report::page(&findings, &Words)?.contains("<h1>"));
+//! assert!(report::page(&findings, &LibrarySpelling)?.contains("<h1>"));
 //! # Ok::<(), modelmill::Error>(())
 //! ```
 //!

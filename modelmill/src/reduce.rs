@@ -3,6 +3,8 @@
 use std::path::Path;
 
 use modelmill_boundary::files::MemoryFiles;
+use modelmill_boundary::message;
+use modelmill_boundary::text::{OptionName, Remedy};
 use modelmill_codegen::{ModelEvaluator, MotionStates};
 use modelmill_reduction::{PlanarReduction, sampled_forces};
 use modelmill_rig::{Rig, RigState};
@@ -36,7 +38,7 @@ impl Host {
         let made = match plan {
             Some(plan) => modelmill_reduction::plan_file_with(plan, self.files())?,
             None => modelmill_reduction::default_plan(&loaded.rig)
-                .map_err(|says| Error::input(format!("{}: {says}", path.display())))?,
+                .map_err(|says| Error::input(message!("{}: {}", path.display(), says)))?,
         };
         let rig = made.rig(&loaded.rig);
         let reduction = self
@@ -45,10 +47,11 @@ impl Host {
             })?
             .map_err(|failure| match plan {
                 Some(_) => failure.into(),
-                None => Error::input(format!(
-                    "{}\nnote: no plan was given, so that every body became a part of its own; a plan (option `plan`) can make one \
+                None => Error::input(message!(
+                    "{}\nnote: no plan was given, so that every body became a part of its own; a plan ({}) can make one \
                      part of bodies that move alike, such as parallel cranks, whose joints are redundant",
-                    failure.render(false).trim_end()
+                    failure.render(false).trim_end(),
+                    Remedy::option(OptionName::Plan)
                 )),
             })?;
         let forces = self.run_job("holding the model against the rig", 0, |_| {
@@ -78,7 +81,8 @@ fn compare(rig: &Rig, reduction: &PlanarReduction) -> Outcome<Vec<DriveForceErro
     let derivation = modelmill_codegen::derive(&loaded.mechanism)
         .map_err(|error| Error::derivation("the reduced model", error))?;
     let mechanism = &derivation.mechanism;
-    let sampled = sampled_forces(rig, POSES.0, POSES.1).map_err(Error::input)?;
+    let sampled =
+        sampled_forces(rig, POSES.0, POSES.1).map_err(|error| Error::input(error.to_string()))?;
     // Coordinates and drives by name: their order in the model may be another.
     let active = mechanism
         .coordinates

@@ -3,6 +3,8 @@
 use std::path::Path;
 
 use modelmill_boundary::files::PathKind;
+use modelmill_boundary::message;
+use modelmill_boundary::text::{CommandName, Remedy};
 use modelmill_identify::{ReadOptions, SignalRecording, RecordingFile};
 use modelmill_rig::{Rig, RigRecording, CoordinateSamples, SimulationError, Trajectory, TrajectoryError};
 
@@ -51,10 +53,11 @@ impl Host {
         }
         modelmill_rig::load_file_with(path, self.files()).map_err(|failure| {
             if self.load(path).is_ok() {
-                return Error::input(format!(
+                return Error::input(message!(
                     "{} is a model file; a rig file is expected, which describes the whole machine (docs/guide/src/rigs.md; \
-                     model-spec/rigs holds some). Forces of a model along a motion come from verb `evaluate`",
-                    path.display()
+                     model-spec/rigs holds some). Forces of a model along a motion come from {}",
+                    path.display(),
+                    Remedy::command(CommandName::Evaluate)
                 ));
             }
             failure.into()

@@ -16,14 +16,13 @@ fn told(model: &Model, name: &str, seed: u64, made: Made) -> Vec<(f64, f64, Stri
     let recording = model
         .recording(file, &RecordingOptions::default())
         .expect("the recording");
-    let events = recording
-        .notes()
-        .filter(|note| note.says.contains("as in a contact or a push"));
-    events
-        .map(|note| {
-            let words: Vec<&str> = note.says.split(' ').collect();
+    let notes = recording.notes().map(|note| note.says.in_library_words());
+    notes
+        .filter(|says| says.contains("as in a contact or a push"))
+        .map(|says| {
+            let words: Vec<&str> = says.split(' ').collect();
             let number = |at: usize| words[at].parse().expect("a time");
-            (number(1), number(3), note.says.clone())
+            (number(1), number(3), says.clone())
         })
         .collect()
 }

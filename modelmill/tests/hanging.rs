@@ -15,7 +15,7 @@ fn told(of: &Model, by: &Model, name: &str, seed: u64) -> Vec<String> {
     let recording = by
         .recording(file, &RecordingOptions::default())
         .expect("the recording");
-    let notes = recording.notes().map(|note| note.says.clone());
+    let notes = recording.notes().map(|note| note.says.in_library_words());
     let is_its = |says: &String| says.to_lowercase().contains("gravity");
     notes.filter(is_its).collect()
 }

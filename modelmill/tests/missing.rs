@@ -223,7 +223,7 @@ fn what_turns_the_sign_of_bodies_is_suspected() {
         let [fit, check] = ["plain-fit.csv", "plain-check.csv"].map(recording);
         let found = model.diagnose(&[&fit], &[&check], &question);
         let notes = found.expect("an answer").notes.into_iter();
-        let says = notes.map(|note| note.says);
+        let says = notes.map(|note| note.says.in_library_words());
         says.filter(|says| says.contains("no bodies near"))
             .collect()
     };

@@ -8,6 +8,7 @@ mod made;
 use std::path::PathBuf;
 
 use modelmill::Model;
+use modelmill::print::LibrarySpelling;
 use modelmill::recording::{RecordingOptions, PreparedRecording};
 use modelmill::runs::{RunsOptions, RunChange, RunsComparison, ChangeEstimate, KnownLoad, PerRunSelection, UnreadRun, PhysicalChange};
 
@@ -209,7 +210,10 @@ fn one_run_alone_is_refused() {
     assert!(error.to_string().contains("nowhere.csv"), "{error}");
     let found = runs(vec![Ok(&one), unread(), Ok(&one)]).expect("an answer");
     assert_eq!((found.runs.len(), found.unread.len()), (2, 1));
-    assert_eq!(found.json()["unread"][0]["file"], "nowhere.csv");
+    assert_eq!(
+        found.json(&LibrarySpelling)["unread"][0]["file"],
+        "nowhere.csv"
+    );
 }
 
 const TOOL: &str = "\n[[part]]\nname = \"tool\"\non = \"link6\"\nmass = 2.8\ncentre = [0.03, -0.02, 0.08]\n\
@@ -380,7 +384,7 @@ fn what_changed_and_stayed_is_told_with_its_run() {
     };
     assert_eq!(*drive, model.drives()[0]);
     is_near(dry, 5.0, 0.2);
-    let page = modelmill::report::runs_page(&found);
+    let page = modelmill::report::runs_page(&found, &LibrarySpelling);
     assert!(
         page.contains("From run 8 on") && page.contains("friction of"),
         "{}",

@@ -603,7 +603,10 @@ fn cables_are_more_than_freedoms() {
     let drives: Vec<&str> = found.drives.iter().map(|one| &*one.drive).collect();
     assert_eq!(drives, model.drives());
     assert!(
-        found.notes[0].says.contains("more drives than"),
+        found.notes[0]
+            .says
+            .in_library_words()
+            .contains("more drives than"),
         "{:?}",
         found.notes
     );

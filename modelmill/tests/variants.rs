@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
+use modelmill::print::LibrarySpelling;
 use modelmill::recording::{RecordingOptions, PreparedRecording};
 use modelmill::variants::{LimitCrossing, DriveVariants, VariantComparison};
 use modelmill::{Model, NoteSeverity, along};
@@ -280,7 +281,7 @@ fn figures_are_those_of_evaluated_forces() {
         let of_columns: f64 = terms.map(|term| (term.share - term.by_value).abs()).sum();
         assert!(of_columns > 1e-3, "{of_columns}");
     }
-    let json = found.json();
+    let json = found.json(&LibrarySpelling);
     let first = &json["drives"][0];
     assert_eq!(
         first["after"]["peak"].as_f64(),
@@ -416,7 +417,7 @@ fn effects_by_load_need_no_recorded_forces() {
         found
             .notes
             .iter()
-            .any(|note| note.says.contains("load_friction"))
+            .any(|note| note.says.in_library_words().contains("load_friction"))
     );
     assert!(found.errors.iter().all(Option::is_none));
 }
@@ -469,9 +470,10 @@ fn what_has_no_counterpart_is_said() {
     ]);
     let found = along(&before, &one, &recording("names", &[]));
     assert_eq!(found.drives.len(), 1);
-    let warned: Vec<&str> = (found.notes.iter())
-        .filter(|note| note.severity == NoteSeverity::Warning && note.says.starts_with("Left out"))
-        .map(|note| note.says.as_str())
+    let warned: Vec<String> = (found.notes.iter())
+        .filter(|note| note.severity == NoteSeverity::Warning)
+        .map(|note| note.says.in_library_words())
+        .filter(|says| says.starts_with("Left out"))
         .collect();
     assert!(
         warned.len() == 2 && warned[0].contains("boom") && warned[1].contains("elbow"),
@@ -496,10 +498,10 @@ fn what_nothing_drives_is_left_out() {
     let found = along(&loose, &loose.clone(), &recording("loose", &[]));
     assert_eq!(found.drives.len(), 1);
     assert!(
-        found
-            .notes
-            .iter()
-            .any(|note| note.says.starts_with("Nothing drives on_q2")),
+        found.notes.iter().any(|note| note
+            .says
+            .in_library_words()
+            .starts_with("Nothing drives on_q2")),
         "{:?}",
         found.notes
     );

@@ -7,13 +7,13 @@ use pyo3::sync::PyOnceLock;
 use pyo3::types::PyType;
 use serde_json::{Value, json};
 
-use crate::spelling::format_advice;
+use crate::spelling::PythonSpelling;
 
 /// An exception `modelmill.ModelmillError` that says `says`; `diagnostics` is a list of objects.
 pub(crate) fn modelmill_error(py: Python<'_>, says: &str, diagnostics: &Value) -> PyErr {
     static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
     let class = CLASS.import(py, "modelmill._errors", "ModelmillError");
-    let made = class.and_then(|class| class.call1((format_advice(says), diagnostics.to_string())));
+    let made = class.and_then(|class| class.call1((says, diagnostics.to_string())));
     match made {
         Ok(error) => PyErr::from_value(error),
         Err(error) => error,
@@ -22,7 +22,7 @@ pub(crate) fn modelmill_error(py: Python<'_>, says: &str, diagnostics: &Value) -
 
 /// An exception that says what is wrong with what was given.
 pub(crate) fn input_error(py: Python<'_>, says: &str) -> PyErr {
-    let diagnostics = json!([{ "severity": "error", "says": format_advice(says) }]);
+    let diagnostics = json!([{ "severity": "error", "says": says }]);
     modelmill_error(py, says, &diagnostics)
 }
 
@@ -30,10 +30,11 @@ pub(crate) fn input_error(py: Python<'_>, says: &str) -> PyErr {
 pub(crate) fn library_error(py: Python<'_>, error: &Error) -> PyErr {
     match error {
         Error::Model(faults) => {
-            let told = print::faults(faults);
-            modelmill_error(py, faults.render(false).trim_end(), &told["diagnostics"])
+            let told = print::faults(faults, &PythonSpelling);
+            let says = faults.render_spelled(false, &PythonSpelling);
+            modelmill_error(py, says.trim_end(), &told["diagnostics"])
         }
         Error::Cancelled => PyKeyboardInterrupt::new_err(error.to_string()),
-        other => input_error(py, &other.to_string()),
+        other => input_error(py, &other.spell(&PythonSpelling)),
     }
 }

@@ -9,6 +9,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
 use crate::errors::input_error;
+use crate::spelling::PythonSpelling;
 
 /// A plan with its model derived.
 #[pyclass(frozen)]
@@ -17,7 +18,7 @@ pub(crate) struct FleetGround {
 }
 
 fn fleet_error(py: Python<'_>, fault: &Fault) -> PyErr {
-    input_error(py, &fault.to_string())
+    input_error(py, &fault.message().spell(&PythonSpelling))
 }
 
 /// The plan that reference recordings make, as JSON.

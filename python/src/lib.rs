@@ -24,4 +24,6 @@ mod _core {
     use crate::results::{PythonExcitation, PythonResult, PythonRecording};
     #[pymodule_export]
     use crate::rigs::{PythonSimulation, reduce, simulate};
+    #[pymodule_export]
+    use crate::spelling::advised_names;
 }

@@ -23,8 +23,8 @@ use crate::arrays::state_matrix;
 use crate::errors::input_error;
 use crate::options::{self, EstimationOptions, ExcitationOptions, ReadingOptions, OptionResult};
 use crate::results::{PythonExcitation, PythonResult, PythonRecording, RemarkList, PythonSource, remarks};
-use crate::spelling::{self, format_advice};
-use crate::work::{JobListener, run_blocking, run_interruptible};
+use crate::spelling::PythonSpelling;
+use crate::run_interruptible::{JobListener, run_blocking, run_interruptible};
 
 /// States whose functions are computed in this thread, without looking for interrupts.
 const FEW: usize = 256;
@@ -249,7 +249,7 @@ impl CoreModel {
     #[getter]
     fn notes(&self) -> RemarkList {
         let of_file = self.model.loaded.warnings.iter();
-        let of_file = of_file.map(|one| ("warning", format_advice(&one.message).into_owned()));
+        let of_file = of_file.map(|one| ("warning", one.message.clone()));
         of_file.chain(remarks(&self.model.notes)).collect()
     }
 
@@ -283,7 +283,7 @@ impl CoreModel {
     fn check(&self, py: Python<'_>) -> PyResult<PythonResult> {
         let checked = self.run_interruptible(py, None, || self.model.check())?;
         Ok(PythonResult::new(
-            &checked.json(),
+            &checked.json(&PythonSpelling),
             &checked.text(Style::PLAIN),
             RemarkList::new(),
         ))
@@ -396,7 +396,8 @@ impl CoreModel {
         self.run_interruptible(py, progress.as_ref(), || {
             let found = self.model.compare(&borrow_recordings(&data), &values)?;
             let text = found.text(name, Style::PLAIN);
-            Ok(PythonResult::new(&found.json(name)?, &text, remarks(&found.notes)))
+            let json = found.json(name, &PythonSpelling)?;
+            Ok(PythonResult::new(&json, &text, remarks(&found.notes)))
         })
     }
 
@@ -425,8 +426,9 @@ impl CoreModel {
             let found = self
                 .model
                 .identify_with(&data, &instruments, &check, &estimation)?;
-            let text = found.text(&self.model, Style::PLAIN);
-            let told = PythonResult::new(&found.json(&self.model)?, &text, remarks(&found.notes));
+            let text = found.text(&self.model, Style::PLAIN, &PythonSpelling);
+            let json = found.json(&self.model, &PythonSpelling)?;
+            let told = PythonResult::new(&json, &text, remarks(&found.notes));
             Ok(told.with_values(found.values()))
         })
     }
@@ -448,7 +450,7 @@ impl CoreModel {
             let found = self
                 .model
                 .diagnose(&borrow_recordings(&data), &borrow_recordings(&check), &question)?;
-            let spelling = spelling::NotebookAdvice;
+            let spelling = PythonSpelling;
             let text = found.text(Style::PLAIN, &spelling).join("\n");
             let better = match found.entries.as_slice() {
                 [] => None,
@@ -481,9 +483,10 @@ impl CoreModel {
         }
         self.run_interruptible(py, progress.as_ref(), || {
             let found = self.model.runs(all, &what)?;
-            let text = found.text(Style::PLAIN);
-            let told = PythonResult::new(&found.json(), &text, remarks(&found.notes));
-            Ok(told.with_page(runs_page(&found)))
+            let text = found.text(Style::PLAIN, &PythonSpelling);
+            let json = found.json(&PythonSpelling);
+            let told = PythonResult::new(&json, &text, remarks(&found.notes));
+            Ok(told.with_page(runs_page(&found, &PythonSpelling)))
         })
     }
 
@@ -561,7 +564,7 @@ impl CoreModel {
             let found = self
                 .model
                 .interpret(&self.fit(fit, name)?, name, &unknown)?;
-            let text = found.text(Style::PLAIN);
+            let text = found.text(Style::PLAIN, &PythonSpelling);
             Ok(PythonResult::new(&found.json(), &text, remarks(&found.notes)))
         })
     }
@@ -618,7 +621,7 @@ impl CoreModel {
             if !runs[0].is_empty() {
                 let [first, second] = [&runs[0], &runs[1]].map(|runs| borrow_recordings(runs));
                 let variants = Variants::along(models, [&first, &second])?;
-                object["along"] = variants.json();
+                object["along"] = variants.json(&PythonSpelling);
                 text = format!("{text}\n\n{}", variants.text(Style::PLAIN));
                 notes = remarks(&variants.notes);
             }

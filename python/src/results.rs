@@ -10,7 +10,7 @@ use pyo3::prelude::*;
 use serde_json::Value;
 
 use crate::model::CoreModel;
-use crate::spelling::{format_advice, format_advice_in_json};
+use crate::spelling::PythonSpelling;
 
 /// Remarks: severity and text.
 pub(crate) type RemarkList = Vec<(&'static str, String)>;
@@ -21,7 +21,7 @@ pub(crate) fn remarks<'a>(notes: impl IntoIterator<Item = &'a Note>) -> RemarkLi
             Severity::Warning => "warning",
             Severity::Info => "info",
         };
-        (severity, format_advice(&note.says).into_owned())
+        (severity, note.says.spell(&PythonSpelling))
     };
     notes.into_iter().map(one).collect()
 }
@@ -98,8 +98,8 @@ pub(crate) struct PythonResult {
 impl PythonResult {
     pub(crate) fn new(json: &Value, text: &str, notes: RemarkList) -> Self {
         Self {
-            json: format_advice_in_json(json).to_string(),
-            text: format_advice(text).into_owned(),
+            json: json.to_string(),
+            text: text.to_owned(),
             notes,
             ..Self::default()
         }
@@ -164,12 +164,13 @@ pub(crate) struct PythonExcitation {
 impl PythonExcitation {
     #[getter]
     fn json(&self) -> String {
-        format_advice_in_json(&self.found.json()).to_string()
+        self.found.json().to_string()
     }
 
     #[getter]
     fn text(&self) -> String {
-        format_advice(&self.found.text(modelmill::text::style::Style::PLAIN)).into_owned()
+        let plain = modelmill::text::style::Style::PLAIN;
+        self.found.text(plain, &PythonSpelling)
     }
 
     #[getter]

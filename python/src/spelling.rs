@@ -1,19 +1,29 @@
 //! How a notebook asks for what the library advises.
 
-use std::borrow::Cow;
 use std::fmt::Write as _;
 
 use modelmill::Model;
 use modelmill::diagnose::{Named, Separation};
 use modelmill::edit::NewEffect;
-use modelmill::print::{self, Advised, Spelling};
-use serde_json::Value;
+use modelmill::print::{CommandName, OptionName, OptionSetting, RemedySpelling, StepSpelling};
+use pyo3::prelude::*;
 
-/// Calls of methods of a model `m`.
-pub(crate) struct NotebookAdvice;
+/// Keywords, and calls of methods of a model `m`.
+pub(crate) struct PythonSpelling;
 
-impl Spelling for NotebookAdvice {
-    fn add(&self, _: &Model, effect: &NewEffect) -> String {
+impl RemedySpelling for PythonSpelling {
+    fn spell_options(&self, settings: &[OptionSetting]) -> String {
+        let all: Vec<String> = settings.iter().map(argument).collect();
+        all.join(" ")
+    }
+
+    fn spell_command(&self, command: CommandName) -> String {
+        format!("`{}()`", method_of_command(command))
+    }
+}
+
+impl StepSpelling for PythonSpelling {
+    fn spell_effect(&self, _: &Model, effect: &NewEffect) -> String {
         let mut call = format!("m.with_effect({:?}, {}", effect.kind, places(&effect.at));
         let parameters = effect.parameters.iter();
         let values = parameters.filter_map(|p| Some((p.symbol.as_str(), p.nominal?)));
@@ -24,11 +34,11 @@ impl Spelling for NotebookAdvice {
         call + ")"
     }
 
-    fn identify(&self, _: &Model) -> String {
+    fn spell_identification(&self, _: &Model) -> String {
         "m.identify(data)".to_owned()
     }
 
-    fn separate(&self, _: &Model, separation: &Separation) -> Option<String> {
+    fn spell_separation(&self, _: &Model, separation: &Separation) -> Option<String> {
         let mut call = format!("m.excite(separate={:?}", effect_argument(&separation.effect));
         let rivals = separation.rivals.iter().map(|effect| {
             let effect = effect.clone();
@@ -48,14 +58,6 @@ impl Spelling for NotebookAdvice {
         }
         Some(call + ")")
     }
-
-    fn held(&self) -> String {
-        "held=True".to_owned()
-    }
-
-    fn text<'a>(&self, text: &'a str) -> Cow<'a, str> {
-        format_advice(text)
-    }
 }
 
 fn places(at: &[String]) -> String {
@@ -74,35 +76,69 @@ fn effect_argument(effect: &Named) -> String {
     text
 }
 
-/// A text of the library with its options as keywords and its verbs as methods.
-pub(crate) fn format_advice(text: &str) -> Cow<'_, str> {
-    print::spelled(text, |advised| match advised {
-        Advised::Option("columns", Some(value)) => match value.split_once('=') {
-            Some((ours, theirs)) => format!("`columns={{{ours:?}: {theirs:?}}}`"),
-            None => format!("`columns={{{value:?}: ...}}`"),
-        },
-        Advised::Option("out", Some(path)) => format!("`save({path:?})`"),
-        Advised::Option(name, Some(value)) if value.parse::<f64>().is_ok() => {
-            format!("`{name}={value}`")
-        }
-        Advised::Option(name, Some(value)) => format!("`{name}={value:?}`"),
-        Advised::Option(name, None) => format!("`{name}`"),
-        Advised::Verb("add") => "`with_effect()`".to_owned(),
-        Advised::Verb(name) => format!("`{name}()`"),
-    })
+/// What an option of the library is in NotebookAdvice.
+enum PythonName {
+    /// A keyword of a function or method.
+    Keyword(&'static str),
+    /// A method of its own, which takes the value.
+    Method(&'static str),
 }
 
-/// The same in all texts of an object.
-pub(crate) fn format_advice_in_json(value: &Value) -> Value {
-    match value {
-        Value::String(text) => Value::String(format_advice(text).into_owned()),
-        Value::Array(all) => all.iter().map(format_advice_in_json).collect(),
-        Value::Object(all) => {
-            let all = all
-                .iter()
-                .map(|(key, value)| (key.clone(), format_advice_in_json(value)));
-            Value::Object(all.collect())
-        }
-        other => other.clone(),
+fn spelled_option(option: OptionName) -> PythonName {
+    match option {
+        OptionName::From => PythonName::Keyword("apart_from"),
+        OptionName::Out => PythonName::Method("save"),
+        OptionName::Picture => PythonName::Method("picture"),
+        other => PythonName::Keyword(other.name()),
     }
+}
+
+fn method_of_command(command: CommandName) -> &'static str {
+    match command {
+        CommandName::Evaluate => "inverse_dynamics",
+        other => other.name(),
+    }
+}
+
+/// An option as an argument, or as a call.
+fn argument(setting: &OptionSetting) -> String {
+    let value = setting.value.as_deref();
+    let keyword = match spelled_option(setting.name) {
+        PythonName::Keyword(keyword) => keyword,
+        PythonName::Method(method) => {
+            let value = value.map(|value| format!("{value:?}"));
+            return format!("`{method}({})`", value.unwrap_or_default());
+        }
+    };
+    let Some(value) = value else {
+        return format!("`{keyword}`");
+    };
+    let value = match setting.name {
+        OptionName::Columns => match value.split_once('=') {
+            Some((ours, theirs)) => format!("{{{ours:?}: {theirs:?}}}"),
+            None => format!("{{{value:?}: ...}}"),
+        },
+        OptionName::Between => format!("({value})"),
+        OptionName::Limits | OptionName::Loads | OptionName::Unknown => format!("[{value:?}]"),
+        _ if value.parse::<f64>().is_ok() => value.to_owned(),
+        _ => format!("{value:?}"),
+    };
+    format!("`{keyword}={value}`")
+}
+
+/// Keywords and methods that messages may advise, for a test that they exist.
+#[pyfunction]
+pub(crate) fn advised_names() -> (Vec<&'static str>, Vec<&'static str>) {
+    let mut keywords = Vec::new();
+    let mut methods: Vec<&str> = CommandName::ALL
+        .iter()
+        .map(|c| method_of_command(*c))
+        .collect();
+    for option in OptionName::ALL {
+        match spelled_option(*option) {
+            PythonName::Keyword(keyword) => keywords.push(keyword),
+            PythonName::Method(method) => methods.push(method),
+        }
+    }
+    (keywords, methods)
 }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import os
 import signal
 import threading
@@ -13,7 +14,8 @@ from pathlib import Path
 import pytest
 
 import modelmill
-from modelmill import ModelmillError
+from modelmill import ModelmillError, _core
+from modelmill._model import ReadingOptions
 
 from .conftest import MODELS, RECORDINGS, ROOT
 
@@ -160,6 +162,28 @@ def test_warnings_are_warnings_of_the_package() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         arm.inverse_dynamics([0, 0], [0, 0], [0, 0], parameters=arm.p_min.values)
+
+
+def test_what_messages_advise_exists() -> None:
+    keywords, methods = _core.advised_names()
+    owners = [modelmill, *(one for one in vars(modelmill).values() if inspect.isclass(one))]
+    members = [(name, member) for owner in owners for name, member in vars(owner).items()]
+    functions = {name: member for name, member in members if inspect.isfunction(member)}
+    known = set(ReadingOptions.__annotations__)
+    for function in functions.values():
+        known.update(inspect.signature(function).parameters)
+    assert keywords and not set(keywords) - known
+    assert methods and not set(methods) - set(functions)
+
+
+def test_names_of_users_stay_as_they_are(tmp_path: Path) -> None:
+    path = tmp_path / "verb `add`.toml"
+    path.write_text((MODELS / "two_link.toml").read_text())
+    arm = modelmill.load(path)
+    assert arm.name == "verb `add`" and arm.check().to_dict()["model"] == "verb `add`"
+    with pytest.raises(ModelmillError, match="columns={") as raised:
+        arm.compare({"t": [0.0, 1.0], "q1": [0.0, 1.0]})
+    assert "option `" not in str(raised.value)
 
 
 def test_a_typed_program_passes_the_checker(monkeypatch: pytest.MonkeyPatch) -> None:

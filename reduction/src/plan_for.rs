@@ -6,6 +6,8 @@
 
 use std::fmt::Write as _;
 
+use modelmill_boundary::message;
+use modelmill_boundary::text::{Message, OptionName, Remedy};
 use modelmill_rig::{BodyAnchor, RigPoint, Rig};
 use nalgebra::Vector3;
 
@@ -14,16 +16,17 @@ use crate::plan::{ReductionPlan, plan};
 /// Makes a plan in which every body is a part of its own.
 ///
 /// Fails when a body cannot be reached by revolute joints; such rigs need a plan by hand.
-pub fn default_plan(rig: &Rig) -> Result<ReductionPlan, String> {
+pub fn default_plan(rig: &Rig) -> Result<ReductionPlan, Message> {
     let mut rig = rig.clone();
     let hinges: Vec<(usize, [BodyAnchor; 2])> = (0..rig.joints.len())
         .filter_map(|j| rig.hinge(j).map(|anchors| (j, anchors)))
         .collect();
     if let Some(other) = (0..rig.joints.len()).find(|j| rig.hinge(*j).is_none()) {
-        return Err(format!(
-            "`{}` is no revolute joint: reducing this rig takes a plan (option `plan`), in which parts and lumped masses stand \
+        return Err(message!(
+            "`{}` is no revolute joint: reducing this rig takes a plan ({}), in which parts and lumped masses stand \
              for what other joints hold",
-            rig.joints[other].name
+            rig.joints[other].name,
+            Remedy::option(OptionName::Plan)
         ));
     }
     let mut text = format!("schema = 1\nname = \"{}_reduced\"\n", rig.name);
@@ -71,7 +74,7 @@ pub fn default_plan(rig: &Rig) -> Result<ReductionPlan, String> {
         );
     }
     if let Some(body) = carried.iter().position(|reached| !reached) {
-        return Err(format!(
+        return Err(message!(
             "no revolute joint reaches `{}` from the base",
             rig.bodies[body].name
         ));

@@ -76,7 +76,7 @@ pub fn load(path_name: &str, text: &str, files: &dyn FileSource) -> Result<Loade
             let folder = path.parent().unwrap_or(Path::new(""));
             let other = normalise_path(&folder.join(extends.get_ref()));
             if file + 1 == LONGEST_CHAIN {
-                let help = "check whether two files extend each other".to_owned();
+                let help = "check whether two files extend each other".into();
                 let found = plain_error(span, "this chain of variants is too long");
                 return Err(failure(
                     sources,
@@ -91,7 +91,7 @@ pub fn load(path_name: &str, text: &str, files: &dyn FileSource) -> Result<Loade
                 Err(error) => {
                     let says = format!("cannot read `{}`: {}", other.display(), error.fault);
                     let found = plain_error(span, says);
-                    let help = "the path is relative to the folder of this file".to_owned();
+                    let help = "the path is relative to the folder of this file".into();
                     return Err(failure(
                         sources,
                         Diagnostic {
@@ -137,7 +137,7 @@ pub fn parse<T: serde::de::DeserializeOwned>(
             } else {
                 "see https://toml.io for the syntax of TOML, and model-spec/rigs for examples"
             }
-            .to_owned(),
+            .into(),
         );
         Box::new(found)
     })

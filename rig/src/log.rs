@@ -1,6 +1,7 @@
 //! Findings about a rig file, and the readers of its plain values: each takes an entry with its place and gives a
 //! sound value, or a stand-in and a finding.
 
+use modelmill_boundary::text::Message;
 use modelmill_spec::{Diagnostic, SourceSpan};
 use nalgebra::Vector3;
 
@@ -21,10 +22,13 @@ pub struct RigLog(pub Vec<Diagnostic>);
 impl RigLog {
     /// Takes an error at a place: what is wrong, what was expected there, what to do; the last two may be empty.
     pub fn error(&mut self, span: SourceSpan, message: String, label: &str, help: &str) {
-        let texts = |text: &str| Some(text.to_owned()).filter(|text| !text.is_empty());
+        let help = Message::from(help);
         self.0.push(Diagnostic {
             label: label.to_owned(),
-            help: texts(help).into_iter().collect(),
+            help: Some(help)
+                .filter(|help| !help.is_empty())
+                .into_iter()
+                .collect(),
             ..plain_error(Some(span), message)
         });
     }

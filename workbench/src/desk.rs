@@ -3,8 +3,10 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use modelmill::Host;
-use modelmill::print::{AdviceFormatter, PlainAdvice};
+use modelmill::diagnose::SeparationProposal;
+use modelmill::edit::NewEffect;
+use modelmill::print::{CommandName, LibrarySpelling, OptionSetting, RemedySpelling, StepSpelling};
+use modelmill::{Host, Model};
 use serde::Deserialize;
 use serde_json::json;
 
@@ -76,7 +78,7 @@ impl RequestHandler {
             ..Options::default()
         };
         let shelf = Arc::new(self.shelf.clone());
-        let opened = WorkbenchSession::open(&Host::new(), options, Arc::new(BrowserAdvice), shelf);
+        let opened = WorkbenchSession::open(&Host::new(), options, Arc::new(PageSpelling), shelf);
         let sitting = Arc::new(opened.map_err(|error| error.to_string())?);
         let told = sitting.view();
         self.sitting = Some(sitting);
@@ -84,32 +86,41 @@ impl RequestHandler {
     }
 }
 
-/// Plain words, where there is no command line.
-struct BrowserAdvice;
+/// PlainAdvice for a page without a command line: panes of the workbench where one does it, else the library's.
+struct PageSpelling;
 
-impl AdviceFormatter for BrowserAdvice {
-    fn add_effect(&self, model: &modelmill::Model, effect: &modelmill::edit::NewEffect) -> String {
-        PlainAdvice.add_effect(model, effect)
+impl RemedySpelling for PageSpelling {
+    fn spell_options(&self, settings: &[OptionSetting]) -> String {
+        LibrarySpelling.spell_options(settings)
     }
 
-    fn identify(&self, model: &modelmill::Model) -> String {
-        PlainAdvice.identify(model)
-    }
-
-    fn separate_effects(
-        &self,
-        model: &modelmill::Model,
-        separation: &modelmill::diagnose::SeparationProposal,
-    ) -> Option<String> {
-        PlainAdvice.separate_effects(model, separation)
-    }
-
-    fn fix_parameters(&self) -> String {
-        PlainAdvice.fix_parameters()
+    fn spell_command(&self, command: CommandName) -> String {
+        match command {
+            CommandName::Check => "pane `Mechanism`".to_owned(),
+            CommandName::Diagnose => "pane `Diagnosis`".to_owned(),
+            CommandName::Excite => "pane `ExcitationSettings`".to_owned(),
+            CommandName::Adopt | CommandName::Evaluate | CommandName::Identify => {
+                LibrarySpelling.spell_command(command)
+            }
+        }
     }
 }
 
-impl WorkbenchCommands for BrowserAdvice {
+impl StepSpelling for PageSpelling {
+    fn spell_effect(&self, model: &Model, effect: &NewEffect) -> String {
+        LibrarySpelling.spell_effect(model, effect)
+    }
+
+    fn spell_identification(&self, model: &Model) -> String {
+        LibrarySpelling.spell_identification(model)
+    }
+
+    fn spell_separation(&self, model: &Model, separation: &SeparationProposal) -> Option<String> {
+        LibrarySpelling.spell_separation(model, separation)
+    }
+}
+
+impl WorkbenchCommands for PageSpelling {
     fn step_command(&self, _: WorkbenchStep) -> Option<String> {
         None
     }

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use modelmill::excite::ExcitationRequest;
-use modelmill::print::AdviceFormatter;
+use modelmill::print::StepSpelling;
 use modelmill::recording::RecordingOptions;
 use serde::Deserialize;
 
@@ -28,7 +28,7 @@ pub struct Options {
 }
 
 /// What a reader is told that does the same without the workbench.
-pub trait WorkbenchCommands: AdviceFormatter + Send + Sync {
+pub trait WorkbenchCommands: StepSpelling + Send + Sync {
     /// Does what a pane of the workbench does; `None` where nothing else does.
     fn step_command(&self, step: WorkbenchStep) -> Option<String>;
 

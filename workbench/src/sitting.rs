@@ -173,9 +173,8 @@ impl WorkbenchSession {
         let name = self.name();
         let now = &state.derived;
         let (model, saved) = (now.found.as_ref().as_ref().ok(), state.saved.as_ref());
-        let mut told = told::derivation_view(&now.found, &name);
+        let mut told = told::derivation_view(&now.found, &name, &*self.commands);
         told["model"] = model.map_or(Value::Null, |model| told::equations(model, saved));
-        let mut told = told::format_advice_in_json(told, &*self.commands);
         told["version"] = json!(self.version.load(Ordering::Relaxed));
         told["revision"] = json!(state.draft.revision());
         told["derived"] = json!(now.revision);
@@ -395,15 +394,16 @@ impl WorkbenchSession {
             let (read, is_read) = self.readings.recordings_for(&model, is_afresh, read)?;
             let [fit, check] = read.each_ref().map(|all| all.iter().collect::<Vec<_>>());
             let identified = model.identify(&fit, &check, &EstimatorOptions::default())?;
-            let mut told = told::errors(&identified, &read);
+            let mut told = told::errors(&identified, &read, &*self.commands);
             told["afresh"] = json!(is_read);
             if with_places {
-                told["compared"] = model.compare(&fit, &model.nominal)?.json("nominal")?;
+                told["compared"] = model
+                    .compare(&fit, &model.nominal)?
+                    .json("nominal", &*self.commands)?;
             }
             Ok(told)
         })()
         .map_err(|error| self.error_text(&error))?;
-        told = told::format_advice_in_json(told, &*self.commands);
         told["revision"] = json!(revision);
         let mut state = self.state();
         if state.draft.revision() == revision {
@@ -491,14 +491,14 @@ impl WorkbenchSession {
         let told = self.variant.comparison_view(
             &other,
             &model,
+            &*self.commands,
             || self.recordings(&other),
             || {
                 let read = || self.recordings(&model);
                 Ok(self.readings.recordings_for(&model, false, read)?.0)
             },
         );
-        let told = told.map_err(|error| self.error_text(&error))?;
-        let mut told = told::format_advice_in_json(told, &*self.commands);
+        let mut told = told.map_err(|error| self.error_text(&error))?;
         told["revision"] = json!(revision);
         told["same"] = json!(other.text() == model.text());
         told["command"] = json!(beside.and_then(|name| self.commands.variant_command(&self.path_of(name))));
@@ -598,7 +598,7 @@ impl WorkbenchSession {
         diagnosis.running = None;
         match found {
             Ok((told, entries)) => {
-                diagnosis.answer = Some(Ok(told::format_advice_in_json(told, &*self.commands)));
+                diagnosis.answer = Some(Ok(told));
                 diagnosis.entries = entries;
             }
             Err(Error::Cancelled) => diagnosis.was_cancelled = true,
@@ -671,11 +671,7 @@ impl WorkbenchSession {
 
     /// What an error says, in the words of the reader.
     fn error_text(&self, error: &Error) -> String {
-        let says = match error {
-            Error::Model(faults) => faults.render(false),
-            error => error.to_string(),
-        };
-        self.commands.format_text(&says).into_owned()
+        error.spell(&*self.commands)
     }
 }
 

@@ -3,7 +3,7 @@
 use modelmill::diagnose::{DiagnosisFindings, words};
 use modelmill::identify::Identification;
 use modelmill::model::ModelCheck;
-use modelmill::print::{self, AdviceFormatter, edit};
+use modelmill::print::{self, RemedySpelling, edit};
 use modelmill::recording::PreparedRecording;
 use modelmill::{EffectKind, Error, Model, RecordingNote, report};
 use serde_json::{Value, json};
@@ -11,15 +11,19 @@ use serde_json::{Value, json};
 use crate::options::WorkbenchCommands;
 
 /// A text that was derived, or why it was not, with what is to be said at its lines.
-pub(crate) fn derivation_view(found: &Result<Model, Error>, path: &str) -> Value {
+pub(crate) fn derivation_view(
+    found: &Result<Model, Error>,
+    path: &str,
+    spelling: &dyn RemedySpelling,
+) -> Value {
     match found {
         Ok(model) => json!({
             "valid": true,
-            "diagnostics": print::warnings(&model.loaded),
-            "notes": model.notes.iter().chain(&model.nominal_values().notes).map(|note| json!(note)).collect::<Vec<_>>(),
+            "diagnostics": print::warnings(&model.loaded, spelling),
+            "notes": model.notes.iter().chain(&model.nominal_values().notes).map(|note| note.json(spelling)).collect::<Vec<_>>(),
         }),
-        Err(Error::Model(faults)) => print::faults(faults),
-        Err(error) => print::refusal(&error.to_string(), path),
+        Err(Error::Model(faults)) => print::faults(faults, spelling),
+        Err(error) => print::refusal(&error.spell(spelling), path),
     }
 }
 
@@ -83,7 +87,11 @@ pub(crate) fn equations(model: &Model, saved: Option<&Model>) -> Value {
 }
 
 /// Errors of a model along recordings, with its own values and once it is identified, and remarks on both.
-pub(crate) fn errors(found: &Identification, recordings: &[Vec<PreparedRecording>; 2]) -> Value {
+pub(crate) fn errors(
+    found: &Identification,
+    recordings: &[Vec<PreparedRecording>; 2],
+    spelling: &dyn RemedySpelling,
+) -> Value {
     let remarks = recordings.iter().flatten().flat_map(PreparedRecording::notes);
     let mut notes: Vec<&RecordingNote> = Vec::new();
     for note in remarks.chain(&found.notes) {
@@ -95,7 +103,7 @@ pub(crate) fn errors(found: &Identification, recordings: &[Vec<PreparedRecording
         "nominal": { "fit": found.nominal_fit, "check": found.nominal_check },
         "identified": { "fit": found.fit.fit, "check": found.fit.check },
         "samples": found.fit.samples,
-        "notes": notes,
+        "notes": notes.iter().map(|note| note.json(spelling)).collect::<Vec<_>>(),
     })
 }
 
@@ -115,7 +123,7 @@ pub(crate) fn findings(findings: &DiagnosisFindings, commands: &dyn WorkbenchCom
         .iter()
         .map(|entry| {
             let mut told = edit::effect_json(entry);
-            told["command"] = json!(commands.add_effect(model, entry));
+            told["command"] = json!(commands.spell_effect(model, entry));
             told
         })
         .collect();
@@ -126,22 +134,4 @@ pub(crate) fn findings(findings: &DiagnosisFindings, commands: &dyn WorkbenchCom
 pub(crate) fn completion_data(kinds: &[EffectKind]) -> Value {
     let schema: Value = serde_json::from_str(modelmill::SCHEMA).unwrap_or_default();
     json!({ "schema": schema, "kinds": print::effects::json(kinds)["kinds"] })
-}
-
-/// A JSON value with all its texts spelled as the reader asks for what they advise.
-pub(crate) fn format_advice_in_json(value: Value, spelling: &dyn AdviceFormatter) -> Value {
-    match value {
-        Value::String(text) => Value::String(spelling.format_text(&text).into_owned()),
-        Value::Array(values) => {
-            let values = values.into_iter();
-            values.map(|value| format_advice_in_json(value, spelling)).collect()
-        }
-        Value::Object(members) => {
-            let members = members.into_iter();
-            members
-                .map(|(name, value)| (name, format_advice_in_json(value, spelling)))
-                .collect()
-        }
-        other => other,
-    }
 }

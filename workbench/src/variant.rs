@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use modelmill::model::ModelChanges;
+use modelmill::print::RemedySpelling;
 use modelmill::recording::PreparedRecording;
 use modelmill::variants::VariantComparison;
 use modelmill::{Error, Host, Model, Outcome};
@@ -60,6 +61,7 @@ impl VariantCache {
         &self,
         before: &Model,
         after: &Model,
+        spelling: &dyn RemedySpelling,
         read: impl FnOnce() -> Outcome<SessionRecordings>,
         after_read: impl FnOnce() -> Outcome<Arc<SessionRecordings>>,
     ) -> Outcome<Value> {
@@ -73,12 +75,12 @@ impl VariantCache {
             if runs[0].is_empty() {
                 return Ok(Value::Null);
             }
-            Ok(VariantComparison::along_recordings([before, after], [&runs[0], &runs[1]])?.json())
+            Ok(VariantComparison::along_recordings([before, after], [&runs[0], &runs[1]])?.json(spelling))
         })();
         match along {
             Ok(along) => told["along"] = along,
             Err(Error::Cancelled) => return Err(Error::Cancelled),
-            Err(error) => told["refused"] = json!(error.to_string()),
+            Err(error) => told["refused"] = json!(error.spell(spelling)),
         }
         Ok(told)
     }

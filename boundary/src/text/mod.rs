@@ -2,15 +2,19 @@
 //!
 //! What comes from a file may hold anything: sequences that move a terminal's cursor, marks that turn the direction of
 //! writing, the end of a comment. Each output has one function that leaves ordinary text as it is and makes the rest
-//! harmless.
+//! harmless. [`Message`] is text of the program's own, with typed remedies in it.
 
-mod advice;
 mod escape;
+mod message;
+mod remedy;
 
 use std::borrow::Cow;
 
-pub use advice::{AdviceItem, format_advice};
 pub use escape::{code_in_markdown, comment, csv_field, csv_name, html, json, latex, markdown};
+pub use message::Message;
+#[doc(hidden)]
+pub use message::{MessageArgument, MessageSink, MessageSlot};
+pub use remedy::{CommandName, LibrarySpelling, OptionName, OptionSetting, Remedy, RemedySpelling};
 
 /// Text on one line: line ends and tabs become blanks, and what steers a terminal or the direction of writing becomes
 /// the replacement character.

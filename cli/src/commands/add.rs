@@ -8,6 +8,7 @@ use serde_json::json;
 
 use crate::args::effects::AddArgs;
 use crate::failure::CommandOutcome;
+use crate::flags::FlagSpelling;
 use crate::output::{self, OutputFile};
 use crate::{commands, terminal};
 
@@ -27,7 +28,9 @@ pub(crate) fn run(host: &Host, args: &AddArgs) -> CommandOutcome {
     let edited = host.edit(&path, old, &effect)?;
     let edited = reload_at_target(host, edited, target.as_ref())?;
     if !edited.loaded.warnings.is_empty() {
-        let warnings = edited.loaded.render(terminal::is_stderr_coloured());
+        let warnings = edited
+            .loaded
+            .render_spelled(terminal::is_stderr_coloured(), &FlagSpelling);
         terminal::print_to_stderr(warnings.trim_end());
     }
     // What `check` would say beyond the file itself: whether the model can be derived.

@@ -4,6 +4,7 @@ use modelmill::{Error, Host, print};
 
 use crate::args::CheckArgs;
 use crate::failure::{CommandFailure, CommandOutcome};
+use crate::flags::FlagSpelling;
 use crate::{commands, terminal};
 
 /// Validates and derives the model, and prints a summary.
@@ -12,8 +13,11 @@ pub(crate) fn run(host: &Host, args: &CheckArgs) -> CommandOutcome {
         Err(CommandFailure::Library(fault)) if args.json && !matches!(fault, Error::Cancelled) => {
             // What is wrong goes to standard output as well, for editors.
             let told = match &fault {
-                Error::Model(faults) => print::faults(faults),
-                fault => print::refusal(&fault.to_string(), &args.model.display().to_string()),
+                Error::Model(faults) => print::faults(faults, &FlagSpelling),
+                fault => print::refusal(
+                    &fault.spell(&FlagSpelling),
+                    &args.model.display().to_string(),
+                ),
             };
             terminal::print_json(&told)?;
             return Err(CommandFailure::Library(fault));
@@ -26,7 +30,7 @@ pub(crate) fn run(host: &Host, args: &CheckArgs) -> CommandOutcome {
         args.drawing.draw(target, &model, None)?;
     }
     if args.json {
-        return terminal::print_json(&checked.json());
+        return terminal::print_json(&checked.json(&FlagSpelling));
     }
     terminal::print(&checked.text(terminal::style()))
 }

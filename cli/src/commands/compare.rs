@@ -4,6 +4,7 @@ use modelmill::Host;
 
 use crate::args::CompareArgs;
 use crate::failure::CommandOutcome;
+use crate::flags::FlagSpelling;
 use crate::{commands, terminal};
 
 /// Prints error figures and the regions where the error lives.
@@ -14,7 +15,7 @@ pub(crate) fn run(host: &Host, args: &CompareArgs) -> CommandOutcome {
     let compared = model.compare(&data.iter().collect::<Vec<_>>(), &values)?;
     let name = args.parameters.name();
     if args.json {
-        return terminal::print_json(&compared.json(&name)?);
+        return terminal::print_json(&compared.json(&name, &FlagSpelling)?);
     }
     terminal::print(&compared.text(&name, terminal::style()))
 }

@@ -10,5 +10,5 @@ use crate::terminal;
 pub(crate) fn run(args: &CompletionsArgs) -> CommandOutcome {
     let mut script = Vec::new();
     clap_complete::generate(args.shell, &mut CommandLine::command(), "modelmill", &mut script);
-    terminal::print_as_is(&String::from_utf8_lossy(&script))
+    terminal::print(&String::from_utf8_lossy(&script))
 }

@@ -6,14 +6,14 @@ use modelmill::diagnose::DiagnosisOptions;
 use crate::args::DiagnoseArgs;
 use crate::commands;
 use crate::failure::CommandOutcome;
-use crate::flags::CommandLineAdvice;
+use crate::flags::CommandLineSpelling;
 use crate::terminal;
 
 /// Prints what is missing, or that nothing is, or that nothing known explains it.
 pub(crate) fn run(host: &Host, args: &DiagnoseArgs) -> CommandOutcome {
-    let flags = CommandLineAdvice::from_args(&args.diagnosis);
+    let flags = CommandLineSpelling::from_args(&args.diagnosis);
     let question = DiagnosisOptions {
-        fixed: args.diagnosis.fixed_parameters(),
+        fixed: args.diagnosis.fixed(),
         ..DiagnosisOptions::default()
     };
     let findings = commands::diagnose(host, &args.diagnosis, question)?;

@@ -9,6 +9,7 @@ use modelmill::{Host, Model, RecordingNote};
 
 use crate::args::DiffArgs;
 use crate::failure::CommandOutcome;
+use crate::flags::FlagSpelling;
 use crate::terminal::progress::ProgressWithoutRemarks;
 use crate::{commands, terminal};
 
@@ -26,7 +27,7 @@ pub(crate) fn run(host: &Host, args: &DiffArgs) -> CommandOutcome {
     if args.json {
         let mut object = changes.json(&before, &after);
         if let Some(variants) = variants {
-            object["along"] = variants.json();
+            object["along"] = variants.json(&FlagSpelling);
         }
         return terminal::print_json(&object);
     }

@@ -30,6 +30,6 @@ pub(crate) fn run(host: &Host, args: &EquationsArgs) -> CommandOutcome {
     }?;
     match target {
         Some(target) => target.write(&written.text),
-        None => terminal::print_as_is(&written.text),
+        None => terminal::print(&written.text),
     }
 }

@@ -57,6 +57,6 @@ pub(crate) fn run(host: &Host, args: &EvaluateArgs) -> CommandOutcome {
             ));
             Ok(())
         }
-        None => terminal::print_as_is(&found.csv()),
+        None => terminal::print(&found.csv()),
     }
 }

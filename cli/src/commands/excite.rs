@@ -9,6 +9,7 @@ use modelmill::text::table::count;
 
 use crate::args::{CriterionArg, ExciteArgs};
 use crate::failure::{CommandFailure, CommandOutcome};
+use crate::flags::FlagSpelling;
 use crate::output::OutputFile;
 use crate::{commands, terminal};
 
@@ -32,7 +33,7 @@ pub(crate) fn run(host: &Host, args: &ExciteArgs) -> CommandOutcome {
     if args.json {
         terminal::print_json(&found.json())?;
     } else {
-        terminal::print(&found.text(terminal::style()))?;
+        terminal::print(&found.text(terminal::style(), &FlagSpelling))?;
     }
     terminal::note(&format!(
         "{}: one period, {}; {} shows it",

@@ -61,7 +61,7 @@ pub(crate) fn run(host: &Host, args: &GenerateArgs) -> CommandOutcome {
 fn write_module(target: Option<&OutputFile>, files: &[EmittedFile]) -> CommandOutcome {
     for file in files {
         let Some(target) = target else {
-            return terminal::print_as_is(&file.text);
+            return terminal::print(&file.text);
         };
         target.write(&file.text)?;
         terminal::note(&format!(

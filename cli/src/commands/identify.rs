@@ -8,7 +8,7 @@ use modelmill::recording::{RecordingOptions, PreparedRecording};
 
 use crate::args::IdentifyArgs;
 use crate::failure::{CommandFailure, CommandOutcome};
-use crate::flags::format_advice_in_json;
+use crate::flags::FlagSpelling;
 use crate::output::OutputFile;
 use crate::{commands, terminal};
 
@@ -54,14 +54,14 @@ pub(crate) fn run(host: &Host, args: &IdentifyArgs) -> CommandOutcome {
     };
     let [data, check] = [&data, &check].map(|all| all.iter().collect::<Vec<_>>());
     let found = model.identify_with(&data, &instruments, &check, &options)?;
-    let object = found.json(&model)?;
+    let object = found.json(&model, &FlagSpelling)?;
     if let Some(target) = &target {
-        target.write(&format!("{:#}\n", format_advice_in_json(&object)))?;
+        target.write(&format!("{object:#}\n"))?;
     }
     if args.json {
         return terminal::print_json(&object);
     }
-    terminal::print(&found.text(&model, terminal::style()))?;
+    terminal::print(&found.text(&model, terminal::style(), &FlagSpelling))?;
     if let Some(target) = &target {
         terminal::note(&format!(
             "the fit is in {0}; use it with --parameters {0}",

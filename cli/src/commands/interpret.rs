@@ -4,6 +4,7 @@ use modelmill::Host;
 
 use crate::args::InterpretArgs;
 use crate::failure::CommandOutcome;
+use crate::flags::FlagSpelling;
 use crate::{commands, terminal};
 
 /// Solves, and prints the solutions or what is not determined.
@@ -14,5 +15,5 @@ pub(crate) fn run(host: &Host, args: &InterpretArgs) -> CommandOutcome {
     if args.json {
         return terminal::print_json(&found.json());
     }
-    terminal::print(&found.text(terminal::style()))
+    terminal::print(&found.text(terminal::style(), &FlagSpelling))
 }

@@ -36,6 +36,7 @@ use modelmill::{Host, Model};
 
 use crate::args::{DiagnosisArgs, ParameterSource};
 use crate::failure::{CommandFailure, CommandOutcome};
+use crate::flags::FlagSpelling;
 use crate::terminal;
 
 /// Reads and derives a model file; warnings go to standard error.
@@ -56,7 +57,8 @@ pub(crate) fn derive_model(host: &Host, path: &str, loaded: LoadedModel) -> Comm
 pub(crate) fn load(host: &Host, path: &Path) -> CommandOutcome<LoadedModel> {
     let loaded = load_quietly(host, path)?;
     if !loaded.warnings.is_empty() {
-        terminal::print_to_stderr(loaded.render(terminal::is_stderr_coloured()).trim_end());
+        let text = loaded.render_spelled(terminal::is_stderr_coloured(), &FlagSpelling);
+        terminal::print_to_stderr(text.trim_end());
     }
     Ok(loaded)
 }

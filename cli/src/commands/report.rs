@@ -9,7 +9,7 @@ use modelmill::report::page;
 use crate::args::ReportArgs;
 use crate::commands;
 use crate::failure::CommandOutcome;
-use crate::flags::CommandLineAdvice;
+use crate::flags::CommandLineSpelling;
 use crate::output::{self, OutputFile};
 use crate::terminal;
 
@@ -28,7 +28,10 @@ pub(crate) fn run(host: &Host, args: &ReportArgs) -> CommandOutcome {
         repeat_with_nominal: false,
     };
     let findings = commands::diagnose(host, &args.diagnosis, question)?;
-    target.write(&page(&findings, &CommandLineAdvice::from_args(&args.diagnosis))?)?;
+    target.write(&page(
+        &findings,
+        &CommandLineSpelling::from_args(&args.diagnosis),
+    )?)?;
     let says = words::verdict(&findings.diagnosis, findings.channels(), findings.validation);
     terminal::print(&format!(
         "{}\n\nThe page is {}.",

@@ -9,6 +9,7 @@ use modelmill::runs::UnreadRun;
 
 use crate::args::runs::RunsArgs;
 use crate::failure::{CommandFailure, CommandOutcome};
+use crate::flags::FlagSpelling;
 use crate::output::{self, OutputFile};
 use crate::{commands, terminal};
 
@@ -53,14 +54,16 @@ pub(crate) fn run(host: &Host, args: &RunsArgs) -> CommandOutcome {
     });
     let found = model.runs(recordings, &args.runs_options())?;
     match &written {
-        Some((target, RunsFileFormat::Page)) => target.write(&runs_page(&found))?,
-        Some((target, RunsFileFormat::Json)) => target.write(&format!("{:#}\n", found.json()))?,
+        Some((target, RunsFileFormat::Page)) => target.write(&runs_page(&found, &FlagSpelling))?,
+        Some((target, RunsFileFormat::Json)) => {
+            target.write(&format!("{:#}\n", found.json(&FlagSpelling)))?;
+        }
         None => {}
     }
     if args.json {
-        return terminal::print_json(&found.json());
+        return terminal::print_json(&found.json(&FlagSpelling));
     }
-    terminal::print(&found.text(terminal::style()))?;
+    terminal::print(&found.text(terminal::style(), &FlagSpelling))?;
     match &written {
         Some((target, _)) => terminal::print(&format!("Written to {}.", target.path().display())),
         None => Ok(()),

@@ -1,6 +1,5 @@
 //! `work`: the workbench in the browser.
 
-use std::borrow::Cow;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -8,7 +7,7 @@ use std::sync::Arc;
 use modelmill::diagnose::SeparationProposal;
 use modelmill::edit::NewEffect;
 use modelmill::files::PathKind;
-use modelmill::print::AdviceFormatter;
+use modelmill::print::{CommandName, OptionSetting, RemedySpelling, StepSpelling};
 use modelmill::{Host, Model};
 use modelmill_workbench::{WorkbenchCommands, ExcitationSettings, Options, WorkbenchStep, serve};
 use serde_json::json;
@@ -16,7 +15,7 @@ use serde_json::json;
 use crate::args::work::WorkArgs;
 use crate::commands;
 use crate::failure::{CommandFailure, CommandOutcome};
-use crate::flags::{CommandLineAdvice, library_flags, quote_word};
+use crate::flags::{CommandLineSpelling, library_flags, quote_word};
 use crate::terminal;
 
 /// Serves the page until the program is stopped.
@@ -68,7 +67,7 @@ pub(crate) fn run(host: &Host, args: &WorkArgs) -> CommandOutcome {
 
 /// The workbench's steps as command lines.
 struct WorkbenchAdvice {
-    flags: CommandLineAdvice,
+    flags: CommandLineSpelling,
     model: String,
     data: String,
     check: String,
@@ -87,7 +86,7 @@ impl WorkbenchAdvice {
             paths.iter().map(path).collect()
         };
         Self {
-            flags: CommandLineAdvice::new(&args.data, &args.check, &args.preparation.reading()),
+            flags: CommandLineSpelling::new(&args.data, &args.check, &args.preparation.reading()),
             model: quoted_path(&args.model),
             data: named("data", &args.data),
             check: named("check", &args.check),
@@ -172,29 +171,31 @@ impl WorkbenchCommands for WorkbenchAdvice {
 /// Where the commands of the page let a trajectory go.
 const TRAJECTORY: &str = "excitation.csv";
 
-impl AdviceFormatter for WorkbenchAdvice {
-    fn add_effect(&self, model: &Model, effect: &NewEffect) -> String {
-        self.flags.add_effect(model, effect)
+impl RemedySpelling for WorkbenchAdvice {
+    fn spell_options(&self, settings: &[OptionSetting]) -> String {
+        self.flags.spell_options(settings)
     }
 
-    fn add_effect_from_library(&self, model: &Model, effect: &NewEffect, library: &str) -> String {
-        self.flags.add_effect_from_library(model, effect, library)
+    fn spell_command(&self, command: CommandName) -> String {
+        self.flags.spell_command(command)
+    }
+}
+
+impl StepSpelling for WorkbenchAdvice {
+    fn spell_effect(&self, model: &Model, effect: &NewEffect) -> String {
+        self.flags.spell_effect(model, effect)
     }
 
-    fn identify(&self, model: &Model) -> String {
-        self.flags.identify(model)
+    fn spell_effect_of_library(&self, model: &Model, effect: &NewEffect, library: &str) -> String {
+        self.flags.spell_effect_of_library(model, effect, library)
     }
 
-    fn separate_effects(&self, model: &Model, separation: &SeparationProposal) -> Option<String> {
-        self.flags.separate_effects(model, separation)
+    fn spell_identification(&self, model: &Model) -> String {
+        self.flags.spell_identification(model)
     }
 
-    fn fix_parameters(&self) -> String {
-        self.flags.fix_parameters()
-    }
-
-    fn format_text<'a>(&self, text: &'a str) -> Cow<'a, str> {
-        self.flags.format_text(text)
+    fn spell_separation(&self, model: &Model, separation: &SeparationProposal) -> Option<String> {
+        self.flags.spell_separation(model, separation)
     }
 }
 

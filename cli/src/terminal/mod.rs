@@ -11,7 +11,7 @@ use modelmill::{RecordingNote, NoteSeverity};
 use modelmill_boundary::text;
 
 use crate::failure::{CommandFailure, CommandOutcome};
-use crate::flags::{format_advice, format_advice_in_json};
+use crate::flags::FlagSpelling;
 
 /// Whether the user allows colours at all: `NO_COLOR` (no-color.org) and dumb terminals forbid them.
 fn is_colour_allowed() -> bool {
@@ -39,11 +39,6 @@ pub(crate) fn is_stderr_coloured() -> bool {
 
 /// Writes the result of a command to standard output, with one line feed at its end.
 pub(crate) fn print(text: &str) -> CommandOutcome {
-    print_as_is(&format_advice(text))
-}
-
-/// Writes data and code, in which nothing is advised, to standard output, with one line feed at its end.
-pub(crate) fn print_as_is(text: &str) -> CommandOutcome {
     let text = text::terminal(text, is_colour_allowed() && io::stdout().is_terminal());
     let mut out = io::stdout().lock();
     let end = if text.ends_with('\n') { "" } else { "\n" };
@@ -58,13 +53,12 @@ pub(crate) fn print_as_is(text: &str) -> CommandOutcome {
 
 /// Prints one JSON object to standard output.
 pub(crate) fn print_json(value: &serde_json::Value) -> CommandOutcome {
-    print_as_is(&text::json(&format!("{:#}", format_advice_in_json(value))))
+    print(&text::json(&format!("{value:#}")))
 }
 
 /// Writes to standard error; who does not read it is not bothered.
 pub(crate) fn print_to_stderr(text: &str) {
-    let text = format_advice(text);
-    let text = text::terminal(&text, is_stderr_coloured());
+    let text = text::terminal(text, is_stderr_coloured());
     let _ = writeln!(io::stderr(), "{text}");
 }
 
@@ -82,9 +76,10 @@ pub(crate) fn note(text: &str) {
 
 /// A remark of the library on standard error.
 pub(crate) fn remark(note: &RecordingNote) {
+    let says = note.says.spell(&FlagSpelling);
     match note.severity {
-        NoteSeverity::Warning => warn(&note.says),
-        NoteSeverity::Info => self::note(&note.says),
+        NoteSeverity::Warning => warn(&says),
+        NoteSeverity::Info => self::note(&says),
     }
 }
 

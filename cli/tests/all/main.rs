@@ -40,6 +40,7 @@ mod plausible;
 mod preparation;
 mod recordings;
 mod reduce;
+mod remedies;
 mod report;
 mod runs;
 mod separate;

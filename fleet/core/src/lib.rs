@@ -23,6 +23,8 @@ pub mod robot;
 mod sensors;
 mod summary;
 
+use modelmill::print::Message;
+
 pub use ground::{FleetFit, FleetModel};
 pub use modelmill::runs::FittedValue;
 pub use plan::{FleetPlan, FleetReference};
@@ -31,18 +33,23 @@ pub use summary::{BadRecording, FleetSummary};
 
 /// Why something cannot be done, in one sentence with a remedy.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct FleetFault(String);
+pub struct FleetFault(Message);
 
 impl FleetFault {
     /// A fault from anything that can say what it is.
     pub fn new(says: impl std::fmt::Display) -> Self {
-        Self(says.to_string())
+        Self(says.to_string().into())
+    }
+
+    /// What is wrong, with what a front end spells in its own words.
+    pub fn message(&self) -> &Message {
+        &self.0
     }
 }
 
 impl std::fmt::Display for FleetFault {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(&self.0)
+        f.write_str(&self.0.in_library_words())
     }
 }
 
@@ -50,10 +57,6 @@ impl std::error::Error for FleetFault {}
 
 impl From<modelmill::Error> for FleetFault {
     fn from(error: modelmill::Error) -> Self {
-        // A model's findings are a text of their own.
-        match error {
-            modelmill::Error::Model(failure) => Self::new(failure.render(false)),
-            other => Self::new(other),
-        }
+        Self(error.message())
     }
 }

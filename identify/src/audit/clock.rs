@@ -5,6 +5,9 @@
 use std::collections::BTreeMap;
 
 use crate::motion::mean_rate;
+use modelmill_boundary::message;
+use modelmill_boundary::text::{OptionName, Remedy};
+
 use crate::recording::{RecordingNote, SignalRecording};
 use crate::signal::median;
 use crate::words::{backquoted_list, with_digits};
@@ -109,11 +112,12 @@ impl SignalRecording {
             .product();
         let part = all as f64 / n as f64;
         (part > REPEATED + 3.0 * by_chance).then(|| {
-            RecordingNote::warning(format!(
+            RecordingNote::warning(message!(
                 "In {all} of {n} samples of {} all positions stay exactly as they were while the mechanism moves: samples were \
                  written twice, or read later than they are stamped. Derivatives of positions hear of it; recorded rates, \
-                 or a lower cut-off (option `cutoff_hz`), help.",
+                 or a lower cut-off ({}), help.",
                 self.file(),
+                Remedy::option(OptionName::CutoffHz),
             ))
         })
     }
@@ -183,14 +187,18 @@ mod tests {
         assert_eq!(recording(|i| 1.02e-3 * f64::from(i), false), []);
         let counted = recording(|i| 1e-3 * f64::from(i), false);
         assert_eq!(counted.len(), 1);
-        let says = &counted[0].says;
+        let says = counted[0].says.in_library_words();
         assert!(
             says.contains("too slowly") && says.contains("1.02 times"),
             "{says}"
         );
         let repeated = recording(|i| 1.02e-3 * f64::from(i), true);
         assert!(
-            repeated.len() == 1 && repeated[0].says.contains("In 100 of 4000"),
+            repeated.len() == 1
+                && repeated[0]
+                    .says
+                    .in_library_words()
+                    .contains("In 100 of 4000"),
             "{repeated:?}"
         );
     }

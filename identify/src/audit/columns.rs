@@ -5,6 +5,9 @@
 
 use std::f64::consts::PI;
 
+use modelmill_boundary::message;
+use modelmill_boundary::text::{Message, OptionName, OptionSetting, Remedy};
+
 use crate::motion::{DerivativeSource, PreparedRun};
 use crate::recording::{GAP, RecordingNote, SignalRecording};
 use crate::signal::median;
@@ -32,11 +35,12 @@ impl PreparedRun {
         if idle.is_empty() {
             return Vec::new();
         }
-        vec![RecordingNote::warning(format!(
-            "The measured force of {} in {} is 0 throughout: nothing was measured, or the column is another one (option `columns`); \
+        vec![RecordingNote::warning(message!(
+            "The measured force of {} in {} is 0 throughout: nothing was measured, or the column is another one ({}); \
              errors relative to it have no value, and it pulls parameters to 0.",
             backquoted_list(&idle),
-            self.file
+            self.file,
+            Remedy::option(OptionName::Columns),
         ))]
     }
 }
@@ -86,9 +90,10 @@ impl SignalRecording {
 
     /// The options that read an angle recorded in degrees, and with it those of its recorded derivatives that are in
     /// degrees too: all but those that are the derivatives in rad of what stands beside them.
-    pub fn degree_conversion_options(&self, name: &str) -> String {
-        let map =
-            |column: &str, unit: &str| format!("option `columns` = `{column}={column} [{unit}]`");
+    pub fn degree_conversion_options(&self, name: &str) -> Vec<OptionSetting> {
+        let map = |column: &str, unit: &str| {
+            OptionSetting::new(OptionName::Columns, format!("{column}={column} [{unit}]"))
+        };
         let mut maps = vec![map(name, "deg")];
         for (of, order, unit) in [("", "_d", "deg/s"), ("_d", "_dd", "deg/s^2")] {
             let [of, rate] = [of, order].map(|suffix| format!("{name}{suffix}"));
@@ -105,7 +110,7 @@ impl SignalRecording {
             }
             maps.push(map(&rate, unit));
         }
-        maps.join(" ")
+        maps
     }
 
     /// Jumps by a whole turn between neighbouring samples.
@@ -145,7 +150,7 @@ impl SignalRecording {
     /// Rates and accelerations that are not the derivatives of what stands beside them, one note for each
     /// explanation; and whether there were any rates that are.
     fn rate_mismatch_notes(&self, coordinates: &[(String, bool)], time: &[f64]) -> (Vec<RecordingNote>, bool) {
-        let mut found: Vec<(String, Vec<String>, Vec<String>, f64)> = Vec::new();
+        let mut found: Vec<(Message, Vec<String>, Vec<String>, f64)> = Vec::new();
         let mut settled = false;
         for (name, is_angle) in coordinates {
             for (of, rate) in [("", "_d"), ("_d", "_dd")] {
@@ -163,7 +168,7 @@ impl SignalRecording {
                 let why = if misfit < MISFIT {
                     explain_ratio(ratio, *is_angle)
                 } else {
-                    String::new()
+                    Message::new()
                 };
                 match found.iter_mut().find(|(other, .., r)| {
                     *other == why && (why.is_empty() || (r / ratio - 1.0).abs() < 0.05)
@@ -183,16 +188,21 @@ impl SignalRecording {
                 ("are", "the derivatives")
             };
             let how = if why.is_empty() {
-                "nor a multiple of it: check which column is which (option `columns`)".to_owned()
+                message!(
+                    "nor a multiple of it: check which column is which ({})",
+                    Remedy::option(OptionName::Columns)
+                )
             } else {
-                format!("but about {} times as large: {why}", with_digits(ratio, 3))
+                message!("but about {} times as large: {}", with_digits(ratio, 3), why)
             };
-            RecordingNote::warning(format!(
-                "{} in {} {is} not {derivative} of {} with respect to `t`, {how}. Mend the columns, or take derivatives \
-                 from positions (option `source` = `positions`).",
+            RecordingNote::warning(message!(
+                "{} in {} {is} not {derivative} of {} with respect to `t`, {}. Mend the columns, or take derivatives \
+                 from positions ({}).",
                 backquoted_list(&rates),
                 self.file(),
                 backquoted_list(&ofs),
+                how,
+                Remedy::option(OptionName::Source).with_value("positions"),
             ))
         });
         (notes.collect(), settled)
@@ -244,37 +254,40 @@ fn compare_rate(time: &[f64], position: &[f64], rate: &[f64]) -> Option<(f64, f6
 }
 
 /// The slip of units behind a ratio of a rate to the derivative of its position.
-fn explain_ratio(ratio: f64, is_angle: bool) -> String {
+fn explain_ratio(ratio: f64, is_angle: bool) -> Message {
     let degree = 180.0 / PI;
     let is = |value: f64| (ratio.abs() / value - 1.0).abs() < RATIO_TOLERANCE;
-    let mut why = if is(1.0) {
-        String::new()
+    let why = if is(1.0) {
+        Message::new()
     } else if is(degree) && is_angle {
-        "it seems to be per second in degrees, where what it derives from is in rad".to_owned()
+        "it seems to be per second in degrees, where what it derives from is in rad".into()
     } else if is(1.0 / degree) && is_angle {
-        "what it derives from seems to be in degrees".to_owned()
+        "what it derives from seems to be in degrees".into()
     } else if is(1e3) && is_angle {
-        "time seems to be in ms, and must be in s".to_owned()
+        "time seems to be in ms, and must be in s".into()
     } else if is(1e3) {
-        "time seems to be in ms, or lengths differ by m and mm".to_owned()
+        "time seems to be in ms, or lengths differ by m and mm".into()
     } else if is(1e3 * degree) && is_angle {
-        "time seems to be in ms and the rate in degrees".to_owned()
+        "time seems to be in ms and the rate in degrees".into()
     } else if is(1e3 / degree) && is_angle {
-        "time seems to be in ms and the angle in degrees".to_owned()
+        "time seems to be in ms and the angle in degrees".into()
     } else if is(1e6) {
-        "time seems to be in microseconds, and must be in s".to_owned()
+        "time seems to be in microseconds, and must be in s".into()
     } else if is(1e-3) && !is_angle {
-        "lengths seem to be in mm, and must be in m".to_owned()
+        "lengths seem to be in mm, and must be in m".into()
     } else if is(30.0 / PI) && is_angle {
-        "it seems to be in revolutions per minute, and must be in rad/s".to_owned()
+        "it seems to be in revolutions per minute, and must be in rad/s".into()
     } else if is(0.5 / PI) && is_angle {
-        "it seems to be in revolutions per second, and must be in rad/s".to_owned()
+        "it seems to be in revolutions per second, and must be in rad/s".into()
     } else {
-        "check the units (rad, m, s) and which column is which (option `columns`)".to_owned()
+        message!(
+            "check the units (rad, m, s) and which column is which ({})",
+            Remedy::option(OptionName::Columns)
+        )
     };
     if ratio < 0.0 {
         let and = if why.is_empty() { "" } else { ", and " };
-        why = format!("the signs differ{and}{why}");
+        return message!("the signs differ{and}{}", why);
     }
     why
 }
@@ -306,7 +319,7 @@ mod tests {
         recording
             .suspicious_columns(&[("q".to_owned(), true)], DerivativeSource::RecordedFirst)
             .iter()
-            .map(|note| note.says.as_str())
+            .map(|note| note.says.in_library_words())
             .collect::<Vec<_>>()
             .join("\n")
     }
@@ -372,7 +385,7 @@ mod tests {
         let slow = recording(500, |t| 1e3 * t, q, qd);
         let notes = slow.suspicious_columns(&[("q".to_owned(), true)], DerivativeSource::Positions);
         assert!(
-            notes.len() == 1 && notes[0].says.contains("is it in ms?"),
+            notes.len() == 1 && notes[0].says.in_library_words().contains("is it in ms?"),
             "{notes:?}"
         );
     }
@@ -384,9 +397,9 @@ mod tests {
         let notes = wrapped.suspicious_columns(&[("q".to_owned(), true)], DerivativeSource::Positions);
         assert!(
             notes.len() == 1
-                && notes[0].says.contains("jumps by 2 pi")
-                && notes[0].says.contains("2 times in all")
-                && notes[0].says.contains("(line 984)"),
+                && notes[0].says.in_library_words().contains("jumps by 2 pi")
+                && notes[0].says.in_library_words().contains("2 times in all")
+                && notes[0].says.in_library_words().contains("(line 984)"),
             "{notes:?}"
         );
         // A length may jump as it likes.
@@ -414,8 +427,11 @@ mod tests {
         let runs = broken.runs_with(&names, &drives, &positions).unwrap();
         assert_eq!(runs.len(), 2);
         assert!(
-            runs[0].notes[0].says.contains("1 gap")
-                && runs[0].notes[0].says.contains("after line 1251"),
+            runs[0].notes[0].says.in_library_words().contains("1 gap")
+                && runs[0].notes[0]
+                    .says
+                    .in_library_words()
+                    .contains("after line 1251"),
             "{:?}",
             runs[0].notes
         );

@@ -3,6 +3,9 @@
 
 use std::f64::consts::PI;
 
+use modelmill_boundary::message;
+use modelmill_boundary::text::{OptionName, Remedy};
+
 use crate::recording::{RecordingNote, SignalRecording, sample_place_word};
 use crate::signal::white_noise;
 use crate::words::{count_of, seven_digits, with_digits};
@@ -64,11 +67,12 @@ impl SignalRecording {
         let usual = gaps[n / 2];
         let share = gaps.iter().filter(|gap| **gap == usual).count() as f64 / n as f64;
         (usual > 1 && share > 0.9).then(|| {
-            RecordingNote::warning(format!(
+            RecordingNote::warning(message!(
                 "`{name}` in {} changes only every {usual} samples: each value is repeated, so it was recorded at a lower \
                  rate than it is written. Rates from such steps are wrong: keep one sample of each, or a lower cut-off \
-                 (option `cutoff_hz`).",
-                self.file()
+                 ({}).",
+                self.file(),
+                Remedy::option(OptionName::CutoffHz),
             ))
         })
     }
@@ -80,13 +84,13 @@ impl SignalRecording {
             value => seven_digits(value),
         };
         (largest > LARGE_ANGLE).then(|| {
-            RecordingNote::warning(format!(
+            RecordingNote::warning(message!(
                 "`{name}` in {} reaches {}, which is {} turns if it is in rad, as it must be; if it is in \
                  degrees, say so: {}.",
                 self.file(),
                 rounded(largest),
                 rounded(largest / (2.0 * PI)),
-                self.degree_conversion_options(name)
+                Remedy::options(self.degree_conversion_options(name))
             ))
         })
     }
@@ -148,16 +152,16 @@ impl SignalRecording {
             let samples = count_of(*count, "sample", "samples");
             format!(", and {samples} at {}", with_digits(*level, 5))
         });
-        Some(RecordingNote::warning(format!(
+        Some(RecordingNote::warning(message!(
             "The force of `{name}` in {} stays at {} but for noise for {}, first in {} {}{}: the drive or its measurement seems \
-             to be saturated. The true force is not known there; use a gentler motion, or leave these times out (option \
-             `between`).",
+             to be saturated. The true force is not known there; use a gentler motion, or leave these times out ({}).",
             self.file(),
             with_digits(level, 5),
             count_of(count, "sample", "samples"),
             sample_place_word(self.file()),
             self.line(first).unwrap_or(0),
             other.unwrap_or_default(),
+            Remedy::option(OptionName::Between),
         )))
     }
 
@@ -201,15 +205,16 @@ impl SignalRecording {
                 format!(", and {samples} at {}", format_recorded(*limit))
             })
             .unwrap_or_default();
-        Some(RecordingNote::warning(format!(
+        Some(RecordingNote::warning(message!(
             "The force of `{name}` in {} stays exactly at {} for {} while the mechanism moves, first in {} {}{other}: \
              the drive or its measurement seems to be saturated. The true force is not known there; use a gentler motion, \
-             or leave these times out (option `between`).",
+             or leave these times out ({}).",
             self.file(),
             format_recorded(limit),
             count_of(count, "sample", "samples"),
             sample_place_word(self.file()),
             self.line(first).unwrap_or(0),
+            Remedy::option(OptionName::Between),
         )))
     }
 }
@@ -267,6 +272,7 @@ mod tests {
 
     use super::*;
     use crate::ReadOptions;
+    use modelmill_boundary::text::LibrarySpelling;
 
     fn says(q: impl Fn(f64) -> f64, force: impl Fn(f64) -> f64) -> Vec<String> {
         let mut text = "t,q,motor\n".to_owned();
@@ -277,7 +283,8 @@ mod tests {
         let recording =
             SignalRecording::from_reader(text.as_bytes(), "run.csv", &ReadOptions::default()).unwrap();
         let notes = recording.signal_notes(&[("q".to_owned(), true)], &["motor".to_owned()]);
-        notes.into_iter().map(|note| note.says).collect()
+        let says = notes.iter().map(|note| note.says.in_library_words());
+        says.collect()
     }
 
     #[test]
@@ -350,7 +357,7 @@ mod tests {
             }
             let recording =
                 SignalRecording::from_bytes(text.as_bytes(), "run.csv", &ReadOptions::default());
-            recording.unwrap().degree_conversion_options("q")
+            Remedy::options(recording.unwrap().degree_conversion_options("q")).spell(&LibrarySpelling)
         };
         assert_eq!(
             of(1.0),

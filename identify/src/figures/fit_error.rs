@@ -2,6 +2,9 @@
 
 use std::fmt;
 
+use modelmill_boundary::message;
+use modelmill_boundary::text::{CommandName, Message, OptionName, Remedy};
+
 use crate::words::backquoted_list;
 
 /// Why a fit file cannot be used.
@@ -72,61 +75,57 @@ pub enum FitFault {
     },
 }
 
-impl fmt::Display for FitFileError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+impl FitFileError {
+    /// What is wrong, and what to do.
+    pub fn message(&self) -> Message {
         let file = &self.file;
+        let identify = Remedy::command(CommandName::Identify);
         match &self.fault {
-            FitFault::Unreadable { reason } => {
-                write!(
-                    f,
-                    "{file}: the fit cannot be read: {reason}; make it with verb `identify` (option `out` = `{file}`)"
-                )
-            }
+            FitFault::Unreadable { reason } => message!(
+                "{file}: the fit cannot be read: {reason}; make it with {} ({})",
+                identify,
+                Remedy::option(OptionName::Out).with_value(file)
+            ),
             FitFault::NotAFit {
                 line,
                 column,
                 reason,
-            } => write!(
-                f,
-                "{file}, line {line}, column {column}: this is not the JSON that verb `identify` writes: \
-                 {reason}"
+            } => message!(
+                "{file}, line {line}, column {column}: this is not the JSON that {} writes: \
+                 {reason}",
+                identify
             ),
-            FitFault::NoJson => write!(
-                f,
-                "{file} is no fit: the JSON that verb `identify` writes is expected; recordings go to option `data`"
+            FitFault::NoJson => message!(
+                "{file} is no fit: the JSON that {} writes is expected; recordings go to {}",
+                identify,
+                Remedy::option(OptionName::Data)
             ),
             FitFault::MissingParameter {
                 name,
                 nearest,
                 present,
             } => {
-                write!(
-                    f,
-                    "{file}: the model's parameter `{name}` is not in the fit"
-                )?;
-                if let Some(nearest) = nearest {
-                    write!(f, " (the closest is `{nearest}`)")?;
-                }
-                write!(
-                    f,
-                    ", which holds {}; identify this model again",
+                let nearest = nearest
+                    .as_ref()
+                    .map(|near| format!(" (the closest is `{near}`)"));
+                message!(
+                    "{file}: the model's parameter `{name}` is not in the fit{}, which holds {}; identify this model again",
+                    nearest.unwrap_or_default(),
                     backquoted_list(present)
                 )
             }
-            FitFault::UnknownParameters { names } => write!(
-                f,
+            FitFault::UnknownParameters { names } => message!(
                 "{file}: the fit holds {}, which the model does not have; identify this model again",
                 backquoted_list(names)
             ),
             FitFault::DuplicateParameter { name } => {
-                write!(f, "{file}: the fit holds `{name}` twice; remove one")
+                message!("{file}: the fit holds `{name}` twice; remove one")
             }
             FitFault::ConstantDiffers {
                 name,
                 file: theirs,
                 model,
-            } => write!(
-                f,
+            } => message!(
                 "{file}: the fit was made with {name} = {theirs}, but the model has {name} = {model}, and base parameters \
                  depend on it: identify again"
             ),
@@ -134,12 +133,17 @@ impl fmt::Display for FitFileError {
                 name,
                 file: theirs,
                 model,
-            } => write!(
-                f,
+            } => message!(
                 "{file}: `{name}` is `{theirs}` in the fit but `{model}` in the model; \
                  the fit belongs to another model or to an earlier state of it: identify again"
             ),
         }
+    }
+}
+
+impl fmt::Display for FitFileError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.message().in_library_words())
     }
 }
 

@@ -112,7 +112,11 @@ pub struct FitFile {
     /// Error figures on the recordings of the check, if any.
     pub check: Option<ErrorFigures>,
     /// Remarks on the data.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[serde(
+        default,
+        skip_serializing_if = "Vec::is_empty",
+        with = "crate::recording::notes"
+    )]
     pub data: Vec<RecordingNote>,
     /// What the estimator found beside the values, of which only physical parameters are read again.
     #[serde(default, skip_serializing)]

@@ -35,7 +35,7 @@ impl SignalRecording {
             return Err(self.fault(RecordingFault::TooFewSamples {
                 have: time.len(),
                 need: SmoothingFilter::Butterworth { order }.min_samples(),
-                purpose: "preparing derivatives from positions",
+                purpose: "preparing derivatives from positions".into(),
             }));
         }
         let design = |cutoff: f64| {
@@ -51,7 +51,7 @@ impl SignalRecording {
             return Err(self.fault(RecordingFault::TooFewSamples {
                 have: time.len(),
                 need,
-                purpose: "preparing derivatives from positions",
+                purpose: "preparing derivatives from positions".into(),
             }));
         }
         let found = find_motion_series(time, columns, preparation);
@@ -145,7 +145,7 @@ impl SignalRecording {
                     self.fault(RecordingFault::TooFewSamples {
                         have: time.len(),
                         need: way.min_samples(),
-                        purpose: "smoothing at this cut-off",
+                        purpose: "smoothing at this cut-off".into(),
                     })
                 })
             })

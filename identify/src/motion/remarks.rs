@@ -2,6 +2,9 @@
 
 use std::f64::consts::TAU;
 
+use modelmill_boundary::message;
+use modelmill_boundary::text::{Message, OptionName, Remedy};
+
 use crate::motion::derivatives::mean_rate;
 use crate::motion::periods;
 use crate::motion::run::PreparedRun;
@@ -62,20 +65,21 @@ impl SignalRecording {
     }
 
     /// Says that the motion is taken for a series, and what that leaves of it.
-    pub(crate) fn describe_series(&self, found: &PeriodicSeries, columns: &[&RecordedCoordinate<'_>]) -> String {
+    pub(crate) fn describe_series(&self, found: &PeriodicSeries, columns: &[&RecordedCoordinate<'_>]) -> Message {
         let names: Vec<String> = columns.iter().map(|column| column.name.clone()).collect();
         let left = columns.iter().zip(&found.noise).map(|(column, noise)| {
             let derivative = if column.qd.is_some() { "_d" } else { "" };
             format!("{noise:.2e} of `{}{derivative}`", column.name)
         });
-        format!(
+        message!(
             "Derivatives of {} in {} are those of a Fourier series of period {} s with {}, since it leaves nothing but \
-             white noise: {} (RMS); option `smoothing` = `butterworth` filters instead.",
+             white noise: {} (RMS); {} filters instead.",
             backquoted_list(&names),
             self.file(),
             seven_digits(found.period),
             count_of(found.harmonics, "harmonic", "harmonics"),
-            left.collect::<Vec<_>>().join(", ")
+            left.collect::<Vec<_>>().join(", "),
+            Remedy::option(OptionName::Smoothing).with_value("butterworth")
         )
     }
 
@@ -170,11 +174,12 @@ impl SignalRecording {
             }
         }
         if !resting.is_empty() {
-            run.notes.push(RecordingNote::info(format!(
+            run.notes.push(RecordingNote::info(message!(
                 "In {} there is standstill, a rate below a hundredth of the fastest: {} of the samples. Friction takes any \
-                 value there; option `standstill` = `0.01` leaves such equations out of a fit.",
+                 value there; {} leaves such equations out of a fit.",
                 self.file(),
-                resting.join(", ")
+                resting.join(", "),
+                Remedy::option(OptionName::Standstill).with_value("0.01")
             )));
         }
     }

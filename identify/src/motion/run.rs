@@ -5,6 +5,9 @@
 
 use std::fmt::Write as _;
 
+use modelmill_boundary::message;
+use modelmill_boundary::text::{OptionName, Remedy};
+
 use crate::motion::band;
 use crate::motion::even;
 use crate::motion::options::{DerivativeSource, StatePreparation, SmoothingMethod};
@@ -340,14 +343,15 @@ impl SignalRecording {
     fn trim_transients(&self, run: &mut PreparedRun) -> Result<(), RecordingError> {
         let (start, end) = run.prepared.trimmed;
         let have = run.time.len();
+        let trim = Remedy::option(OptionName::Trim);
         if have < start.saturating_add(end).saturating_add(1) {
             return Err(self.fault(RecordingFault::TooFewSamples {
                 have,
                 need: start.saturating_add(end).saturating_add(1),
                 purpose: if run.prepared.trim_asked_for {
-                    "dropping as many at both ends as option `trim` asks for"
+                    message!("dropping as many at both ends as {} asks for", trim)
                 } else {
-                    "dropping the filter's transients at both ends"
+                    "dropping the filter's transients at both ends".into()
                 },
             }));
         }
@@ -375,13 +379,13 @@ impl SignalRecording {
         {
             cut(column);
         }
-        run.notes.push(RecordingNote::info(format!(
+        run.notes.push(RecordingNote::info(message!(
             "The first {start} and the last {end} of {have} samples of {} are dropped ({}).",
             self.file(),
             if run.prepared.trim_asked_for {
-                "as asked for by option `trim`"
+                message!("as asked for by {}", trim)
             } else {
-                "transients of the filter"
+                "transients of the filter".into()
             }
         )));
         Ok(())

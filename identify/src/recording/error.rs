@@ -2,6 +2,9 @@
 
 use std::fmt;
 
+use modelmill_boundary::message;
+use modelmill_boundary::text::{Message, OptionName, OptionSetting, Remedy};
+
 use crate::recording::read::sample_place_word;
 use crate::signal::FilterError;
 use crate::words::{count_of, backquoted_list};
@@ -177,7 +180,7 @@ pub enum RecordingFault {
         /// Samples there must be.
         need: usize,
         /// What they are needed for.
-        purpose: &'static str,
+        purpose: Message,
     },
     /// A Fourier series was asked for, but the motion has no period that could be found.
     NoPeriod,
@@ -208,13 +211,21 @@ pub enum RecordingFault {
     },
 }
 
+impl RecordingError {
+    /// Where and what is wrong, and what to do.
+    pub fn message(&self) -> Message {
+        let file = &self.file;
+        let says = self.fault.message();
+        match self.fault.line() {
+            Some(line) => message!("{file}, {} {line}: {}", place_word(file), says),
+            None => message!("{file}: {}", says),
+        }
+    }
+}
+
 impl fmt::Display for RecordingError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let file = &self.file;
-        match self.fault.line() {
-            Some(line) => write!(f, "{file}, {} {line}: {}", sample_place_word(file), self.fault),
-            None => write!(f, "{file}: {}", self.fault),
-        }
+        f.write_str(&self.message().in_library_words())
     }
 }
 
@@ -236,103 +247,93 @@ impl RecordingFault {
     }
 }
 
-impl fmt::Display for RecordingFault {
+impl RecordingFault {
+    /// What is wrong, and what to do.
     #[allow(clippy::too_many_lines, reason = "one arm per fault, each a sentence")]
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    pub fn message(&self) -> Message {
+        let map = |ours: &str, theirs: &str| {
+            OptionSetting::new(OptionName::Columns, format!("{ours}={theirs}"))
+        };
         match self {
-            Self::Unreadable { reason } => {
-                write!(
-                    f,
-                    "the recording cannot be read: {reason}; check the path and the permissions"
-                )
+            Self::Unreadable { reason } => message!(
+                "the recording cannot be read: {reason}; check the path and the permissions"
+            ),
+            Self::Empty => {
+                "the recording is empty; a header line and one line per sample are expected".into()
             }
-            Self::Empty => f.write_str(
-                "the recording is empty; a header line and one line per sample are expected",
-            ),
-            Self::NoSamples => f.write_str(
-                "there is a header but no sample; one line of numbers per sample is expected",
-            ),
-            Self::NotCsv { looks_like } => write!(
-                f,
+            Self::NoSamples => {
+                "there is a header but no sample; one line of numbers per sample is expected".into()
+            }
+            Self::NotCsv { looks_like } => message!(
                 "this looks like {looks_like}, not like a recording; save it as CSV (UTF-8, with a header), Parquet, HDF5, MCAP or a MATLAB file"
             ),
-            Self::Format { format, message: says } => write!(f, "this is {format}: {says}"),
+            Self::Format { format, message: says } => message!("this is {format}: {says}"),
             Self::TooLarge {
                 samples,
                 columns,
                 until,
                 ..
             } => {
-                write!(
-                    f,
-                    "the recording is too large to be kept in memory: up to here {samples} samples of {columns} columns are \
-                     {:.1} GB; ",
-                    8e-9 * (*samples as f64) * (*columns as f64 + 1.0)
-                )?;
-                match until {
-                    Some((from, to)) => write!(
-                        f,
-                        "take a part of it, for example option `between` = `{from},{to}`, or several such parts one after the other"
+                let part = Remedy::option(OptionName::Between);
+                let part = match until {
+                    Some((from, to)) => message!(
+                        "for example {}, or several such parts one after the other",
+                        part.with_value(format!("{from},{to}"))
                     ),
-                    None => f.write_str("take a part of it with option `between` = `FROM,TO` (s)"),
-                }
+                    None => message!("with {} (s)", part.with_value("FROM,TO")),
+                };
+                let comma = if until.is_some() { "," } else { "" };
+                message!(
+                    "the recording is too large to be kept in memory: up to here {samples} samples of {columns} columns are \
+                     {:.1} GB; take a part of it{comma} {}",
+                    8e-9 * (*samples as f64) * (*columns as f64 + 1.0),
+                    part
+                )
             }
-            Self::NoSamplesInInterval { from, to } => write!(
-                f,
-                "no sample lies between t = {from} s and {to} s, as option `between` asks; give times that the recording has"
+            Self::NoSamplesInInterval { from, to } => message!(
+                "no sample lies between t = {from} s and {to} s, as {} asks; give times that the recording has",
+                Remedy::option(OptionName::Between)
             ),
-            Self::NoCommonTime { parts } => write!(
-                f,
+            Self::NoCommonTime { parts } => message!(
                 "{} have no samples at the same time, so they cannot be joined; are their clocks the same?",
                 backquoted_list(parts)
             ),
-            Self::ColumnInTwoFiles { name, other } => write!(
-                f,
+            Self::ColumnInTwoFiles { name, other } => message!(
                 "the column `{name}` is in {other} too; rename it in one of the two files, or leave one of them out"
             ),
-            Self::SumAcrossFiles { name } => write!(
-                f,
+            Self::SumAcrossFiles { name } => message!(
                 "`{name}` is a sum of columns of several files, which is read from one file only; add them up in a file before"
             ),
-            Self::NoHeader => f.write_str(
-                "the first line holds numbers, but column names are expected there; \
-                 put a line such as `t,theta1,spindle_left` on top",
-            ),
-            Self::UnclearSeparator { header } if header.starts_with('#') => write!(
-                f,
+            Self::NoHeader => "the first line holds numbers, but column names are expected there; \
+                 put a line such as `t,theta1,spindle_left` on top"
+                .into(),
+            Self::UnclearSeparator { header } if header.starts_with('#') => message!(
                 "the first line must name the columns, but it is `{header}`; comment lines are not read, delete them"
             ),
-            Self::UnclearSeparator { header } => write!(
-                f,
+            Self::UnclearSeparator { header } => message!(
                 "it cannot be told what separates the columns of `{header}`; \
                  use a comma (or `;` or a tab) throughout and a point for decimals"
             ),
-            Self::UnnamedColumn { place } => {
-                write!(
-                    f,
-                    "column {place} has no name; name it, or remove a separator at the end of the lines"
-                )
-            }
+            Self::UnnamedColumn { place } => message!(
+                "column {place} has no name; name it, or remove a separator at the end of the lines"
+            ),
             Self::DuplicateColumn {
                 name,
                 places: [a, b],
                 by_renaming,
             } => {
-                write!(f, "columns {a} and {b} are both called `{name}`; ")?;
-                if *by_renaming {
-                    f.write_str("a renaming brings this about: leave it out, or rename the other column too")
+                let what = if *by_renaming {
+                    "a renaming brings this about: leave it out, or rename the other column too"
                 } else {
-                    f.write_str("give every column a name of its own")
-                }
+                    "give every column a name of its own"
+                };
+                message!("columns {a} and {b} are both called `{name}`; {what}")
             }
-            Self::DuplicateRenaming { name } => {
-                write!(
-                    f,
-                    "`{name}` is renamed twice; give each name and each column one renaming (option `columns` = `ours=theirs`)"
-                )
-            }
-            Self::RaggedLine { have, expected, .. } => write!(
-                f,
+            Self::DuplicateRenaming { name } => message!(
+                "`{name}` is renamed twice; give each name and each column one renaming ({})",
+                Remedy::options([map("ours", "theirs")])
+            ),
+            Self::RaggedLine { have, expected, .. } => message!(
                 "{} where the header has {expected}; complete or remove the line",
                 count_of(*have, "field", "fields")
             ),
@@ -342,33 +343,28 @@ impl fmt::Display for RecordingFault {
                 present,
                 by_renaming,
             } => {
-                if *by_renaming {
-                    write!(
-                        f,
-                        "a renaming asks for the column `{name}`, which is not there"
-                    )?;
+                let missing = if *by_renaming {
+                    format!("a renaming asks for the column `{name}`, which is not there")
                 } else {
-                    write!(f, "there is no column `{name}`")?;
-                }
-                match nearest {
-                    Some(nearest) => write!(f, "; is `{nearest}` meant?")?,
-                    None => f.write_str(".")?,
-                }
-                write!(f, " The columns are: {}.", backquoted_list(present))?;
-                if present.first().is_some_and(|first| first.starts_with('#')) {
-                    f.write_str(
-                        " The first line must name the columns: comment lines are not read, delete them.",
-                    )?;
-                }
-                if *by_renaming {
-                    f.write_str(" Renamings read option `columns` = `ours=theirs`.")
-                } else {
-                    write!(
-                        f,
-                        " Map one onto it with option `columns` = `{name}={}`.",
-                        nearest.as_deref().unwrap_or("THEIRS")
+                    format!("there is no column `{name}`")
+                };
+                let meant = match nearest {
+                    Some(nearest) => format!("; is `{nearest}` meant?"),
+                    None => ".".to_owned(),
+                };
+                let how = if *by_renaming {
+                    message!(
+                        "Renamings read {}.",
+                        Remedy::options([map("ours", "theirs")])
                     )
-                }
+                } else {
+                    let theirs = nearest.as_deref().unwrap_or("THEIRS");
+                    message!(
+                        "Map one onto it with {}.",
+                        Remedy::options([map(name, theirs)])
+                    )
+                };
+                message!("{missing}{meant}{} {}", columns_there(present), how)
             }
             Self::MissingColumns { missing, present } => {
                 let all: Vec<String> = missing
@@ -378,27 +374,15 @@ impl fmt::Display for RecordingFault {
                         None => format!("`{name}`"),
                     })
                     .collect();
-                let maps: Vec<String> = missing
+                let maps = missing
                     .iter()
-                    .map(|(name, nearest)| {
-                        format!(
-                            "option `columns` = `{name}={}`",
-                            nearest.as_deref().unwrap_or("THEIRS")
-                        )
-                    })
-                    .collect();
-                write!(
-                    f,
-                    "there are no columns {}. The columns are: {}.",
+                    .map(|(name, nearest)| map(name, nearest.as_deref().unwrap_or("THEIRS")));
+                message!(
+                    "there are no columns {}.{} Map one onto each of them with {}.",
                     all.join(", "),
-                    backquoted_list(present)
-                )?;
-                if present.first().is_some_and(|first| first.starts_with('#')) {
-                    f.write_str(
-                        " The first line must name the columns: comment lines are not read, delete them.",
-                    )?;
-                }
-                write!(f, " Map one onto each of them with {}.", maps.join(" "))
+                    columns_there(present),
+                    Remedy::options(maps)
+                )
             }
             Self::NotANumber {
                 column,
@@ -406,16 +390,15 @@ impl fmt::Display for RecordingFault {
                 count,
                 ..
             } => {
-                write!(
-                    f,
-                    "column `{column}` holds `{text}` where a number is expected"
-                )?;
-                write_other_count(f, *count, "fields of the column are no numbers")?;
-                if looks_like_decimal_comma(text) {
-                    f.write_str("; write decimals with a point")
+                let write_other_count = write_other_count(*count, "fields of the column are no numbers");
+                let what = if looks_like_decimal_comma(text) {
+                    "write decimals with a point"
                 } else {
-                    f.write_str("; correct or remove it")
-                }
+                    "correct or remove it"
+                };
+                message!(
+                    "column `{column}` holds `{text}` where a number is expected{others}; {what}"
+                )
             }
             Self::NotFinite {
                 column,
@@ -423,30 +406,31 @@ impl fmt::Display for RecordingFault {
                 count,
                 ..
             } => {
-                if text.is_empty() {
-                    write!(f, "column `{column}` is empty where a number is expected")?;
+                let holds = if text.is_empty() {
+                    format!("column `{column}` is empty where a number is expected")
                 } else {
                     let expected = match text.parse::<f64>() {
                         Ok(value) if value.is_finite() => "a number that was measured",
                         _ => "a finite number",
                     };
-                    write!(
-                        f,
-                        "column `{column}` holds `{text}` where {expected} is expected"
-                    )?;
-                }
-                write_other_count(f, *count, "fields of the column are not finite or empty")?;
-                f.write_str("; repair the recording, or leave such samples out with option `skip_bad_samples` (they are counted)")
+                    format!("column `{column}` holds `{text}` where {expected} is expected")
+                };
+                message!(
+                    "{holds}{}; repair the recording, or leave such samples out with {} (they are counted)",
+                    write_other_count(*count, "fields of the column are not finite or empty"),
+                    Remedy::option(OptionName::SkipBadSamples)
+                )
             }
-            Self::MissingForce { drives } => write!(
-                f,
+            Self::MissingForce { drives } => message!(
                 "the measured force of {} is needed, but there is no such column; \
-                 map one onto it with option `columns` = `{}=THEIRS`",
+                 map one onto it with {}",
                 backquoted_list(drives),
-                drives.first().map_or("DRIVE", String::as_str)
+                Remedy::options([map(
+                    drives.first().map_or("DRIVE", String::as_str),
+                    "THEIRS"
+                )])
             ),
-            Self::TimeNotIncreasing { previous, here, .. } => write!(
-                f,
+            Self::TimeNotIncreasing { previous, here, .. } => message!(
                 "time goes from {previous} s to {here} s, but must increase from sample to sample; \
                  remove repeated samples, or split the file where the clock was reset"
             ),
@@ -454,30 +438,29 @@ impl fmt::Display for RecordingFault {
                 have,
                 need,
                 purpose,
-            } => {
-                write!(
-                    f,
-                    "{} too few for {purpose}, which takes at least {need}; use a longer recording",
-                    match have {
-                        1 => "1 sample is".to_owned(),
-                        n => format!("{n} samples are"),
-                    }
-                )
-            }
-            Self::OpenQuote { .. } => f.write_str(
-                "a quote opens here, but the field that it begins does not end in the same line; delete the quote, or \
-                 close it",
+            } => message!(
+                "{} too few for {}, which takes at least {need}; use a longer recording",
+                match have {
+                    1 => "1 sample is".to_owned(),
+                    n => format!("{n} samples are"),
+                },
+                purpose
             ),
-            Self::NoPeriod => f.write_str(
+            Self::OpenQuote { .. } => {
+                "a quote opens here, but the field that it begins does not end in the same line; delete the quote, or \
+                 close it"
+                    .into()
+            }
+            Self::NoPeriod => message!(
                 "the motion does not repeat itself within the recording, so no period can be found; give it with \
-                 option `period` = `S`, or take another smoothing",
+                 {}, or take another smoothing",
+                Remedy::option(OptionName::Period).with_value("S")
             ),
             Self::Period {
                 period,
                 shortest,
                 longest,
-            } => write!(
-                f,
+            } => message!(
                 "a period of {period} s was asked for, but this recording can show periods from {shortest:.6} s to \
                  {longest:.6} s only; choose one of them, or another smoothing"
             ),
@@ -485,22 +468,41 @@ impl fmt::Display for RecordingFault {
                 cutoff_hz,
                 lowest_hz,
                 duration,
-            } => write!(
-                f,
+            } => message!(
                 "a cut-off of {cutoff_hz} Hz is too low for a recording of {duration:.4} s, of which no motion would be \
-                 left; choose one above {lowest_hz:.4} Hz, or leave option `cutoff_hz` away and have it chosen from the signal"
+                 left; choose one above {lowest_hz:.4} Hz, or leave {} away and have it chosen from the signal",
+                Remedy::option(OptionName::CutoffHz)
             ),
-            Self::Filter { column, error } => write!(f, "`{column}` cannot be filtered: {error}"),
+            Self::Filter { column, error } => {
+                message!("`{column}` cannot be filtered: {error}")
+            }
         }
     }
 }
 
+impl fmt::Display for Fault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.message().in_library_words())
+    }
+}
+
+/// Names the columns that are there.
+fn columns_there(present: &[String]) -> String {
+    let mut says = format!(" The columns are: {}.", list(present));
+    if present.first().is_some_and(|first| first.starts_with('#')) {
+        says.push_str(
+            " The first line must name the columns: comment lines are not read, delete them.",
+        );
+    }
+    says
+}
+
 /// Says how many other fields share the fault.
-fn write_other_count(f: &mut fmt::Formatter<'_>, count: usize, what: &str) -> fmt::Result {
+fn write_other_count(count: usize, what: &str) -> String {
     if count > 1 {
-        write!(f, " ({count} {what})")
+        format!(" ({count} {what})")
     } else {
-        Ok(())
+        String::new()
     }
 }
 

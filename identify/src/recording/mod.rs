@@ -11,7 +11,7 @@ mod formats;
 mod gaps;
 mod intake;
 mod join;
-mod notes;
+pub(crate) mod notes;
 mod options;
 mod read;
 mod repair;

@@ -52,7 +52,8 @@ impl SignalRecording {
                 }
                 column.not_finite = None;
                 let prefix = format!("Column `{name}` of {} holds NaN", self.file);
-                self.notes.retain(|note| !note.says.starts_with(&prefix));
+                self.notes
+                    .retain(|note| !note.says.in_library_words().starts_with(&prefix));
                 let first = lost.iter().position(|lost| *lost).unwrap_or(0);
                 notes.push(RecordingNote::warning(format!(
                     "{n} of {} samples of {} lack the force of `{name}`, the first in {place} {}: positions there are kept, \
@@ -439,7 +440,8 @@ mod tests {
         assert!((faulty.column("motor").unwrap()[700] - 1e6).abs() < 1e-9);
         let lost = faulty.lost_samples("motor").unwrap();
         assert!(lost[300] && lost[301] && !lost[700]);
-        let says: Vec<&str> = found.notes().iter().map(|n| n.says.as_str()).collect();
+        let says = found.notes().iter().map(|n| n.says.in_library_words());
+        let says: Vec<String> = says.collect();
         assert_eq!(says.len(), 2, "{says:?}");
         assert!(says[0].contains("2 of 1000 samples") && says[0].contains("line 302"));
         assert!(
@@ -480,6 +482,7 @@ mod tests {
         assert!(
             found.notes()[0]
                 .says
+                .in_library_words()
                 .contains("jumps 3 times, by up to 0.02")
         );
     }

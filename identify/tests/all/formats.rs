@@ -205,10 +205,16 @@ fn only_the_time_that_is_asked_for_is_read() {
     };
     let recording = part((2.0, 12.0)).unwrap();
     assert!((9_999..=10_001).contains(&recording.samples()));
-    assert!(recording.notes()[0].says.contains("time stamps"));
+    assert!(
+        recording.notes()[0]
+            .says
+            .in_library_words()
+            .contains("time stamps")
+    );
     assert!(
         recording.notes()[1]
             .says
+            .in_library_words()
             .contains("from t = 2 s to 12 s are read; 2000 samples before")
     );
     assert_eq!(
@@ -276,7 +282,7 @@ fn matlab_files_give_vectors_and_columns_of_matrices() {
         }
     }
     let recording = SignalRecording::read(fixture("run-v7.mat"), &[]).unwrap();
-    let says = &recording.notes()[0].says;
+    let says = recording.notes()[0].says.in_library_words();
     assert!(says.contains("`gain`") && !says.contains("`z`"), "{says}");
     // Complex numbers are refused as such, not read by their real parts.
     let says = recording.column("z").unwrap_err().to_string();

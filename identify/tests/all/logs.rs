@@ -192,7 +192,10 @@ fn datasets_of_all_types_are_read_right() {
         }
         let notes = recording.notes();
         assert!(
-            notes.iter().any(|note| note.says.contains("`calibration`") && note.says.contains("`operator`")),
+            notes.iter().any(
+                |note| note.says.in_library_words().contains("`calibration`")
+                    && note.says.in_library_words().contains("`operator`")
+            ),
             "{notes:?}"
         );
     }
@@ -248,7 +251,14 @@ fn messages_of_any_type_become_columns() {
         expected
     );
     assert!(
-        current.notes()[0].says.contains("`status`") && current.notes()[0].says.contains("arrival"),
+        current.notes()[0]
+            .says
+            .in_library_words()
+            .contains("`status`")
+            && current.notes()[0]
+                .says
+                .in_library_words()
+                .contains("arrival"),
         "{:?}",
         current.notes()
     );
@@ -281,10 +291,10 @@ fn topics_are_joined_on_time() {
         let expected = k as f64 + 1.0 - 1000.0 / 4e6;
         assert!((value - expected).abs() < 1e-9, "{k}: {value}");
     }
-    let says: Vec<&str> = recording
+    let says: Vec<String> = recording
         .notes()
         .iter()
-        .map(|note| note.says.as_str())
+        .map(|note| note.says.in_library_words())
         .collect();
     assert!(
         says.iter()

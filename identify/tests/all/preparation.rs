@@ -80,7 +80,7 @@ fn two_periods_or_one_are_projected_on_their_series() {
     for seed in 1..=8 {
         for samples in [3645, 1823] {
             let run = prepared(seed, samples, SmoothingMethod::default());
-            let note = &run.notes[0].says;
+            let note = run.notes[0].says.in_library_words();
             assert!(
                 note.contains("with 7 harmonics, since it leaves nothing but white noise"),
                 "seed {seed}, {samples} samples: {note}"

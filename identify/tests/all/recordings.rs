@@ -159,10 +159,10 @@ fn a_column_with_other_things_than_numbers_is_refused_when_it_is_used() {
          (3 fields of the column are not finite or empty); \
          repair the recording, or leave such samples out with option `skip_bad_samples` (they are counted)"
     );
-    let says: Vec<&str> = recording
+    let says: Vec<String> = recording
         .notes()
         .iter()
-        .map(|note| note.says.as_str())
+        .map(|note| note.says.in_library_words())
         .collect();
     assert!(
         says.iter().any(
@@ -190,7 +190,7 @@ fn samples_left_out_are_counted() {
     assert_eq!(recording.column("q").unwrap(), [1.0, 2.0, 5.0]);
     assert_eq!(recording.line(1), Some(4));
     assert_eq!(
-        recording.notes()[0].says,
+        recording.notes()[0].says.in_library_words(),
         "2 of 5 samples of run.csv hold NaN, infinite or empty fields and are left out, the first in line 3."
     );
 }
@@ -304,9 +304,13 @@ fn time_must_increase_and_gaps_are_said() {
     let run = gap.states(&names(&["q"]), &[]).unwrap();
     assert_eq!(run.notes[0].severity, NoteSeverity::Warning);
     assert!(
-        run.notes[0].says.contains("1 gap ") && run.notes[0].says.contains("after line 4"),
+        run.notes[0].says.in_library_words().contains("1 gap ")
+            && run.notes[0]
+                .says
+                .in_library_words()
+                .contains("after line 4"),
         "{}",
-        run.notes[0].says
+        run.notes[0].says.in_library_words()
     );
 }
 
@@ -341,16 +345,17 @@ fn missing_derivatives_are_prepared_and_said() {
         assert!(start > 0 && run.samples() == 400 - start - end);
         assert!(run.prepared.cutoff_chosen);
         assert!(
-            run.notes
-                .iter()
-                .any(|note| note.says.contains("chosen from the signal")),
+            run.notes.iter().any(|note| note
+                .says
+                .in_library_words()
+                .contains("chosen from the signal")),
             "{:?}",
             run.notes
         );
         assert!(
             run.notes
                 .iter()
-                .any(|note| note.says.contains("are dropped"))
+                .any(|note| note.says.in_library_words().contains("are dropped"))
         );
         let middle = 50..350 - start;
         for i in middle {
@@ -439,10 +444,10 @@ fn short_and_still_recordings_get_an_answer() {
     );
     let still = sine(&["still"]).states(&names(&["still"]), &[]).unwrap();
     assert!(
-        still
-            .notes
-            .iter()
-            .any(|note| note.says.contains("`still` does not move")),
+        still.notes.iter().any(|note| note
+            .says
+            .in_library_words()
+            .contains("`still` does not move")),
         "{:?}",
         still.notes
     );

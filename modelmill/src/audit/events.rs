@@ -5,6 +5,8 @@
 //! not pull the fit to itself. A law that the model lacks leaves errors that come again with the motion; an event is rare, lasts,
 //! and stands far above all that the rest of the run leaves.
 
+use modelmill_boundary::message;
+use modelmill_boundary::text::{OptionName, Remedy};
 use modelmill_identify::diagnose::{Disturbance, EstimatedQuantity};
 use modelmill_identify::{RecordingNote, robust_fit};
 use nalgebra::DVector;
@@ -69,16 +71,17 @@ pub(super) fn event_notes(model: &Model, data: &mut RecordingSegment, leave_out:
                 )
             })
             .collect();
-        notes.push(RecordingNote::warning(format!(
-            "From {} to {} s of {} forces differ from all that parameters explain, {}, as in a contact or a push. {}",
+        let option = Remedy::option(OptionName::LeaveOutEvents);
+        notes.push(RecordingNote::warning(message!(
+            "From {} to {} s of {} forces differ from all that parameters explain, {}, as in a contact or a push{}",
             significant(event.from, 5),
             significant(event.to, 5),
             data.run.file,
             drives.join(" and "),
             if leave_out {
-                "They are left out of fits and figures (option `leave_out_events`)."
+                message!(". They are left out of fits and figures ({}).", option)
             } else {
-                "Option `leave_out_events` leaves them out of fits and figures."
+                message!("; {} leaves them out of fits and figures.", option)
             }
         )));
     }

@@ -1,5 +1,7 @@
 //! Gravity that pulls the other way: a machine that hangs where its model stands, or the sign of `gravity` in the model file.
 
+use modelmill_boundary::message;
+use modelmill_boundary::text::Remedy;
 use modelmill_identify::ForceAudit;
 use nalgebra::DVector;
 
@@ -31,12 +33,13 @@ pub(super) fn reversed_gravity_finding(
     (after < BETTER * before).then(|| {
         let says = "gravity seems to pull the other way".to_owned();
         let file = &data.run.file;
-        let note = format!(
+        let note = message!(
             "In {file} {says}: the best fit of the model with friction and offsets of its drives is off by {} as it is, and \
-             would be off by {} then. Check `gravity` in the model file, and which way up the machine is mounted; something \
+             would be off by {} then. Check {}, and which way up the machine is mounted; something \
              that more than balances its weight looks alike.",
             percent(Some(before)),
-            percent(Some(after))
+            percent(Some(after)),
+            Remedy::edit("gravity")
         );
         AuditFinding::suspicion(GRAVITY, vec!["base".to_owned()], says, file, note)
     })

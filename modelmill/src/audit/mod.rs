@@ -7,6 +7,8 @@ mod gravity;
 mod nominal_forces;
 mod rows;
 
+use modelmill_boundary::message;
+use modelmill_boundary::text::{Message, OptionName, OptionSetting, Remedy};
 use modelmill_codegen::{ModelEvaluator, MotionStates};
 use modelmill_identify::diagnose::Disturbance;
 use modelmill_identify::{ChannelRegressor, ForceAudit, RecordingNote, WiringFault};
@@ -67,7 +69,7 @@ struct AuditFinding {
 
 impl AuditFinding {
     /// A suspicion of a kind in [`SUSPICIONS`], as a clause and as the whole note.
-    fn suspicion(kind: &str, at: Vec<String>, says: String, file: &str, note: String) -> Self {
+    fn suspicion(kind: &str, at: Vec<String>, says: String, file: &str, note: Message) -> Self {
         let fault = Disturbance {
             kind: kind.to_owned(),
             at,
@@ -107,6 +109,7 @@ fn findings(model: &Model, data: &RecordingSegment) -> Vec<AuditFinding> {
     // Forces that are late by a good part of a period look like those of another drive.
     if error > BEARABLE && with_delay.is_none_or(|left| left > BETTER * error) {
         let drives = model.drives();
+        let columns = Remedy::option(OptionName::Columns);
         if let Some((suspect, [before, after])) = as_it_is.find_wiring_fault(&measured)
             && after < BETTER * before
             // Nominal values know which drive it is.
@@ -135,12 +138,13 @@ fn findings(model: &Model, data: &RecordingSegment) -> Vec<AuditFinding> {
                     format!("the force of `{}` seems to have the wrong sign", drives[a]),
                 ),
             };
-            let note = format!(
+            let note = message!(
                 "In {} {says}: the best fit of the model is off by {} as the columns are, and by {} then. Check which column is \
-                 which (option `columns`).",
+                 which ({}).",
                 run.file,
                 percent(Some(before)),
-                percent(Some(after))
+                percent(Some(after)),
+                columns
             );
             let at = at.into_iter().map(|d| drives[d].clone()).collect();
             notes.push(AuditFinding::suspicion(kind, at, says, &run.file, note));
@@ -265,7 +269,7 @@ fn motion_findings(model: &Model, data: &RecordingSegment, samples: &[usize]) ->
         Some(now) => format!("is off by {}", percent(Some(now))),
         None => "does not exist, for the mechanism cannot reach such poses".to_owned(),
     };
-    let note = format!(
+    let note = message!(
         "In {file} {says}: {}. The best fit of the model {as_it_is} as the columns are, and would be off by {} then.",
         first.advice,
         percent(Some(*error))
@@ -282,12 +286,13 @@ struct ColumnHypothesis {
     /// What happened, as a clause.
     says: String,
     /// What to do about it.
-    advice: String,
+    advice: Message,
     change: Box<MotionChange<'static>>,
 }
 
 /// Angles in degrees, coordinates with the wrong sign, and pairs that are exchanged.
-fn hypotheses(model: &Model, maps_from_degrees: &str) -> Vec<ColumnHypothesis> {
+fn hypotheses(model: &Model, maps_from_degrees: &[OptionSetting]) -> Vec<ColumnHypothesis> {
+    let columns = Remedy::option(OptionName::Columns);
     let motions = model.motions();
     let mut hypotheses = Vec::new();
     let scaled = |coordinates: Vec<usize>, factor: f64| -> Box<MotionChange<'static>> {
@@ -307,7 +312,10 @@ fn hypotheses(model: &Model, maps_from_degrees: &str) -> Vec<ColumnHypothesis> {
             kind: UNITS,
             at: angles.iter().map(|i| motions[*i].0.clone()).collect(),
             says: "the angles seem to be in degrees".to_owned(),
-            advice: format!("they must be in rad, so say {maps_from_degrees}"),
+            advice: message!(
+                "they must be in rad, so say {}",
+                Remedy::options(maps_from_degrees.to_vec())
+            ),
             change: scaled(angles, 1.0_f64.to_radians()),
         });
     }
@@ -316,7 +324,7 @@ fn hypotheses(model: &Model, maps_from_degrees: &str) -> Vec<ColumnHypothesis> {
             kind: WRONG_SIGN,
             at: vec![name.clone()],
             says: format!("the coordinate `{name}` seems to have the wrong sign"),
-            advice: "check which way it counts (option `columns`)".to_owned(),
+            advice: message!("check which way it counts ({})", columns),
             change: scaled(vec![a], -1.0),
         });
     }
@@ -330,7 +338,7 @@ fn hypotheses(model: &Model, maps_from_degrees: &str) -> Vec<ColumnHypothesis> {
                         "the coordinates `{}` and `{}` seem to be exchanged",
                         motions[a].0, motions[b].0
                     ),
-                    advice: "check which column is which (option `columns`)".to_owned(),
+                    advice: message!("check which column is which ({})", columns),
                     change: Box::new(move |states| {
                         for order in states.iter_mut() {
                             order.swap(a, b);

@@ -2,6 +2,8 @@
 //! forces point the other way or are in another unit come out, with the option that mends it. A fit alone does not show
 //! either, since parameters may take any sign and size.
 
+use modelmill_boundary::message;
+use modelmill_boundary::text::{Message, OptionName, OptionSetting, Remedy};
 use modelmill_identify::RecordingNote;
 use modelmill_spec::{ModelDrive, Mechanism};
 
@@ -14,10 +16,6 @@ const TOLERANCE: f64 = 4.0;
 
 /// Forces that are so many times as small may be those of motors before their gears; nearer, nominal values may be wrong.
 const GEARS: std::ops::Range<f64> = 12.0..1000.0 / TOLERANCE;
-
-/// What else turns forces.
-const HANGS: &str = " Gravity that pulls the other way would turn them, too: check `gravity` in the model file, and which way \
-                     up the machine is mounted, first.";
 
 /// How a column of forces may have been misread.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -144,38 +142,39 @@ fn misreading_finding(
         [_] => ("force", "is", "it is"),
         _ => ("forces", "are", "they are"),
     };
-    let maps: Vec<String> = drives
-        .iter()
-        .map(|drive| {
-            let name = &drive.name;
-            match which {
-                ForceMisreading::Turned => format!("option `columns` = `{name}=-{name}`"),
-                ForceMisreading::TooSmall => {
-                    format!(
-                        "option `columns` = `{name}={name} [k{}]`",
-                        drive.kind.force_unit(&mechanism.coordinates)
-                    )
-                }
-                ForceMisreading::TooLarge => format!("option `columns` = `{name}={name}/1000`"),
+    let maps = drives.iter().map(|drive| {
+        let name = &drive.name;
+        let column = match which {
+            ForceMisreading::Turned => format!("{name}=-{name}"),
+            ForceMisreading::TooSmall => {
+                let unit = drive.kind.force_unit(&mechanism.coordinates);
+                format!("{name}={name} [k{unit}]")
             }
-        })
-        .collect();
+            Misread::TooLarge => format!("{name}={name}/1000"),
+        };
+        OptionSetting::new(OptionName::Columns, column)
+    });
     let (kind, what, if_so) = match which {
         ForceMisreading::Turned => (WRONG_SIGN, "of the opposite sign", "counted the other way"),
         ForceMisreading::TooSmall => (UNITS, "about 1000 times as small", "in kN or kN m"),
         ForceMisreading::TooLarge => (UNITS, "about 1000 times as large", "in mN or mN m"),
     };
     let names = names.join(", ");
-    let [or, besides] = if may_hang {
-        [", or gravity pulls the other way", HANGS]
+    let (or, besides) = if may_hang {
+        let besides = message!(
+            " Gravity that pulls the other way would turn them, too: check {}, and which way up the machine is mounted, first.",
+            Remedy::edit("gravity")
+        );
+        (", or gravity pulls the other way", besides)
     } else {
-        ["", ""]
+        ("", Message::new())
     };
     let says =
         format!("the {forces} of {names} {are} {what} beside what the nominal values give{or}");
-    let note = format!(
-        "Beside what the nominal values give, the {forces} of {names} in {file} {are} {what}; if {they_are} {if_so}, say {}.{besides}",
-        maps.join(" ")
+    let note = message!(
+        "Beside what the nominal values give, the {forces} of {names} in {file} {are} {what}; if {they_are} {if_so}, say {}.{}",
+        Remedy::options(maps),
+        besides
     );
     let at = drives.iter().map(|drive| drive.name.clone()).collect();
     AuditFinding::suspicion(kind, at, says, file, note)

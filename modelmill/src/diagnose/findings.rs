@@ -1,6 +1,8 @@
 //! What a diagnosis found, as values: the verdict, what is missing with estimates and doubles, the model with what was
 //! found beside the model as it is, and where errors live. Text, JSON and the page print them.
 
+use modelmill_boundary::message;
+use modelmill_boundary::text::{CommandName, Message, OptionName, Remedy};
 use modelmill_identify::diagnose::{ModelDiagnosis, LocatedEffect, EffectParameter, IdentifiedEffect, DiagnosisVerdict};
 use modelmill_identify::{FitParameter, RecordingNote, ErrorRegion, ParameterStatus};
 use modelmill_spec::Mechanics;
@@ -36,13 +38,15 @@ fn check_prediction(answer: &DiagnosisSolution, judged: ValidationMethod) -> Out
     if words::has_suspicion(diagnosis) {
         return Ok(());
     }
-    Err(Error::input(format!(
+    Err(Error::input(message!(
         "what is fitted to these recordings ({} of the forces is left there) misses the forces {} by {}, more than a model without \
          any force would: nothing can be said of what is missing. Record longer to fit to, with all drives moving far and fast \
-         (verb `excite`), or hold the parameters of an earlier run (option `parameters`)",
+         ({}), or hold the parameters of an earlier run ({})",
         percent(Some(last.fit)),
         judged.phrase(),
-        percent(Some(last.check))
+        percent(Some(last.check)),
+        Remedy::command(CommandName::Excite),
+        Remedy::option(OptionName::Parameters)
     )))
 }
 
@@ -87,7 +91,7 @@ pub struct DiagnosisFindings {
     /// The model as it is, along all recordings.
     pub before: ModelVersion,
     /// The model with what was found, or why there is none; the reason is empty where nothing was found.
-    pub after: Result<ModelVersion, String>,
+    pub after: Result<ModelVersion, Message>,
     /// What was found, as entries of a model file.
     pub entries: Vec<NewEffect>,
     /// The model file with them.
@@ -253,14 +257,14 @@ impl Model {
         let notes = self.caution().into_iter().chain(notes.cloned()).collect();
         let entries = added::entries(self, &answer);
         let (edited, after) = if entries.is_empty() {
-            (None, Err(String::new()))
+            (None, Err(Message::new()))
         } else {
             match added::add_entries(self, &entries) {
                 Ok(edited) => {
                     let after = version_with_effects(self, &edited, [fit, check], &data, held);
-                    (Some(edited), after.map_err(|error| error.to_string()))
+                    (Some(edited), after.map_err(|error| error.message()))
                 }
-                Err(error) => (None, Err(error.to_string())),
+                Err(error) => (None, Err(error.message())),
             }
         };
         let [fit_data, check_data] = data;

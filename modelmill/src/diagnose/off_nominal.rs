@@ -1,5 +1,7 @@
 //! Base parameters that come out off what the file says, and what that means where no body could have them.
 
+use modelmill_boundary::message;
+use modelmill_boundary::text::{CommandName, OptionName, Remedy};
 use modelmill_identify::{FitParameter, RecordingNote, ParameterStatus};
 use modelmill_runtime::Random;
 use modelmill_spec::Sign;
@@ -64,10 +66,11 @@ pub(super) fn reversed_sign_note(version: &ModelVersion, off: &[OffNominalParame
     let turned: Vec<&OffNominalParameter> = off.iter().filter(has_turned).collect();
     let first = turned.first()?;
     let names: Vec<&str> = turned.iter().map(|o| o.parameter.name.as_str()).collect();
-    Some(RecordingNote::warning(format!(
+    let unit = &first.parameter.unit;
+    Some(RecordingNote::warning(message!(
         "{} with a sign that no bodies near those of the file have (`{}` is {:.4} {unit}; the file's values give {:.4} {unit}). Look \
          first at the direction of gravity, the signs of lengths and angles, and which way drives and columns of the recording \
-         count (verb `check` draws the mechanism with option `picture`): what is said to be missing may only make up for that.",
+         count ({} draws the mechanism with {}): what is said to be missing may only make up for that.",
         if names.len() == 1 {
             format!("{} comes out", names[0])
         } else {
@@ -76,7 +79,8 @@ pub(super) fn reversed_sign_note(version: &ModelVersion, off: &[OffNominalParame
         first.parameter.expression,
         first.parameter.value,
         first.nominal,
-        unit = first.parameter.unit,
+        Remedy::command(CommandName::Check),
+        Remedy::option(OptionName::Picture),
     )))
 }
 

@@ -1,6 +1,8 @@
 //! Limits on the command line, which join those of the model file or replace them: `theta1=1.5:2.1`, `theta1_d=1.2`,
 //! `spindle_left=1500`, `R3m.x=0.2:0.7`, `singularity=0.3`.
 
+use modelmill_boundary::message;
+use modelmill_boundary::text::{OptionName, Remedy};
 use modelmill_identify::RecordingNote;
 use modelmill_identify::excite::ExcitationLimits;
 use modelmill_spec::{CoordinateIdx, DriveIdx, MotionLimits, PointIdx};
@@ -59,10 +61,10 @@ pub fn merged_limits(model: &Model, given: &[TrajectoryLimit]) -> Outcome<Motion
         let name = limit.name.as_str();
         if name == "singularity" {
             if !(limit.value > 0.0 && limit.value < 1.0) {
-                return Err(Error::options(
-                    "option `limits` = `singularity`: expected a share of the nominal pose's value between 0 and 1, such as 0.3"
-                        .to_owned(),
-                ));
+                return Err(Error::options(message!(
+                    "{}: expected a share of the nominal pose's value between 0 and 1, such as 0.3",
+                    Remedy::option(OptionName::Limits).with_value(name)
+                )));
             }
             limits.singularity = Some(limit.value);
         } else if let Some((point, axis)) = name.rsplit_once('.')
@@ -91,15 +93,17 @@ pub fn merged_limits(model: &Model, given: &[TrajectoryLimit]) -> Outcome<Motion
 fn set_coordinate_limit(model: &Model, limits: &mut MotionLimits, limit: &TrajectoryLimit) -> Outcome {
     let coordinates = &model.derivation.mechanism.coordinates;
     let name = limit.name.as_str();
+    let this = Remedy::option(OptionName::Limits).with_value(name);
     let (stem, derivative) = match (name.strip_suffix("_dd"), name.strip_suffix("_d")) {
         (Some(stem), _) => (stem, 2),
         (None, Some(stem)) => (stem, 1),
         _ => (name, 0),
     };
     let Some(i) = coordinates.iter().position(|c| c.name == stem) else {
-        return Err(Error::input(format!(
-            "option `limits` = `{name}`: {} has no such coordinate, drive or point; expected one of {}, with _d for a rate and _dd \
+        return Err(Error::input(message!(
+            "{}: {} has no such coordinate, drive or point; expected one of {}, with _d for a rate and _dd \
              for an acceleration, a drive such as {}, a point with .x, .y or .z, or `singularity`",
+            this,
             model.path,
             coordinates
                 .iter()
@@ -110,13 +114,15 @@ fn set_coordinate_limit(model: &Model, limits: &mut MotionLimits, limit: &Trajec
         )));
     };
     if coordinates[i].passive && derivative > 0 {
-        return Err(Error::input(format!(
-            "option `limits` = `{name}`: `{stem}` is passive, and only its position can be limited; limit rates of active coordinates"
+        return Err(Error::input(message!(
+            "{}: `{stem}` is passive, and only its position can be limited; limit rates of active coordinates",
+            this
         )));
     }
     if derivative > 0 && !(limit.ends[0] < 0.0 && limit.ends[1] > 0.0) {
-        return Err(Error::input(format!(
-            "option `limits` = `{name}`: the range must contain 0, for periodic motion turns back; one number means both directions"
+        return Err(Error::input(message!(
+            "{}: the range must contain 0, for periodic motion turns back; one number means both directions",
+            this
         )));
     }
     let position = limits.coordinates.iter().position(|(c, _)| c.0 == i);
@@ -182,11 +188,13 @@ pub(crate) fn with_recorded_ranges(
         ));
     }
     let note = (!says.is_empty()).then(|| {
-        RecordingNote::info(format!(
+        RecordingNote::info(message!(
             "{} has no limits for positions; motion keeps within what was recorded: {}, and within the largest rates and \
-             accelerations there. Option `limits`, or `[limits.coordinates]` in the model file, allows more.",
+             accelerations there; {}, or {}, allows more.",
             model.path,
-            says.join(", ")
+            says.join(", "),
+            Remedy::option(OptionName::Limits),
+            Remedy::edit("[limits.coordinates]")
         ))
     });
     if let Some(note) = &note {
@@ -215,12 +223,13 @@ pub fn active_limits(model: &Model, limits: &MotionLimits) -> Outcome<Vec<Excita
         .map(|i| coordinates[*i].name.as_str())
         .collect();
     if let Some(first) = missing.first() {
-        return Err(Error::input(format!(
+        return Err(Error::input(message!(
             "{}: the positions of {} have no limits, and excitation would grow without end; add \
              `[limits.coordinates]` with `{first} = {{ position = [low, high], rate = ..., acceleration = ... }}` to the \
-             model file, or give option `limits` = `{first}=LOW:HIGH`",
+             model file, or give {}",
             model.path,
-            missing.join(", ")
+            missing.join(", "),
+            Remedy::option(OptionName::Limits).with_value(format!("{first}=LOW:HIGH"))
         )));
     }
     Ok(active.iter().filter_map(of_one).collect())

@@ -6,6 +6,8 @@ pub mod plant;
 mod separate;
 mod separated;
 
+use modelmill_boundary::message;
+use modelmill_boundary::text::{OptionName, Remedy};
 use modelmill_identify::RecordingNote;
 use modelmill_identify::excite::{
     ExcitationTrajectory, ExcitationMotion, ExcitationPlant, excite, scaled_condition_number, max_progress_steps,
@@ -146,9 +148,11 @@ impl Model {
             Some(separating) => {
                 let apart = separating.distance_along(&motion, &separating.which);
                 Some(apart.ok_or_else(|| {
-                    Error::input(format!(
-                        "{}: nothing is left of the difference at {} samples per second; give a higher rate (option `rate`)",
-                        self.path, request.rate
+                    Error::input(message!(
+                        "{}: nothing is left of the difference at {} samples per second; give a higher rate ({})",
+                        self.path,
+                        request.rate,
+                        Remedy::option(OptionName::Rate)
                     ))
                 })?)
             }

@@ -3,6 +3,8 @@
 //!
 //! Columns come from where the diagnosis has them, so that kinds of one's own are told apart like all others.
 
+use modelmill_boundary::message;
+use modelmill_boundary::text::{OptionName, Remedy};
 use modelmill_identify::diagnose::{CandidateEffect, ColumnChoice, ForceColumn, LocatedEffect, SignConstraint, white_noise};
 use modelmill_identify::excite::separate::{SeparationProblem, SeparationMeasure, fit_coefficients, measure_separation};
 use modelmill_identify::excite::{ExcitationMotion, ExcitationPlant};
@@ -71,9 +73,12 @@ impl SeparationSetup {
             .collect();
         for (k, one) in all.iter().enumerate() {
             if all[..k].iter().any(|known| is_same_effect(known, one)) {
-                return Err(Error::input(format!(
-                    "{} is named twice; option `separate`, option `from` and option `beside` take different effects",
-                    words::effect(&one.effect)
+                return Err(Error::input(message!(
+                    "{} is named twice; {}, {} and {} take different effects",
+                    words::effect(&one.effect),
+                    Remedy::option(OptionName::Separate),
+                    Remedy::option(OptionName::From),
+                    Remedy::option(OptionName::Beside)
                 )));
             }
         }
@@ -447,7 +452,7 @@ fn recording(plant: &ModelPlant<'_>, motion: &ExcitationMotion) -> Option<Record
         },
         variance: None,
         weights: None,
-        maps_from_degrees: String::new(),
+        maps_from_degrees: Vec::new(),
         faults: Vec::new(),
         load: None,
     })

@@ -3,6 +3,8 @@
 
 use std::fmt::Write as _;
 
+use modelmill_boundary::message;
+use modelmill_boundary::text::{Message, OptionName, Remedy, RemedySpelling};
 use modelmill_identify::RecordingNote;
 use modelmill_identify::diagnose::LocatedEffect;
 use modelmill_identify::excite::{ExcitationLimits, Options, random_motions};
@@ -119,13 +121,13 @@ pub(crate) fn prepare_separation(
         }
         if all.iter().all(|one| one.figures.is_mimicked()) {
             let rival = words::effect(pair.rivals[k].effect());
-            note(RecordingNote::warning(format!(
+            note(RecordingNote::warning(message!(
                 "no motion tells {name} from {rival}, which can say all that it says beside the base parameters{}; it is left \
                  out",
                 if pair.common_effects().next().is_some() {
-                    " and the effects of option `beside`"
+                    message!(" and the effects of {}", Remedy::option(OptionName::Beside))
                 } else {
-                    ""
+                    Message::new()
                 }
             )));
             continue;
@@ -271,7 +273,12 @@ impl SeparationResult {
     }
 
     /// For people.
-    pub fn text(&self, evaluations: usize, random: usize) -> Vec<String> {
+    pub fn text(
+        &self,
+        evaluations: usize,
+        random: usize,
+        spelling: &dyn RemedySpelling,
+    ) -> Vec<String> {
         let pair = &self.task.pair;
         let mut lines = vec![format!("  tells {}", self.task.description())];
         let beside: Vec<LocatedEffect> = pair.common_effects().cloned().collect();
@@ -356,7 +363,7 @@ impl SeparationResult {
             "  {says}; {} were evaluated",
             count(evaluations, "trajectory", "trajectories")
         ));
-        lines.extend(self.remarks());
+        lines.extend(self.remarks(spelling));
         lines
     }
 
@@ -365,7 +372,7 @@ impl SeparationResult {
     }
 
     /// What the figures mean.
-    fn remarks(&self) -> Vec<String> {
+    fn remarks(&self, spelling: &dyn RemedySpelling) -> Vec<String> {
         let pair = &self.task.pair;
         let mut lines = indent_lines(&match (pair.noise(), self.periods()) {
             (Some(noise), Some(periods)) => format!(
@@ -378,7 +385,12 @@ impl SeparationResult {
                     "no more than one period".to_owned()
                 }
             ),
-            _ => "With option `noise` = `SIZE`, or option `data` = `RUN`, it says how many periods it takes.".to_owned(),
+            _ => message!(
+                "With {}, or {}, it says how many periods it takes.",
+                Remedy::option(OptionName::Noise).with_value("SIZE"),
+                Remedy::option(OptionName::Data).with_value("RUN")
+            )
+            .spell(spelling),
         });
         for k in &self.task.which {
             let rival = &pair.rivals[*k];

@@ -1,5 +1,7 @@
 //! Instruments for recordings: the motion that was asked for, or the same motion one period later.
 
+use modelmill_boundary::message;
+use modelmill_boundary::text::{OptionName, Remedy};
 use modelmill_identify::sample_place_word;
 
 use crate::error::{Error, Outcome};
@@ -29,10 +31,12 @@ pub(crate) fn instrument_segments(
         return Ok(Vec::new());
     }
     if options.weights == EquationWeights::Channels {
-        return Err(Error::options(
-            "option `instruments` goes with option `weights` = `none` or `variance`: weights from residuals would depend on the estimate that \
+        return Err(Error::options(message!(
+            "{} goes with {} or `variance`: weights from residuals would depend on the estimate that \
              the instruments are to mend",
-        ));
+            Remedy::option(OptionName::Instruments),
+            Remedy::option(OptionName::Weights).with_value("none")
+        )));
     }
     match instruments {
         Instruments::None => Ok(Vec::new()),
@@ -51,11 +55,13 @@ pub(crate) fn instrument_segments(
 /// Fails unless instruments have the same times as the recordings.
 fn check_same_times(data: &[RecordingSegment], instruments: &[RecordingSegment]) -> Outcome {
     if data.len() != instruments.len() {
-        return Err(Error::options(format!(
-            "option `instruments` gives {} for {} of option `data` (recordings count once for each stretch between gaps); give one for \
+        return Err(Error::options(message!(
+            "{} gives {} for {} of {} (recordings count once for each stretch between gaps); give one for \
              each, in the same order",
+            Remedy::option(OptionName::Instruments),
             instruments.len(),
-            data.len()
+            data.len(),
+            Remedy::option(OptionName::Data)
         )));
     }
     for (own, theirs) in data.iter().zip(instruments) {

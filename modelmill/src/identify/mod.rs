@@ -7,6 +7,8 @@ mod refine;
 pub mod regression;
 mod standstill;
 
+use modelmill_boundary::message;
+use modelmill_boundary::text::{OptionName, Remedy};
 use modelmill_identify::estimate::FEWEST_ROWS;
 use modelmill_identify::fit_parameters;
 use modelmill_identify::{
@@ -236,10 +238,12 @@ fn remarks(model: &Model, found: &RegressionEstimate, parameters: &[FitParameter
         .as_ref()
         .is_some_and(|weighting| !weighting.converged)
     {
-        notes.push(RecordingNote::warning(
+        notes.push(RecordingNote::warning(message!(
             "The weights have not settled: residuals depend on the weights from one solution to the next; leave out \
-             option `weights` or option `robust`.",
-        ));
+             {} or {}.",
+            Remedy::option(OptionName::Weights),
+            Remedy::option(OptionName::Robust)
+        )));
     }
     for direction in &solution.undetermined {
         let kept: Vec<String> = direction

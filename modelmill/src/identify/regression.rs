@@ -1,6 +1,8 @@
 //! Least squares over recordings: rows of the regressor are made block by block and kept only if
 //! they fit a modest memory; else they are made again for every pass.
 
+use modelmill_boundary::message;
+use modelmill_boundary::text::{Message, OptionName, Remedy};
 use modelmill_codegen::{ModelEvaluator, PoseFault, MotionStates};
 use modelmill_identify::estimate::{EstimateOptions, RowVisitor, RowWeighting, estimate, estimate_with_instruments};
 use modelmill_identify::{ParameterUncertainty, FilterError, LeastSquaresError, RegressionSolution, decimate_table};
@@ -171,10 +173,11 @@ fn check_forces_nonzero(data: &[RecordingSegment], runs: &[RegressionRows<'_>]) 
 }
 
 /// What is wrong with recordings whose forces are zero throughout.
-pub fn zero_force_message(files: &str) -> String {
-    format!(
+pub fn zero_force_message(files: &str) -> Message {
+    message!(
         "{files}: the measured forces are zero throughout, so that there is nothing to explain; record the forces of the \
-         drives, or name their columns with option `columns`"
+         drives, or name their columns with {}",
+        Remedy::option(OptionName::Columns)
     )
 }
 
@@ -210,11 +213,15 @@ impl<'a> RegressionRows<'a> {
                     .iter()
                     .map(|d| format!("`{}`", variances::column(d)))
                     .collect();
-                return Err(Error::input(format!(
-                    "{}: option `weights` = `variance` needs the variance of every drive's force, in the columns {}; name yours \
-                     with option `columns`, or use option `weights` = `channels`",
+                let weights = |value: &str| Remedy::option(OptionName::Weights).with_value(value);
+                return Err(Error::input(message!(
+                    "{}: {} needs the variance of every drive's force, in the columns {}; name yours \
+                     with {}, or use {}",
                     data.run.file,
-                    columns.join(", ")
+                    weights("variance"),
+                    columns.join(", "),
+                    Remedy::option(OptionName::Columns),
+                    weights("channels")
                 )));
             };
             Some(variances::factors(

@@ -1,6 +1,8 @@
 //! Equations at standstill: while a drive hardly moves its friction takes any value, and the sign of its rate is noise,
 //! so that they may be left out of a fit.
 
+use modelmill_boundary::message;
+use modelmill_boundary::text::{OptionName, Remedy};
 use modelmill_identify::RecordingNote;
 
 use crate::along::drive_rates;
@@ -45,18 +47,22 @@ pub(crate) fn exclude_standstill(model: &Model, data: &mut [RecordingSegment], p
             }
         }
     }
+    let standstill = Remedy::option(OptionName::Standstill);
     for (drive, out) in drives.iter().zip(out) {
         if out == of {
-            return Err(Error::input(format!(
-                "`{drive}` stands still in all recordings of the fit, so option `standstill` leaves nothing of it; \
-                 use a recording in which it moves, or leave option `standstill` out"
+            return Err(Error::input(message!(
+                "`{drive}` stands still in all recordings of the fit, so {} leaves nothing of it; \
+                 use a recording in which it moves, or leave {} out",
+                standstill,
+                standstill
             )));
         }
         if out > 0 {
-            data[0].note(model, RecordingNote::info(format!(
+            data[0].note(model, RecordingNote::info(message!(
                 "Of the {} of `{drive}` {out} are left out of the fit: it is slower there than {part} of its fastest \
-                 (option `standstill`). Error figures count them.",
+                 ({}). Error figures count them.",
                 count(of, "equation", "equations"),
+                standstill,
             )));
         }
     }

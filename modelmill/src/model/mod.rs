@@ -10,6 +10,8 @@ mod values;
 use std::path::Path;
 use std::sync::Arc;
 
+use modelmill_boundary::message;
+use modelmill_boundary::text::{CommandName, Remedy};
 use modelmill_codegen::review::base_expression;
 use modelmill_codegen::{BaseParameterEntry, ColumnDependency, Derivation, ParameterMonomial};
 use modelmill_identify::estimate::ParameterPrior;
@@ -113,10 +115,11 @@ impl Host {
         let found = derivation.identified_base();
         let said = derivation.mechanism.identified_base.len();
         if found.len() < said {
-            notes.push(RecordingNote::warning(format!(
+            notes.push(RecordingNote::warning(message!(
                 "{path}: {} of the {said} values of `identified.base` are of no base parameter of this model and left aside; \
-                 identify it again and let verb `adopt` write the values",
-                said - found.len()
+                 identify it again and let {} write the values",
+                said - found.len(),
+                Remedy::command(CommandName::Adopt)
             )));
         }
         let mut identified = vec![false; derivation.reduction.retained.len()];

@@ -4,19 +4,20 @@ use serde_json::{Value, json};
 
 use crate::compare::ModelComparison;
 use crate::error::{Error, Outcome};
-use crate::print::tables;
+use crate::print::{RemedySpelling, notes, tables};
 use crate::text::TerminalStyle;
 use crate::text::table::count;
 
 impl ModelComparison {
     /// Figures, regions and remarks as one JSON object; `parameters` says whose values they are: `nominal` or a file.
-    pub fn json(&self, parameters: &str) -> Outcome<Value> {
+    pub fn json(&self, parameters: &str, spelling: &dyn RemedySpelling) -> Outcome<Value> {
         let mut object = json!({ "model": self.model, "parameters": parameters });
-        let figures = serde_json::to_value(&self.figures).map_err(Error::input)?;
+        let figures = serde_json::to_value(&self.figures);
+        let figures = figures.map_err(|error| Error::input(error.to_string()))?;
         if let (Some(object), Some(figures)) = (object.as_object_mut(), figures.as_object()) {
             object.extend(figures.clone());
             object.insert("where".to_owned(), json!(self.places.regions));
-            object.insert("data".to_owned(), json!(self.notes));
+            object.insert("data".to_owned(), notes(&self.notes, spelling));
         }
         Ok(object)
     }

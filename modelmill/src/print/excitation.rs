@@ -5,6 +5,7 @@ use serde_json::{Map, Value, json};
 
 use crate::excite::plant::used_fraction;
 use crate::excite::{ExcitationResult, SeparationResult};
+use crate::print::RemedySpelling;
 use crate::text::TerminalStyle;
 use crate::text::table::{ColumnAlignment, count, number, significant, table};
 
@@ -61,7 +62,7 @@ impl ExcitationResult {
     }
 
     /// The same for people.
-    pub fn text(&self, style: TerminalStyle) -> String {
+    pub fn text(&self, style: TerminalStyle, spelling: &dyn RemedySpelling) -> String {
         let found = &self.found;
         let mut lines = vec![style.bold(&format!(
             "{}: {} of {} s",
@@ -70,7 +71,7 @@ impl ExcitationResult {
             self.options.period
         ))];
         if let Some(separated) = &self.separated {
-            lines.extend(separated.text(found.evaluations, found.feasible_starts));
+            lines.extend(separated.text(found.evaluations, found.feasible_starts, spelling));
         } else {
             lines.extend(self.conditions());
         }

@@ -5,7 +5,7 @@ use serde_json::{Map, Value, json};
 
 use super::laws;
 use crate::diagnose::{EffectEstimate, DiagnosisFindings, words};
-use crate::print::AdviceFormatter;
+use crate::print::{OptionName, Remedy, StepSpelling, notes};
 use crate::text::TerminalStyle;
 use crate::text::table::{ColumnAlignment, number, percent, significant, table};
 
@@ -14,7 +14,7 @@ const MOST_CANDIDATES: usize = 6;
 
 impl DiagnosisFindings {
     /// All that was found as one JSON object; `spelling` says how its reader asks for what it advises.
-    pub fn json(&self, spelling: &dyn AdviceFormatter) -> Value {
+    pub fn json(&self, spelling: &dyn StepSpelling) -> Value {
         let diagnosis = &self.diagnosis;
         let channels = self.channels();
         let model = &self.before.model;
@@ -27,8 +27,8 @@ impl DiagnosisFindings {
                     "estimates": estimates(&missing.estimates),
                     "probability": missing.probability,
                     "indistinguishable_from": missing.indistinguishable_from,
-                    "separate_by": missing.separating_experiment,
-                    "separate_command": separation.and_then(|asked| spelling.separate_effects(model, asked)),
+                    "separating_experiment": missing.separating_experiment,
+                    "separate_command": separation.and_then(|asked| spelling.spell_separation(model, asked)),
                 })
             })
             .collect();
@@ -94,7 +94,7 @@ impl DiagnosisFindings {
             "laws": laws::laws(&self.laws, model, spelling),
             "parameters_off_nominal": off,
             "unexplained": unexplained,
-            "data": self.notes,
+            "data": notes(&self.notes, spelling),
             "where": self.regions,
             "with_nominal_parameters": self.with_nominal.as_ref().map(|held| {
                 json!({
@@ -109,7 +109,7 @@ impl DiagnosisFindings {
     }
 
     /// The answer for people, line by line.
-    pub fn text(&self, style: TerminalStyle, spelling: &dyn AdviceFormatter) -> Vec<String> {
+    pub fn text(&self, style: TerminalStyle, spelling: &dyn StepSpelling) -> Vec<String> {
         let diagnosis = &self.diagnosis;
         let channels = self.channels();
         let verdict = words::verdict(diagnosis, channels, self.validation);
@@ -155,7 +155,7 @@ impl DiagnosisFindings {
         self.undecided_text(style, &mut lines);
         self.off_nominal_text(style, spelling, &mut lines);
         let mut next: Vec<String> = (self.entries_to_add().iter())
-            .map(|entry| spelling.add_effect(&self.before.model, entry))
+            .map(|entry| spelling.spell_effect(&self.before.model, entry))
             .collect();
         next.extend(self.further_action().map(str::to_owned));
         if !next.is_empty() {
@@ -167,7 +167,8 @@ impl DiagnosisFindings {
             && !says.is_empty()
         {
             lines.push(format!(
-                "  The model with what was found cannot be made: {says}"
+                "  The model with what was found cannot be made: {}",
+                says.spell(spelling)
             ));
         }
         lines
@@ -212,7 +213,7 @@ impl DiagnosisFindings {
     }
 
     /// What was found, with values and doubles.
-    fn missing_text(&self, style: TerminalStyle, spelling: &dyn AdviceFormatter, lines: &mut Vec<String>) {
+    fn missing_text(&self, style: TerminalStyle, spelling: &dyn StepSpelling, lines: &mut Vec<String>) {
         if self.missing.is_empty() {
             return;
         }
@@ -253,7 +254,7 @@ impl DiagnosisFindings {
                     lines.extend(wrapped.iter().map(|line| style.dim(&format!("    {line}"))));
                 }
                 if let Some(asked) = &found.separation
-                    && let Some(command) = spelling.separate_effects(&self.before.model, asked)
+                    && let Some(command) = spelling.spell_separation(&self.before.model, asked)
                 {
                     lines.push("    Motion that tells them apart is sought by".to_owned());
                     lines.push(format!("      {command}"));
@@ -317,7 +318,7 @@ impl DiagnosisFindings {
     }
 
     /// Parameters that differ from what the file says.
-    fn off_nominal_text(&self, style: TerminalStyle, spelling: &dyn AdviceFormatter, lines: &mut Vec<String>) {
+    fn off_nominal_text(&self, style: TerminalStyle, spelling: &dyn StepSpelling, lines: &mut Vec<String>) {
         if self.off_nominal.is_empty() {
             return;
         }
@@ -362,7 +363,8 @@ impl DiagnosisFindings {
                 .iter()
                 .map(|line| format!("  {line}")),
         );
-        lines.push(format!("  ({} tells more.)", spelling.fix_parameters()));
+        let fix_parameters = Remedy::option(OptionName::Held).spell(spelling);
+        lines.push(format!("  ({fix_parameters} tells more.)"));
     }
 }
 

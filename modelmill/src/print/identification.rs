@@ -6,15 +6,19 @@ use serde_json::{Value, json};
 use crate::error::{Error, Outcome};
 use crate::identify::Identification;
 use crate::model::Model;
-use crate::print::{estimation, tables};
+use crate::print::{RemedySpelling, estimation, notes, tables};
 use crate::text::TerminalStyle;
 use crate::text::table::{count, number};
 
 impl Identification {
     /// The fit with all figures as one JSON object, from which [`modelmill_identify::FitFile`] is read again.
-    pub fn json(&self, model: &Model) -> Outcome<Value> {
-        let mut value = serde_json::to_value(&self.fit).map_err(Error::input)?;
+    pub fn json(&self, model: &Model, spelling: &dyn RemedySpelling) -> Outcome<Value> {
+        let value = serde_json::to_value(&self.fit);
+        let mut value = value.map_err(|error| Error::input(error.to_string()))?;
         if let Some(object) = value.as_object_mut() {
+            if let Some(data) = object.get_mut("data") {
+                *data = notes(&self.fit.data, spelling);
+            }
             object.insert(
                 "nominal".to_owned(),
                 json!({ "fit": self.nominal_fit, "check": self.nominal_check }),
@@ -36,7 +40,7 @@ impl Identification {
     }
 
     /// The result for people.
-    pub fn text(&self, model: &Model, style: TerminalStyle) -> String {
+    pub fn text(&self, model: &Model, style: TerminalStyle, spelling: &dyn RemedySpelling) -> String {
         let fit = &self.fit;
         let estimator = estimation::text(model, &self.found, &model.parameter_infos());
         let identified = fit.parameters.iter().filter(|p| p.status != ParameterStatus::Known);
@@ -75,7 +79,7 @@ impl Identification {
         }
         lines.extend(tables::figures(&figures));
         lines.push(String::new());
-        lines.push(self.next_step());
+        lines.push(self.next_step().spell(spelling));
         lines.join("\n")
     }
 }

@@ -1,9 +1,11 @@
 //! Physical parameters as JSON and for people.
 
+use modelmill_boundary::message;
 use modelmill_identify::interpret::{PhysicalInterpretation, PhysicalSolution};
 use serde_json::{Map, Value, json};
 
 use crate::interpret::InterpretationResult;
+use crate::print::{OptionName, Remedy, RemedySpelling};
 use crate::text::TerminalStyle;
 use crate::text::table::{ColumnAlignment, count, number, significant, table};
 
@@ -59,7 +61,7 @@ impl InterpretationResult {
     }
 
     /// The same for people.
-    pub fn text(&self, style: TerminalStyle) -> String {
+    pub fn text(&self, style: TerminalStyle, spelling: &dyn RemedySpelling) -> String {
         let solutions = self.solutions();
         let unknowns = count(
             self.unknown.len(),
@@ -95,10 +97,11 @@ impl InterpretationResult {
             lines.push(format!("  {says}."));
         }
         if !self.directions().is_empty() {
-            lines.push(
-                "  Hold one parameter of each line at its nominal value, that is, leave it out of option `unknown`."
-                    .to_owned(),
+            let how = message!(
+                "  Hold one parameter of each line at its nominal value, that is, leave it out of {}.",
+                Remedy::option(OptionName::Unknown)
             );
+            lines.push(how.spell(spelling));
         }
         if let (PhysicalInterpretation::Exact { .. }, []) = (&self.found, solutions) {
             lines.push(

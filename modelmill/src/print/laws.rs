@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use super::findings::estimates;
 use crate::diagnose::{LawHypothesis, ProposedLaw, words};
 use crate::model::Model;
-use crate::print::AdviceFormatter;
+use crate::print::StepSpelling;
 use crate::text::TerminalStyle;
 use crate::text::table::{number, percent, significant};
 
@@ -17,7 +17,7 @@ pub(crate) const LIBRARY: &str = "laws.toml";
 pub(crate) const PATH_DEPENDENT_NOTE: &str = "It depends on the way there, which no formula of a library says; it is told so that it can be looked for.";
 
 /// Laws as scripts read them.
-pub(super) fn laws(laws: &[LawHypothesis], model: &Model, spelling: &dyn AdviceFormatter) -> Vec<Value> {
+pub(super) fn laws(laws: &[LawHypothesis], model: &Model, spelling: &dyn StepSpelling) -> Vec<Value> {
     let one = |hypothesis: &LawHypothesis| {
         let mut told = law(&hypothesis.law, model, spelling);
         let ties = hypothesis.near_ties.iter();
@@ -29,7 +29,7 @@ pub(super) fn laws(laws: &[LawHypothesis], model: &Model, spelling: &dyn AdviceF
     laws.iter().map(one).collect()
 }
 
-fn law(law: &ProposedLaw, model: &Model, spelling: &dyn AdviceFormatter) -> Value {
+fn law(law: &ProposedLaw, model: &Model, spelling: &dyn StepSpelling) -> Value {
     let entry = law.entry.as_ref();
     json!({
         "expression": law.expression,
@@ -40,7 +40,7 @@ fn law(law: &ProposedLaw, model: &Model, spelling: &dyn AdviceFormatter) -> Valu
         "entry": entry.map(|entry| &entry.text),
         "kind": entry.map(|entry| &entry.effect.kind),
         "places": entry.map(|entry| &entry.effect.at),
-        "command": entry.map(|entry| spelling.add_effect_from_library(model, &entry.effect, LIBRARY)),
+        "command": entry.map(|entry| spelling.spell_effect_of_library(model, &entry.effect, LIBRARY)),
     })
 }
 
@@ -49,7 +49,7 @@ pub(super) fn text(
     laws: &[LawHypothesis],
     model: &Model,
     style: TerminalStyle,
-    spelling: &dyn AdviceFormatter,
+    spelling: &dyn StepSpelling,
 ) -> Vec<String> {
     let mut lines = Vec::new();
     if laws.is_empty() {
@@ -79,7 +79,7 @@ pub(super) fn text(
                         .map(|line| style.dim(&format!("      {line}"))),
                 );
                 lines.push("    and with it".to_owned());
-                let command = spelling.add_effect_from_library(model, &entry.effect, LIBRARY);
+                let command = spelling.spell_effect_of_library(model, &entry.effect, LIBRARY);
                 lines.push(format!("      {command}"));
             }
             None => {

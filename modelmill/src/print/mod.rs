@@ -19,5 +19,16 @@ mod summary;
 pub mod tables;
 mod variants;
 
-pub use spelling::{AdviceItem, AdviceFormatter, PlainAdvice, format_advice};
+use modelmill_identify::Note;
+use serde_json::Value;
+
+pub use spelling::{
+    CommandName, LibrarySpelling, Message, OptionName, OptionSetting, Remedy, RemedySpelling,
+    StepSpelling,
+};
 pub use summary::{faults, refusal, warnings};
+
+/// Remarks as JSON.
+pub(crate) fn notes(notes: &[Note], spelling: &dyn RemedySpelling) -> Value {
+    notes.iter().map(|note| note.json(spelling)).collect()
+}

@@ -1,5 +1,7 @@
 //! What is best done after an identification.
 
+use modelmill_boundary::message;
+use modelmill_boundary::text::{CommandName, Message, OptionName, Remedy};
 use modelmill_identify::ParameterStatus;
 
 use crate::identify::{Identification, RefinementResult};
@@ -11,7 +13,7 @@ const MANY: f64 = 0.25;
 
 impl Identification {
     /// What to do next, in a sentence or two.
-    pub fn next_step(&self) -> String {
+    pub fn next_step(&self) -> Message {
         let parameters = &self.fit.parameters;
         let asked = parameters.iter().filter(|p| p.status != ParameterStatus::Known);
         let n = asked.clone().count();
@@ -24,21 +26,32 @@ impl Identification {
             .count();
         if vague > 0 && vague as f64 >= MANY * n as f64 {
             let physical = match self.found.refined {
-                RefinementResult::Physical(..) => "",
-                _ => {
-                    "; option `physical` lets bodies and nominal values say what the recording does not"
-                }
+                RefinementResult::Physical(..) => Message::new(),
+                _ => message!(
+                    "; {} lets bodies and nominal values say what the recording does not",
+                    Remedy::option(OptionName::Physical)
+                ),
             };
-            return format!(
+            return message!(
                 "Next: {vague} of {n} base parameters have deviations above half of their values, so the recording hardly \
-                 tells them{physical}; verb `excite` plans a motion that does."
+                 tells them{}; {} plans a motion that does.",
+                physical,
+                Remedy::command(CommandName::Excite)
             );
         }
+        let diagnose = Remedy::command(CommandName::Diagnose);
         if self.fit.check.is_none() {
-            return "Next: hold the fit against a recording that it has not seen, with option `check`; verb `diagnose` says \
-                    what the model lacks."
-                .to_owned();
+            return message!(
+                "Next: hold the fit against a recording that it has not seen, with {}; {} says \
+                 what the model lacks.",
+                Remedy::option(OptionName::Check),
+                diagnose
+            );
         }
-        "Next: verb `diagnose` says what the model lacks; verb `adopt` writes the fit into the model file.".to_owned()
+        message!(
+            "Next: {} says what the model lacks; {} writes the fit into the model file.",
+            diagnose,
+            Remedy::command(CommandName::Adopt)
+        )
     }
 }

@@ -3,13 +3,14 @@
 use modelmill_identify::ParameterInfo;
 use serde_json::{Value, json};
 
+use crate::print::RemedySpelling;
 use crate::runs::{ChangePoint, RunChange, RunsComparison, FittedValue, RunReport, SharedFit, RunValue, PhysicalChange};
 use crate::text::TerminalStyle;
 use crate::text::table::{ColumnAlignment, count, table, with_deviation};
 
 impl RunsComparison {
     /// All that was found as one JSON object.
-    pub fn json(&self) -> Value {
+    pub fn json(&self, spelling: &dyn RemedySpelling) -> Value {
         let later = || self.runs.iter().enumerate().skip(1);
         let moved =
             later().flat_map(|(k, run)| run.moved.iter().map(move |p| self.moved_parameter_json(k, *p)));
@@ -17,7 +18,8 @@ impl RunsComparison {
         let changes =
             all.flat_map(|(k, run)| run.changes.iter().map(move |one| change_json([0, k], one)));
         let unread = self.unread.iter();
-        let unread = unread.map(|one| json!({ "file": one.file, "says": one.error.to_string() }));
+        let unread =
+            unread.map(|one| json!({ "file": one.file, "says": one.error.spell(spelling) }));
         let runs = self.runs.iter().map(|run| {
             json!({
                 "file": run.file,
@@ -116,7 +118,7 @@ impl RunsComparison {
     }
 
     /// The same for people.
-    pub fn text(&self, style: TerminalStyle) -> String {
+    pub fn text(&self, style: TerminalStyle, spelling: &dyn RemedySpelling) -> String {
         let [first, later @ ..] = &self.runs[..] else {
             return String::new();
         };
@@ -147,7 +149,8 @@ impl RunsComparison {
         }
         for one in &self.unread {
             lines.push(String::new());
-            lines.push(format!("{} gave no answer: {}", one.file, one.error));
+            let why = one.error.spell(spelling);
+            lines.push(format!("{} gave no answer: {why}", one.file));
         }
         lines.push(String::new());
         lines.join("\n")

@@ -1,46 +1,38 @@
 //! How the reader of a text asks for what the text advises: on a command line, in a notebook, in Rust.
+//!
+//! [`RemedySpelling`] spells remedies inside of messages, [`StepSpelling`] whole steps with a model.
 
-use std::borrow::Cow;
 use std::fmt::Write as _;
 
-pub use modelmill_boundary::text::{AdviceItem, format_advice};
+pub use modelmill_boundary::text::{
+    CommandName, LibrarySpelling, Message, OptionName, OptionSetting, Remedy, RemedySpelling,
+};
 use modelmill_spec::edit::NewEffect;
 
 use crate::diagnose::SeparationProposal;
 use crate::model::Model;
 
-/// How the reader of a text asks for what it advises. The program spells its flags, a notebook its keywords.
-pub trait AdviceFormatter {
+/// How the reader of a text asks for the steps that a diagnosis advises. The program spells commands, a notebook calls.
+pub trait StepSpelling: RemedySpelling {
     /// Adds an effect to the file of a model.
-    fn add_effect(&self, model: &Model, effect: &NewEffect) -> String;
+    fn spell_effect(&self, model: &Model, effect: &NewEffect) -> String;
 
     /// Adds an effect of a kind that a further library holds, which is kept in a file of some name.
-    fn add_effect_from_library(&self, model: &Model, effect: &NewEffect, library: &str) -> String {
-        format!("{}, with the library {library}", self.add_effect(model, effect))
+    fn spell_effect_of_library(&self, model: &Model, effect: &NewEffect, library: &str) -> String {
+        let effect = self.spell_effect(model, effect);
+        format!("{effect}, with the library {library}")
     }
 
     /// Identifies a model once more from the same recordings.
-    fn identify(&self, model: &Model) -> String;
+    fn spell_identification(&self, model: &Model) -> String;
 
     /// Seeks motion along which effects differ; `None` where that cannot be asked for.
-    fn separate_effects(&self, model: &Model, separation: &SeparationProposal) -> Option<String>;
-
-    /// Holds all parameters at their nominal values in a diagnosis.
-    fn fix_parameters(&self) -> String;
-
-    /// A text of the library, which names options by their fields ("option `columns` = `q=angle`") and verbs by their
-    /// names ("verb `identify`"); [`spelled`] finds them.
-    fn format_text<'a>(&self, text: &'a str) -> Cow<'a, str> {
-        Cow::Borrowed(text)
-    }
+    fn spell_separation(&self, model: &Model, separation: &SeparationProposal) -> Option<String>;
 }
 
 /// Plain words, for whoever calls the library.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct PlainAdvice;
-
-impl AdviceFormatter for PlainAdvice {
-    fn add_effect(&self, model: &Model, effect: &NewEffect) -> String {
+impl StepSpelling for LibrarySpelling {
+    fn spell_effect(&self, model: &Model, effect: &NewEffect) -> String {
         let mut says = format!(
             "{}: add {} at {}",
             model.name,
@@ -57,11 +49,11 @@ impl AdviceFormatter for PlainAdvice {
         says
     }
 
-    fn identify(&self, model: &Model) -> String {
+    fn spell_identification(&self, model: &Model) -> String {
         format!("{}: identify again", model.name)
     }
 
-    fn separate_effects(&self, model: &Model, separation: &SeparationProposal) -> Option<String> {
+    fn spell_separation(&self, model: &Model, separation: &SeparationProposal) -> Option<String> {
         let effect = &separation.effect.effect;
         let rivals: Vec<&str> = separation.rivals.iter().map(|r| r.kind.as_str()).collect();
         Some(format!(
@@ -71,9 +63,5 @@ impl AdviceFormatter for PlainAdvice {
             effect.at.join(", "),
             rivals.join(", ")
         ))
-    }
-
-    fn fix_parameters(&self) -> String {
-        "`Question::held`".to_owned()
     }
 }

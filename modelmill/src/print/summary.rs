@@ -9,15 +9,16 @@ use modelmill_spec::{
 use serde_json::{Value, json};
 
 use crate::model::{ModelCheck, SampledRank, ModelSummary, ineffective_retained};
+use crate::print::RemedySpelling;
 use crate::text::TerminalStyle;
 use crate::text::table::count;
 
 impl ModelCheck {
     /// What the model holds as one JSON object, with all warnings.
-    pub fn json(&self) -> Value {
+    pub fn json(&self, spelling: &dyn RemedySpelling) -> Value {
         let model = &self.model;
         let loaded = &model.loaded;
-        let mut warnings = self::warnings(loaded);
+        let mut warnings = self::warnings(loaded, spelling);
         let in_vain = ineffective_retained(&model.derivation).into_iter();
         warnings.extend(in_vain.map(|(k, says)| {
             let span = loaded.retain.get(k);
@@ -57,19 +58,23 @@ pub fn refusal(says: &str, path: &str) -> Value {
 }
 
 /// What is wrong with a file that has no meaning, as one JSON object.
-pub fn faults(failure: &LoadFailure) -> Value {
+pub fn faults(failure: &LoadFailure, spelling: &dyn RemedySpelling) -> Value {
     json!({
         "valid": false,
-        "diagnostics": diagnostics(&failure.diagnostics, &failure.sources),
+        "diagnostics": diagnostics(&failure.diagnostics, &failure.sources, spelling),
     })
 }
 
 /// What may not be intended in a file that has a meaning, each as a JSON object.
-pub fn warnings(loaded: &LoadedModel) -> Vec<Value> {
-    diagnostics(&loaded.warnings, &loaded.sources)
+pub fn warnings(loaded: &LoadedModel, spelling: &dyn RemedySpelling) -> Vec<Value> {
+    diagnostics(&loaded.warnings, &loaded.sources, spelling)
 }
 
-fn diagnostics(found: &[Diagnostic], sources: &SourceFiles) -> Vec<Value> {
+fn diagnostics(
+    found: &[Diagnostic],
+    sources: &SourceFiles,
+    spelling: &dyn RemedySpelling,
+) -> Vec<Value> {
     found
         .iter()
         .map(|one| {
@@ -88,7 +93,7 @@ fn diagnostics(found: &[Diagnostic], sources: &SourceFiles) -> Vec<Value> {
                 "line": place.as_ref().map(|p| p.1),
                 "column": place.as_ref().map(|p| p.2),
                 "expected": one.label,
-                "help": one.help,
+                "help": one.help.iter().map(|help| help.spell(spelling)).collect::<Vec<_>>(),
             })
         })
         .collect()

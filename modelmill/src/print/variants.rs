@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use crate::print::tables;
+use crate::print::{RemedySpelling, notes, tables};
 use crate::text::TerminalStyle;
 use crate::text::table::{ColumnAlignment, count, number, percent, significant, table};
 use crate::variants::{LimitCrossing, DriveVariants, DriveEffort, LimitUse, TermShare, VariantComparison};
@@ -18,7 +18,7 @@ const LEAST_SHARE: f64 = 0.01;
 
 impl VariantComparison {
     /// All figures as one JSON object.
-    pub fn json(&self) -> Value {
+    pub fn json(&self, spelling: &dyn RemedySpelling) -> Value {
         let limits = self.limits.iter().map(|one| {
             let side = |m: usize| json!({ "range": one.ranges[m], "used": one.used[m] });
             json!({
@@ -35,7 +35,7 @@ impl VariantComparison {
             "drives": self.drives.iter().map(drive).collect::<Vec<_>>(),
             "limits": limits.collect::<Vec<_>>(),
             "errors": { "before": self.errors[0], "after": self.errors[1] },
-            "notes": self.notes,
+            "notes": notes(&self.notes, spelling),
         })
     }
 

@@ -10,6 +10,8 @@
 //! harmonics are tried in the same way: it averages over the periods what a low-pass lets through. Local polynomials are no
 //! candidates: at the same cut-off they leave as much as the low-pass, on all recordings that were looked at.
 
+use modelmill_boundary::message;
+use modelmill_boundary::text::{OptionName, Remedy};
 use modelmill_codegen::{ModelEvaluator, MotionStates};
 use modelmill_identify::{LowPass, RecordingNote, PreparationChoices, DECIMATION_PASSBAND, SignalRecording as Raw, PreparedRun};
 use nalgebra::{DMatrix, DVector};
@@ -194,13 +196,16 @@ impl SmootherSearch<'_> {
         } else {
             String::new()
         };
-        let says = format!(
+        let says = message!(
             "{} {}{every}, since that leaves least of the forces on held-out time: {} below {} Hz (geometric mean over the \
-             drives){others}; options `cutoff_hz`, `smoothing` and `decimate` say otherwise.",
+             drives){others}; {}, {} and {} say otherwise.",
             self.raw.file(),
             smoother.describe(),
             percent(Some(left.relative)),
             significant(band_hz, 3),
+            Remedy::option(OptionName::CutoffHz),
+            Remedy::option(OptionName::Smoothing),
+            Remedy::option(OptionName::Decimate),
         );
         Some((reading, RecordingNote::info(says)))
     }

@@ -1,6 +1,8 @@
 //! Which columns of a recording are ours: the user's `--map`, then what the model file says, applied to the names
 //! that the file has.
 
+use modelmill_boundary::message;
+use modelmill_boundary::text::{Message, OptionName, Remedy};
 use modelmill_identify::{ComputedColumn, NonFinitePolicy, ReadOptions};
 use modelmill_spec::{ColumnFault, ColumnSum, ColumnQuantity, read_column};
 
@@ -27,8 +29,9 @@ pub(crate) fn read_options(
             continue;
         };
         if args.columns[..k].iter().any(|(other, _)| other == ours) {
-            faults.push(Error::options(format!(
-                "option `columns` = `{ours}=...`: `{ours}` is mapped twice; give each name one mapping"
+            faults.push(Error::options(message!(
+                "{}: `{ours}` is mapped twice; give each name one mapping",
+                map(ours, "...")
             )));
             continue;
         }
@@ -39,15 +42,14 @@ pub(crate) fn read_options(
                 mapping.renames.push((ours.clone(), text.clone()));
             }
             Err(fault @ ColumnFault::Missing { .. }) => {
-                faults.push(Error::input(format!(
-                    "{file}: option `columns` = `{ours}={text}`: {fault} {}",
+                faults.push(Error::input(message!(
+                    "{file}: {}: {fault} {}",
+                    map(ours, text),
                     column_list_text(header)
                 )));
             }
             Err(fault) => {
-                faults.push(Error::options(format!(
-                    "option `columns` = `{ours}={text}`: {fault}"
-                )));
+                faults.push(Error::options(message!("{}: {fault}", map(ours, text))));
             }
         }
     }
@@ -65,10 +67,11 @@ pub(crate) fn read_options(
             Err(ColumnFault::Missing { .. })
                 if header.contains(ours) || is_optional(ours, quantity) => {}
             Err(fault) => {
-                faults.push(Error::input(format!(
+                faults.push(Error::input(message!(
                     "{file}: the model file takes `{ours}` from `{text}`, but {fault} {} \
-                     Map one onto it with option `columns` = `{ours}=THEIRS`",
-                    column_list_text(header)
+                     Map one onto it with {}",
+                    column_list_text(header),
+                    map(ours, "THEIRS")
                 )));
             }
         }
@@ -112,11 +115,11 @@ fn combined_error(mut faults: Vec<Error>) -> Option<Error> {
     let is_wrong_option = faults
         .iter()
         .any(|fault| matches!(fault, Error::Options(_)));
-    let lines: Vec<String> = faults.iter().map(|fault| format!("- {fault}")).collect();
-    let says = format!(
+    let lines = faults.iter().map(|fault| message!("- {}", fault.message()));
+    let says = message!(
         "{} mappings of columns are at fault:\n{}",
         faults.len(),
-        lines.join("\n")
+        Message::join(lines, "\n")
     );
     Some(if is_wrong_option {
         Error::options(says)
@@ -209,10 +212,16 @@ fn unknown_column_error(model: &Model, known: &[(String, ColumnQuantity)], ours:
         "is no name of this model"
     };
     let known: Vec<&str> = known.iter().map(|(name, _)| name.as_str()).collect();
-    Error::options(format!(
-        "option `columns` = `{ours}=...`: `{ours}` {why}; expected one of {}",
+    Error::options(message!(
+        "{}: `{ours}` {why}; expected one of {}",
+        map(ours, "..."),
         known.join(", ")
     ))
+}
+
+/// The option that maps a column of the recording onto one of ours.
+fn map(ours: &str, theirs: &str) -> Remedy {
+    Remedy::option(OptionName::Columns).with_value(format!("{ours}={theirs}"))
 }
 
 fn column_list_text(header: &[String]) -> String {

@@ -1,6 +1,8 @@
 //! What recordings hold of free bodies and of what nothing drives: quaternions whose sign may change from sample to sample,
 //! twists that are recorded or follow from the pose, and forces that are zero because nothing acts.
 
+use modelmill_boundary::message;
+use modelmill_boundary::text::{OptionName, Remedy};
 use modelmill_identify::{RecordingNote, StatePreparation, SignalRecording as Raw, PreparedRun};
 use modelmill_spec::{DriveKind, FreeBody, Kinematics, Mechanism, FrameStep, TwistAxes};
 
@@ -110,11 +112,12 @@ fn normalise_quaternions(raw: &mut Raw, names: [&str; 4]) -> Outcome {
         let length = here.iter().map(|x| x * x).sum::<f64>().sqrt();
         if (length - 1.0).abs() > UNIT {
             let line = raw.line(sample).unwrap_or(0);
-            return Err(Error::input(format!(
+            return Err(Error::input(message!(
                 "{}: the quaternion `{}` in line {line} has the length {length:.4}, and that of a unit quaternion is 1; check \
-                 which columns are its components (option `columns`)",
+                 which columns are its components ({})",
                 raw.file(),
-                names.join("`, `")
+                names.join("`, `"),
+                Remedy::option(OptionName::Columns)
             )));
         }
         let side: f64 = here.iter().zip(&last).map(|(a, b)| a * b).sum();
@@ -149,12 +152,13 @@ fn check_twist(mechanism: &Mechanism, body: &FreeBody, raw: &Raw) -> Outcome {
             continue;
         }
         let of = |suffix: &str| half.map(|i| format!("`{}{suffix}`", name(i))).join(", ");
-        return Err(Error::input(format!(
+        return Err(Error::input(message!(
             "{}: a free body's velocity and acceleration are recorded by all their components: expected {}, with {} or without \
-             (option `columns`), or none of them",
+             ({}), or none of them",
             raw.file(),
             of("_d"),
-            of("_dd")
+            of("_dd"),
+            Remedy::option(OptionName::Columns)
         )));
     }
     Ok(())

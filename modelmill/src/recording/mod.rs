@@ -13,6 +13,8 @@ use std::path::Path;
 use std::sync::Arc;
 
 use modelmill_boundary::files::MemoryFiles;
+use modelmill_boundary::message;
+use modelmill_boundary::text::{Message, OptionName, OptionSetting, Remedy};
 use modelmill_identify::diagnose::{Disturbance, EstimatedQuantity};
 use modelmill_identify::{RecordingNote, PositionFault, SignalRecording as Raw, RecordingFiles};
 
@@ -155,10 +157,9 @@ fn prepare(model: &Model, recording: &Raw, args: &RecordingOptions, delay: f64) 
     }
     let motions = model.motions();
     let angles = motions.iter().filter(|(_, is_angle)| *is_angle);
-    let maps: Vec<String> = angles
-        .map(|(name, _)| recording.degree_conversion_options(name))
+    let maps_from_degrees: Vec<OptionSetting> = angles
+        .flat_map(|(name, _)| recording.degree_conversion_options(name))
         .collect();
-    let maps_from_degrees = maps.join(" ");
     for run in &mut runs {
         if is_examined {
             let idle = run.zero_force_notes(&model.drives(), &model.undriven_rows());
@@ -235,23 +236,25 @@ fn position_fault(model: &Model, file: &str, fault: &PositionFault) -> Disturban
 /// Says that options of the filter do nothing where all derivatives are recorded.
 fn note_idle_options(data: &mut [RecordingSegment], args: &RecordingOptions) {
     let usual = StatePreparation::default();
-    let given: Vec<&str> = [
-        args.preparation.cutoff_hz.map(|_| "option `cutoff_hz`"),
-        (args.preparation.order != usual.order).then_some("option `order`"),
+    let given: Vec<Message> = [
+        args.preparation.cutoff_hz.map(|_| OptionName::CutoffHz),
+        (args.preparation.order != usual.order).then_some(OptionName::Order),
     ]
     .into_iter()
     .flatten()
+    .map(|name| Remedy::option(name).into())
     .collect();
     if given.is_empty() || data.iter().any(|one| one.run.prepared.cutoff_hz.is_some()) {
         return;
     }
     if let Some(one) = data.first_mut() {
         let does = if given.len() == 1 { "does" } else { "do" };
-        one.run.notes.push(RecordingNote::warning(format!(
+        one.run.notes.push(RecordingNote::warning(message!(
             "{} {does} nothing to {}: it holds all rates and accelerations, so none are made from positions; ask for \
-             that with option `source` = `positions`.",
-            given.join(" and "),
-            one.run.file
+             that with {}.",
+            Message::join(given, " and "),
+            one.run.file,
+            Remedy::option(OptionName::Source).with_value("positions")
         )));
     }
 }

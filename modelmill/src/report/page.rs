@@ -9,16 +9,16 @@ use modelmill_identify::diagnose::DiagnosisVerdict;
 use super::{DiagnosisFindings, curves, legend, ladder, maps, regions, spectrum, tables, words};
 use crate::compare::ErrorLocations;
 use crate::error::Outcome;
-use crate::print::{AdviceFormatter, laws as told};
+use crate::print::{StepSpelling, laws as told};
 use crate::text::svg::escape;
 use crate::text::table::percent;
 
 /// The page's text; `spelling` says how its reader asks for what it advises.
 ///
 /// Fails only when whoever watches stops it.
-pub fn page(findings: &DiagnosisFindings, spelling: &dyn AdviceFormatter) -> Outcome<String> {
-    let last = findings.final_version();
-    let equations = last.model.equations(PageFormat::Html)?.text;
+pub fn page(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) -> Outcome<String> {
+    let final_version = findings.final_version();
+    let equations = final_version.model.equations(PageFormat::Html)?.text;
     let name = &findings.before.model.name;
     let title = format!("{name}: what the model lacks");
     let mut page = pages::begin(&title);
@@ -131,7 +131,7 @@ fn ladder_section(findings: &DiagnosisFindings) -> String {
     )
 }
 
-fn missing_section(findings: &DiagnosisFindings, spelling: &dyn AdviceFormatter) -> String {
+fn missing_section(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) -> String {
     let mut html = effects(findings, spelling);
     if !findings.laws.is_empty() {
         html.push_str(&laws(findings, spelling));
@@ -140,7 +140,7 @@ fn missing_section(findings: &DiagnosisFindings, spelling: &dyn AdviceFormatter)
 }
 
 /// Laws that would explain what is left.
-fn laws(findings: &DiagnosisFindings, spelling: &dyn AdviceFormatter) -> String {
+fn laws(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) -> String {
     let model = &findings.before.model;
     let mut html = format!(
         "<h3>Which law would explain what is left</h3>\n<p>{}</p>\n",
@@ -164,7 +164,7 @@ fn laws(findings: &DiagnosisFindings, spelling: &dyn AdviceFormatter) -> String 
         }
         match &law.entry {
             Some(entry) => {
-                let command = spelling.add_effect_from_library(model, &entry.effect, told::LIBRARY);
+                let command = spelling.spell_effect_of_library(model, &entry.effect, told::LIBRARY);
                 let _ = writeln!(
                     html,
                     "<p>As a library, <code>{}</code>, and with it:</p>\n<pre class=\"commands\"><code>{}</code></pre>\n\
@@ -182,7 +182,7 @@ fn laws(findings: &DiagnosisFindings, spelling: &dyn AdviceFormatter) -> String 
     html
 }
 
-fn effects(findings: &DiagnosisFindings, spelling: &dyn AdviceFormatter) -> String {
+fn effects(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) -> String {
     if findings.entries_to_add().is_empty() {
         if let Some(says) = findings.further_action() {
             return format!("{}<p>{says}</p>\n", tables::effects(findings));
@@ -203,16 +203,16 @@ fn effects(findings: &DiagnosisFindings, spelling: &dyn AdviceFormatter) -> Stri
         let _ = writeln!(
             html,
             "<p class=\"alias\">The model with these effects could not be made: {}</p>",
-            escape(&spelling.format_text(says))
+            escape(&says.spell(spelling))
         );
     }
     let model = &findings.before.model;
     let mut commands: Vec<String> = findings
         .entries_to_add()
         .iter()
-        .map(|entry| spelling.add_effect(model, entry))
+        .map(|entry| spelling.spell_effect(model, entry))
         .collect();
-    commands.push(spelling.identify(model));
+    commands.push(spelling.spell_identification(model));
     let _ = writeln!(
         html,
         "<p>Add it to the model file, which keeps its comments, and identify again:</p>\n<pre class=\"commands\"><code>{}</code></pre>",

@@ -9,6 +9,7 @@ use super::draw::{PlotAxis, LEFT, SvgPicture, RIGHT, WIDTH, range, with_room};
 use super::page::end;
 use super::tables::{TableCell, table};
 use super::units::typographic_unit;
+use crate::print::RemedySpelling;
 use crate::runs::{RunChange, RunsComparison, FittedValue, SharedFit};
 use crate::text::svg::escape;
 use crate::text::table::{count, significant};
@@ -18,8 +19,8 @@ const HEIGHT: f64 = 170.0;
 /// How many standard deviations a bar reaches up and down.
 const BARS: f64 = 2.0;
 
-/// The page's text.
-pub fn runs_page(compared: &RunsComparison) -> String {
+/// The page's text, with advice in the words quantity whoever reads it.
+pub fn runs_page(compared: &RunsComparison, spelling: &dyn RemedySpelling) -> String {
     let title = format!("{}: what changed between runs", compared.model);
     let mut page = pages::begin(&title);
     page.push_str(&summary(compared));
@@ -39,7 +40,7 @@ pub fn runs_page(compared: &RunsComparison) -> String {
         "Base parameters over the runs",
         parameters(compared),
     ));
-    sections.push(("runs", "The runs", runs(compared)));
+    sections.push(("runs", "The runs", runs(compared, spelling)));
     for (id, title, html) in sections {
         let _ = write!(
             page,
@@ -290,7 +291,7 @@ pub fn parameter_history(
     )
 }
 
-fn runs(compared: &RunsComparison) -> String {
+fn runs(compared: &RunsComparison, spelling: &dyn RemedySpelling) -> String {
     let mut rows: Vec<Vec<TableCell>> = (compared.runs.iter().enumerate())
         .map(|(k, run)| {
             vec![
@@ -302,7 +303,7 @@ fn runs(compared: &RunsComparison) -> String {
         })
         .collect();
     rows.extend(compared.unread.iter().map(|one| {
-        let says = TableCell::text(&format!("gave no answer: {}", one.error));
+        let says = TableCell::text(&format!("gave no answer: {}", one.error.spell(spelling)));
         vec![TableCell::text(""), TableCell::text(&one.file), TableCell::text(""), says]
     }));
     table(

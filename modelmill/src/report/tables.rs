@@ -8,7 +8,7 @@ use modelmill_identify::{FitParameter, NoteSeverity, ParameterStatus};
 use super::draw::attribute;
 use super::units::{force_unit, typographic_unit};
 use super::{DiagnosisFindings, ModelVersion, words};
-use crate::print::AdviceFormatter;
+use crate::print::StepSpelling;
 use crate::text::svg::escape;
 use crate::text::table::{percent, significant};
 
@@ -335,7 +335,7 @@ pub(crate) fn parameters(version: &ModelVersion) -> String {
 }
 
 /// Recordings and what was done to them.
-pub(crate) fn data(findings: &DiagnosisFindings, spelling: &dyn AdviceFormatter) -> String {
+pub(crate) fn data(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) -> String {
     let rows: Vec<Vec<TableCell>> = findings
         .before
         .runs
@@ -378,7 +378,7 @@ pub(crate) fn data(findings: &DiagnosisFindings, spelling: &dyn AdviceFormatter)
         let _ = writeln!(
             html,
             "<li class=\"{class}\">{word}{}</li>",
-            escape(&spelling.format_text(&note.says))
+            escape(&note.says.spell(spelling))
         );
     }
     html.push_str("</ul>\n");

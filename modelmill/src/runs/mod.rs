@@ -16,6 +16,7 @@ mod sums;
 
 use std::borrow::Borrow;
 
+use modelmill_boundary::message;
 use modelmill_identify::changes::{SelectedChange, NormalEquations, RunPair, ChangeHypotheses, search_changes, within_run_spread};
 use modelmill_identify::diagnose::ForceColumn;
 use modelmill_identify::{RecordingNote, ParameterInfo};
@@ -214,12 +215,12 @@ fn too_few_runs_error(first: &str, unread: &[UnreadRun]) -> Error {
         [] => Error::options(format!(
             "{first} is the only recording; what changed is told between two or more, the first of which is how things were"
         )),
-        [one, ..] => Error::input(format!(
+        [one, ..] => Error::input(message!(
             "no recording but {first} gave an answer; {} of {} did not, as {}: {}",
             unread.len(),
             unread.len() + 1,
             one.file,
-            one.error
+            one.error.message()
         )),
     }
 }

@@ -1,6 +1,8 @@
 //! One fit of all runs in which base parameters are shared and what is named is each run's own, and the scales of measured forces
 //! from a load of known mass.
 
+use modelmill_boundary::message;
+use modelmill_boundary::text::{OptionName, Remedy};
 use modelmill_identify::ParameterInfo;
 use modelmill_identify::changes::{JointFit, JointRun, JointValues, fit_jointly};
 
@@ -240,9 +242,10 @@ impl<'a> SharedFitBuilder<'a> {
             .collect();
         match found[..] {
             [one] => Ok(one),
-            _ => Err(Error::options(format!(
-                "`{}` of option `loads` is the name of {} of the runs that were read; give the end of one file's name: {}",
+            _ => Err(Error::options(message!(
+                "`{}` of {} is the name of {} of the runs that were read; give the end of one file's name: {}",
                 load.run,
+                Remedy::option(OptionName::Loads),
                 if found.is_empty() { "none" } else { "several" },
                 self.runs
                     .iter()

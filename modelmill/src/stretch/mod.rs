@@ -3,6 +3,8 @@
 
 pub mod variances;
 
+use modelmill_boundary::message;
+use modelmill_boundary::text::{OptionName, OptionSetting, Remedy};
 use modelmill_codegen::{PoseFault, PoseReason, MotionStates};
 use modelmill_identify::decimate_time;
 use modelmill_identify::diagnose::Disturbance;
@@ -27,7 +29,7 @@ pub struct RecordingSegment {
     /// What the drives carry, `[drive][sample]`, for effects that depend on it; the measured forces if there are none.
     pub load: Option<Vec<Vec<f64>>>,
     /// The options that would read all angles in degrees; empty where no file stands behind.
-    pub maps_from_degrees: String,
+    pub maps_from_degrees: Vec<OptionSetting>,
     /// What is wrong with the recording, as far as it was seen.
     pub faults: Vec<Disturbance>,
 }
@@ -40,7 +42,7 @@ impl From<PreparedRun> for RecordingSegment {
             variance: None,
             weights: None,
             load: None,
-            maps_from_degrees: String::new(),
+            maps_from_degrees: Vec::new(),
             faults: Vec::new(),
         }
     }
@@ -170,12 +172,13 @@ impl RecordingSegment {
         if effects.is_empty() || self.load.is_some() || self.run.force.is_some() {
             return Ok(());
         }
-        Err(Error::input(format!(
+        Err(Error::input(message!(
             "{}: {} depends on the load that the drives carry, but the recording lacks the measured force of {}; \
-             record it, or name its column with option `columns`",
+             record it, or name its column with {}",
             self.run.file,
             effects.join(", "),
-            self.run.missing_force.join(", ")
+            self.run.missing_force.join(", "),
+            Remedy::option(OptionName::Columns)
         )))
     }
 
@@ -191,6 +194,7 @@ impl RecordingSegment {
             .zip(&self.run.q)
             .map(|(name, q)| format!("{name} = {:.6}", q.get(sample).copied().unwrap_or(f64::NAN)))
             .collect();
+        let columns = Remedy::option(OptionName::Columns);
         let (what, todo) = match fault.reason {
             PoseReason::NotFinite { input } => {
                 return Error::input(format!(
@@ -200,22 +204,30 @@ impl RecordingSegment {
             }
             PoseReason::OutOfReach => (
                 "the loops cannot close at this pose",
-                "check the units (rad, m) and the signs of the positions, which column is which \
-                 coordinate (option `columns`), and the lengths in the model file",
+                message!(
+                    "check the units (rad, m) and the signs of the positions, which column is which \
+                     coordinate ({}), and the lengths in the model file",
+                    columns
+                ),
             ),
             PoseReason::Undefined => (
                 "a term of the model has no finite value at this state",
-                "look at the effects whose expressions hold quotients, roots or exponentials",
+                "look at the effects whose expressions hold quotients, roots or exponentials"
+                    .into(),
             ),
             PoseReason::Singular => (
                 "the mechanism is singular at this pose, so that forces are not determined",
-                "leave the poses around it out of the recording, and check which column is which coordinate (option `columns`)",
+                message!(
+                    "leave the poses around it out of the recording, and check which column is which coordinate ({})",
+                    columns
+                ),
             ),
         };
-        Error::input(format!(
-            "{}, {place} {line} (t = {time} s): {what} ({}); {todo}",
+        Error::input(message!(
+            "{}, {place} {line} (t = {time} s): {what} ({}); {}",
             self.run.file,
-            pose.join(", ")
+            pose.join(", "),
+            todo
         ))
     }
 }

@@ -1,6 +1,8 @@
 //! Variances of the measured forces, where a recording has them: columns `DRIVE_var`, as the mean of many periods leaves
 //! them beside it.
 
+use modelmill_boundary::message;
+use modelmill_boundary::text::{OptionName, Remedy};
 use modelmill_identify::{SignalRecording, PreparedRun, sample_place_word};
 
 use crate::error::{Error, Outcome};
@@ -29,10 +31,11 @@ pub fn recorded_variances(
         .map(|line| lines.binary_search(line).ok())
         .collect();
     let Some(places) = places else {
-        return Err(Error::input(format!(
+        return Err(Error::input(message!(
             "{}: the variances cannot be matched with the samples that are left after preparation; leave out \
-             option `weights` = `variance`",
-            run.file
+             {}",
+            run.file,
+            Remedy::option(OptionName::Weights).with_value("variance")
         )));
     };
     let column_of = |drive: &String| -> Outcome<Vec<f64>> {
@@ -59,13 +62,14 @@ pub fn factors(
         for (drive, values) in drives.iter().zip(variance) {
             let value = values[sample];
             if !(value > 0.0 && value.is_finite()) {
-                return Err(Error::input(format!(
-                    "{}, {} {}: {} = {value}, but a variance must be a positive number for option `weights` = `variance`; leave such \
+                return Err(Error::input(message!(
+                    "{}, {} {}: {} = {value}, but a variance must be a positive number for {}; leave such \
                      samples out of the recording",
                     run.file,
                     sample_place_word(&run.file),
                     run.lines.get(sample).copied().unwrap_or(0),
-                    column(drive)
+                    column(drive),
+                    Remedy::option(OptionName::Weights).with_value("variance")
                 )));
             }
             factors.push(value.sqrt().recip());

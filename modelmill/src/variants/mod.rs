@@ -6,6 +6,7 @@ mod effort;
 mod limits;
 mod terms;
 
+use modelmill_boundary::message;
 use modelmill_identify::{ErrorFigures, RecordingNote};
 
 use crate::along;
@@ -174,7 +175,11 @@ fn forces_of(model: &Model, states: &RecordingSegment) -> Outcome<Vec<Vec<f64>>>
     along::forces(model, states, &model.nominal).map_err(|error| match error {
         Error::Cancelled => error,
         // Which of both models cannot follow is not seen from the recording.
-        error => Error::input(format!("{} cannot follow the motion: {error}", model.path)),
+        error => Error::input(message!(
+            "{} cannot follow the motion: {}",
+            model.path,
+            error.message()
+        )),
     })
 }
 

@@ -1,6 +1,8 @@
 //! Effects that descriptions of robots know: friction, inertia of drives and springs of joints and tendons, and elements
 //! between two points.
 
+use modelmill_boundary::message;
+use modelmill_boundary::text::Message;
 use modelmill_spec::{DriveKind, ModelEffect, Mechanics, Mechanism, EffectPlace, PointIdx};
 
 use super::DescriptionFormat;
@@ -35,7 +37,7 @@ pub(super) struct PassiveEffects {
 pub(super) fn passive_effects(
     mechanism: &Mechanism,
     format: DescriptionFormat,
-    remarks: &mut Vec<String>,
+    remarks: &mut Vec<Message>,
 ) -> PassiveEffects {
     let mut found = PassiveEffects {
         joints: vec![PassiveProperties::default(); mechanism.coordinates.len()],
@@ -49,7 +51,7 @@ pub(super) fn passive_effects(
         }
         if !add_effect(mechanism, effect, format, &mut found) {
             let places: Vec<String> = effect.places.iter().map(|p| place_text(mechanism, *p)).collect();
-            remarks.push(format!(
+            remarks.push(message!(
                 "`{}` at {} is left out: {} has nothing like it",
                 effect.kind,
                 places.join(", "),

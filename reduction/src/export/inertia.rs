@@ -1,5 +1,7 @@
 //! What links carry: the inertia of parts, lumped masses and such effects as are bodies, added up.
 
+use modelmill_boundary::message;
+use modelmill_boundary::text::{CommandName, Message, OptionName, Remedy};
 use modelmill_spec::{ExactExpression, FrameIdx, PartInertia, LumpedMass, Mechanism, ModelPart, EffectPlace};
 use nalgebra::{Matrix3, Vector3};
 
@@ -160,7 +162,7 @@ fn from_part(
 
 /// Gives links that only slide, or turn about one direction, moments of inertia that a body can have: those that the model
 /// does not say are not felt.
-pub(super) fn complete_inertias(tree: &LinkTree, bodies: &mut [LinkInertia], remarks: &mut Vec<String>) {
+pub(super) fn complete_inertias(tree: &LinkTree, bodies: &mut [LinkInertia], remarks: &mut Vec<Message>) {
     let mut completed = Vec::new();
     for (l, link) in tree.links.iter().enumerate().skip(1) {
         let body = &mut bodies[l];
@@ -187,7 +189,7 @@ pub(super) fn complete_inertias(tree: &LinkTree, bodies: &mut [LinkInertia], rem
         }
     }
     if !completed.is_empty() {
-        remarks.push(format!(
+        remarks.push(message!(
             "moments of inertia that no motion feels are chosen so that a body can have them: of {}",
             completed.join(", ")
         ));
@@ -237,14 +239,16 @@ fn inertia_fault(body: &LinkInertia) -> Option<&'static str> {
 }
 
 /// Tells of links that no body can be: simulators refuse them, or move them as nothing moves.
-pub(super) fn report_impossible(tree: &LinkTree, bodies: &[LinkInertia], remarks: &mut Vec<String>) {
+pub(super) fn report_impossible(tree: &LinkTree, bodies: &[LinkInertia], remarks: &mut Vec<Message>) {
     for (link, body) in tree.links.iter().zip(bodies).skip(1) {
         let Some(fault) = inertia_fault(body).filter(|_| !body.is_zero()) else {
             continue;
         };
-        remarks.push(format!(
-            "`{}` {fault}, which no body does: simulators refuse it or go astray; identify with option `physical` and let verb `adopt` write that fit",
-            link.name
+        remarks.push(message!(
+            "`{}` {fault}, which no body does: simulators refuse it or go astray; identify with {} and let {} write that fit",
+            link.name,
+            Remedy::option(OptionName::Physical),
+            Remedy::command(CommandName::Adopt)
         ));
     }
 }

@@ -2,6 +2,8 @@
 
 use std::fmt::Write as _;
 
+use modelmill_boundary::message;
+use modelmill_boundary::text::Message;
 use modelmill_spec::{CoordinateIdx, ModelDrive, DriveKind, Mechanism, PointIdx};
 use nalgebra::UnitQuaternion;
 
@@ -20,7 +22,7 @@ pub(super) fn write(
     bodies: &[LinkInertia],
     friction: &PassiveEffects,
     at: &[f64],
-    remarks: &mut Vec<String>,
+    remarks: &mut Vec<Message>,
 ) -> String {
     let mut writer = MjcfWriter {
         mechanism,
@@ -43,7 +45,7 @@ struct MjcfWriter<'a> {
     friction: &'a PassiveEffects,
     /// Coordinates at which the bodies are drawn.
     at: &'a [f64],
-    remarks: &'a mut Vec<String>,
+    remarks: &'a mut Vec<Message>,
     text: String,
     depth: usize,
 }
@@ -162,7 +164,7 @@ impl MjcfWriter<'_> {
     fn inertial(&mut self, at: usize) -> String {
         let body = &self.bodies[at];
         if body.mass == 0.0 {
-            self.remarks.push(format!(
+            self.remarks.push(message!(
                 "`{}` has no mass, and MuJoCo moves no body without: it gets {NEGLIGIBLE_MASS:e} kg",
                 self.tree.links[at].name
             ));
@@ -227,7 +229,7 @@ impl MjcfWriter<'_> {
         self.remarks.push(
             "MuJoCo holds loops and coupled joints by soft constraints: forces of its inverse dynamics agree as far as these \
              are held (`solref`, `solimp`)"
-                .to_owned(),
+                .into(),
         );
         self.write_element("equality", "", |w| {
             for line in lines {

@@ -12,6 +12,8 @@ mod urdf;
 
 use std::fmt;
 
+use modelmill_boundary::message;
+use modelmill_boundary::text::{CommandName, Message, OptionName, Remedy};
 use modelmill_spec::{ExactExpression, Mechanism};
 
 /// A format of robot descriptions.
@@ -51,7 +53,7 @@ pub struct DescriptionExport {
     /// Its text.
     pub text: String,
     /// What the format does not say, or says otherwise.
-    pub remarks: Vec<String>,
+    pub remarks: Vec<Message>,
 }
 
 /// Why a model cannot be written down in a format.
@@ -85,11 +87,12 @@ pub fn export(mechanism: &Mechanism, format: DescriptionFormat) -> Result<Descri
     inertia::complete_inertias(&tree, &mut bodies, &mut remarks);
     inertia::report_impossible(&tree, &bodies, &mut remarks);
     if !mechanism.identified_base.is_empty() {
-        remarks.push(
+        remarks.push(message!(
             "the values under `[identified]` are those of base parameters, which say nothing of single bodies: bodies have \
-             their nominal values here; identify with option `physical` and let verb `adopt` write that fit for a description of the real machine"
-                .to_owned(),
-        );
+             their nominal values here; identify with {} and let {} write that fit for a description of the real machine",
+            Remedy::option(OptionName::Physical),
+            Remedy::command(CommandName::Adopt)
+        ));
     }
     let friction = friction::passive_effects(mechanism, format, &mut remarks);
     let text = match format {
@@ -109,7 +112,7 @@ struct FollowedCoordinate {
 }
 
 /// Couplings that formats have; those to several coordinates they have not, which is said.
-fn followed_coordinates(mechanism: &Mechanism, remarks: &mut Vec<String>) -> Vec<FollowedCoordinate> {
+fn followed_coordinates(mechanism: &Mechanism, remarks: &mut Vec<Message>) -> Vec<FollowedCoordinate> {
     let value = |exact: &ExactExpression| exact.evaluate(&|symbol| mechanism.symbol_nominal(symbol));
     let mut found = Vec::new();
     for coupling in &mechanism.couplings {
@@ -121,7 +124,7 @@ fn followed_coordinates(mechanism: &Mechanism, remarks: &mut Vec<String>) -> Vec
                 offset: value(&coupling.offset),
             });
         } else {
-            remarks.push(format!(
+            remarks.push(message!(
                 "`{}` follows several joints, which the format has no word for: it moves by itself",
                 mechanism.coordinates[coupling.coordinate.0].name
             ));

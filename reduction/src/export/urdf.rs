@@ -2,6 +2,8 @@
 
 use std::fmt::Write as _;
 
+use modelmill_boundary::message;
+use modelmill_boundary::text::Message;
 use modelmill_spec::{DriveKind, Mechanism};
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
@@ -18,7 +20,7 @@ pub(super) fn write(
     tree: &LinkTree,
     bodies: &[LinkInertia],
     friction: &PassiveEffects,
-    remarks: &mut Vec<String>,
+    remarks: &mut Vec<Message>,
 ) -> String {
     report_unsupported(mechanism, remarks);
     let mut text = format!(
@@ -34,14 +36,14 @@ pub(super) fn write(
 }
 
 /// What URDF has no words for.
-fn report_unsupported(mechanism: &Mechanism, remarks: &mut Vec<String>) {
+fn report_unsupported(mechanism: &Mechanism, remarks: &mut Vec<Message>) {
     if !mechanism.loops.is_empty() {
         let names: Vec<&str> = mechanism
             .loops
             .iter()
             .map(|one| one.name.as_str())
             .collect();
-        remarks.push(format!(
+        remarks.push(message!(
             "URDF has no loops: {} left open, and passive joints move by themselves; MJCF has loops",
             names.join(", ")
         ));
@@ -53,14 +55,14 @@ fn report_unsupported(mechanism: &Mechanism, remarks: &mut Vec<String>) {
         .map(|drive| drive.name.as_str())
         .collect();
     if !lines.is_empty() {
-        remarks.push(format!(
+        remarks.push(message!(
             "URDF has no drives between two points: {} left out; MJCF has tendons",
             lines.join(", ")
         ));
     }
     let gravity: [f64; 3] =
         std::array::from_fn(|k| mechanism.gravity[k].evaluate(&|s| mechanism.symbol_nominal(s)));
-    remarks.push(format!(
+    remarks.push(message!(
         "URDF does not say gravity: it is {} m/s^2 along x, y and z of `{}`",
         number_list(&gravity),
         mechanism.frames[0].name

@@ -28,6 +28,7 @@ pub use mjcf_include::expand_includes as expand_includes;
 use std::fmt;
 
 use modelmill_boundary::files::MemoryFiles;
+use modelmill_boundary::text::Message;
 use roxmltree::Document;
 
 /// A model file made from a robot description.
@@ -36,7 +37,7 @@ pub struct DescriptionImport {
     /// The text of the model file.
     pub model: String,
     /// What was left out, rounded or made up; one sentence each.
-    pub remarks: Vec<String>,
+    pub remarks: Vec<Message>,
     /// Joints of the description, with the coordinates of the model that move them.
     pub joints: Vec<ImportedJoint>,
 }

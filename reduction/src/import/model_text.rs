@@ -7,6 +7,8 @@ mod lines;
 
 use std::fmt::Write as _;
 
+use modelmill_boundary::message;
+use modelmill_boundary::text::{Message, OptionName, Remedy};
 use nalgebra::{Matrix3, Vector3};
 
 use super::chain::{FrameChain, ChainMotion, ChainFrame, CoincidentPair};
@@ -67,7 +69,7 @@ struct ModelTextBuilder<'a> {
     couplings: ImportCouplings,
     /// Names that are taken.
     names: Vec<String>,
-    remarks: Vec<String>,
+    remarks: Vec<Message>,
     constants: String,
     /// Constants that are angles, with their values.
     angles: Vec<(String, f64)>,
@@ -98,7 +100,7 @@ pub(crate) fn model_text(mut description: RobotDescription, options: &Options) -
     let mut build = ModelTextBuilder {
         options,
         names: vec!["base".to_owned(), "g".to_owned()],
-        remarks: std::mem::take(&mut description.remarks),
+        remarks: description.remarks.drain(..).map(Message::from).collect(),
         constants: String::new(),
         angles: Vec::new(),
         followers: String::new(),
@@ -229,9 +231,11 @@ impl ModelTextBuilder<'_> {
         let joint_text = if moved.is_some() {
             format!("{kind} = \"{text}\"{axis_text}")
         } else {
-            self.remarks.push(format!(
+            self.remarks.push(message!(
                 "line {}: `{}` is held at {} by a coupling",
-                joint.line, joint.name, follows.offset
+                joint.line,
+                joint.name,
+                follows.offset
             ));
             String::new()
         };
@@ -426,7 +430,7 @@ impl ModelTextBuilder<'_> {
                 offset: 0.0,
             });
         }
-        self.remarks.push(format!(
+        self.remarks.push(message!(
             "line {}: the ball joint `{}` has three angles here, about {axes} one after the other, which are singular where \
              the second is a right angle",
             joint.line, joint.name
@@ -436,7 +440,7 @@ impl ModelTextBuilder<'_> {
             || joint.stiffness != 0.0
             || joint.armature != 0.0
         {
-            self.remarks.push(format!(
+            self.remarks.push(message!(
                 "line {}: damping, friction, spring and armature of the ball joint `{}` are left out",
                 joint.line, joint.name
             ));
@@ -490,9 +494,10 @@ impl ModelTextBuilder<'_> {
             list.join(", ")
         );
         if joint.damping != 0.0 || joint.armature != 0.0 || joint.friction != 0.0 {
-            self.remarks.push(format!(
+            self.remarks.push(message!(
                 "line {}: damping, friction and armature of the free joint `{}` are left out",
-                joint.line, joint.name
+                joint.line,
+                joint.name
             ));
         }
         let frame = self.frame(own, None, *link, "", &text, Vec::new());
@@ -561,7 +566,7 @@ impl ModelTextBuilder<'_> {
         if moments.min() < -1e-15 * moments.amax()
             || 2.0 * moments.amax() > moments.sum() * (1.0 + 1e-6)
         {
-            self.remarks.push(format!(
+            self.remarks.push(message!(
                 "no body has the inertia of `{name}`: its principal moments are {}, {} and {} kg m^2",
                 significant_digits(moments[0], 4),
                 significant_digits(moments[1], 4),
@@ -569,7 +574,7 @@ impl ModelTextBuilder<'_> {
             ));
         }
         let Some(frame) = frame else {
-            self.remarks.push(format!(
+            self.remarks.push(message!(
                 "`{name}` stands still; its {} kg have no effect and are left out",
                 significant_digits(mass, 4)
             ));
@@ -651,7 +656,7 @@ impl ModelTextBuilder<'_> {
                 coordinate.nominal = coordinate.nominal.clamp(low, high);
             } else {
                 self.acts[variable].range = None;
-                self.remarks.push(format!(
+                self.remarks.push(message!(
                     "no pose was found at which the loops close within all limits: the range of `{}`, {low} to {high}, is left out",
                     coordinate.name
                 ));
@@ -660,19 +665,19 @@ impl ModelTextBuilder<'_> {
         if closed.is_moved {
             self.remarks.push(
                 "at the pose of the description the loops are open or singular; nominal values are those of another pose"
-                    .to_owned(),
+                    .into(),
             );
         }
         let [conditions, independent] = closed.conditions;
         if conditions > independent {
-            self.remarks.push(format!(
+            self.remarks.push(message!(
                 "of {conditions} conditions of its loops {independent} are independent at the poses that were tried; where the others \
                  are not recognised as following from these, a model keeps too many base parameters or counts poses as singular: \
                  hold some forces against another program before you rely on it"
             ));
         }
         if let Some(gap) = closed.gap {
-            self.remarks.push(format!(
+            self.remarks.push(message!(
                 "the digits of the description close its loops to {} of their size only; points were moved by that to meet at the \
                  nominal pose",
                 significant_digits(gap, 2)
@@ -753,15 +758,16 @@ impl ModelTextBuilder<'_> {
         if deviation < SAME_ANGLE && deviation > ROUNDING && n.abs() <= 48.0 {
             let short = significant_digits(deviation, 2);
             self.remarks.push(if self.options.round_angles {
-                format!(
+                message!(
                     "an angle of `{joint}`, {value} rad, is taken for {}; it differs by {short} rad",
                     twelfths_of_pi(n)
                 )
             } else {
-                format!(
+                message!(
                     "an angle of `{joint}`, {value} rad, stays as it is; {}, from which it differs by {short} rad, makes shorter \
-                     equations: option `round_angles` takes it for that",
-                    twelfths_of_pi(n)
+                     equations: {} takes it for that",
+                    twelfths_of_pi(n),
+                    Remedy::option(OptionName::RoundAngles)
                 )
             });
         }
@@ -824,7 +830,7 @@ impl ModelTextBuilder<'_> {
         let along_z = gravity.x == 0.0 && gravity.y == 0.0;
         if gravity.norm() == 0.0 {
             self.remarks
-                .push("the description says that there is no gravity".to_owned());
+                .push("the description says that there is no gravity".into());
             text.push_str("gravity = [0, 0, 0]\n\n[constants]\n");
         } else if along_z && gravity.z < 0.0 {
             let _ = write!(
@@ -969,7 +975,7 @@ impl ModelTextBuilder<'_> {
                     coordinate.name
                 );
             } else if coordinate.is_driven {
-                self.remarks.push(format!(
+                self.remarks.push(message!(
                     "`{}` is settled by loops and couplings; it has no drive of its own here",
                     coordinate.name
                 ));

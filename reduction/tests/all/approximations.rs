@@ -152,7 +152,7 @@ fn a_rig_without_a_plan() {
         coordinate = [{ name = "phi", joint = "shaft" }]
         drive = [{ name = "motor", joint = "shaft" }]
     "#);
-    let plan = default_plan(&rig).unwrap_or_else(|says| panic!("{says}"));
+    let plan = default_plan(&rig).unwrap_or_else(|says| panic!("{says:?}"));
     let reduction = reduce(plan.rig(&rig), &plan).unwrap_or_else(|failure| panic!("{failure}"));
     let mechanism = modelmill_spec::load("model.toml", &reduction.model, &MemoryFiles::default())
         .expect("a model")
@@ -186,7 +186,7 @@ fn a_rig_without_a_plan() {
         );
     }
 
-    let says = default_plan(&machine()).expect_err("a weld");
+    let says = default_plan(&machine()).expect_err("a weld").in_library_words();
     assert!(
         says.contains("`weld` is no revolute joint") && says.contains("option `plan`"),
         "{says}"

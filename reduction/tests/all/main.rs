@@ -9,3 +9,10 @@ mod spidermill;
 mod urdf;
 mod welds;
 mod zoo;
+
+use modelmill_boundary::text::Message;
+
+/// Remarks in the words of the library, a line for each.
+fn lines(remarks: &[Message]) -> String {
+    Message::join(remarks.iter().cloned(), "\n").in_library_words()
+}

@@ -2,6 +2,8 @@
 
 use modelmill_reduction::{ImportOptions, import};
 
+use crate::lines;
+
 /// A bar on a hinge about y, and what stands inside.
 fn bar(name: &str, pos: &str, inside: &str) -> String {
     format!(
@@ -14,10 +16,7 @@ fn remarks(options: &str, bodies: &str, equality: &str) -> String {
     let text = format!(
         "<mujoco model=\"bars\">{options}<worldbody>{bodies}</worldbody><equality>{equality}</equality></mujoco>"
     );
-    import(&text, &ImportOptions::default())
-        .unwrap()
-        .remarks
-        .join("\n")
+    lines(&import(&text, &ImportOptions::default()).unwrap().remarks)
 }
 
 /// A four-bar linkage in a plane, closed by its fourth hinge: two conditions, which are independent; or by a last body that is
@@ -82,7 +81,7 @@ fn straight_tendons_are_drives_between_points() {
         model.contains("viscous_friction") && model.contains("drive_inertia"),
         "{model}"
     );
-    let remarks = imported.remarks.join("\n");
+    let remarks = lines(&imported.remarks);
     assert!(remarks.contains("stiffness of this tendon"), "{remarks}");
     assert!(!remarks.contains("damping"), "{remarks}");
     // A joint with a motor and a rope besides has more drives than freedoms.
@@ -98,7 +97,7 @@ fn straight_tendons_are_drives_between_points() {
 fn tendons_that_bend_are_said() {
     let bent = "><site site=\"top\"/><site site=\"side\"/><site site=\"tip\"/>";
     let imported = pulled(bent, "<motor tendon=\"rope\"/><motor joint=\"bar_turn\"/>").unwrap();
-    let remarks = imported.remarks.join("\n");
+    let remarks = lines(&imported.remarks);
     assert!(
         remarks.contains("no straight line between two sites"),
         "{remarks}"

@@ -4,6 +4,8 @@ use modelmill_boundary::files::MemoryFiles;
 use modelmill_codegen::{Derivation, ModelEvaluator, MotionStates, derive};
 use modelmill_reduction::{ImportOptions, DescriptionImport, import};
 
+use crate::lines;
+
 fn link(name: &str, mass: f64, at: &str) -> String {
     format!(
         "<link name='{name}'><inertial><origin xyz='{at}'/><mass value='{mass}'/>\
@@ -112,7 +114,7 @@ fn a_loop_is_cut_at_its_ball_joint_wherever_the_file_cuts_it() {
         &hung,
         &format!("closed_loop: [['foot', 'stand']]\ntype: ['3d']\n{drives}"),
     );
-    let said = welded.remarks.join("\n");
+    let said = lines(&welded.remarks);
     assert!(said.contains("the loop is cut at `x`, `y`, `z`"), "{said}");
     let [welded, hung] = [&welded, &hung].map(derived);
     assert_eq!(
@@ -239,7 +241,7 @@ fn joints_are_what_the_file_of_closures_says() {
         &rod_between("spherical"),
         &format!("{SEATED}color: ['red']\n"),
     );
-    let remarks = odd.expect("a model").remarks.join("\n");
+    let remarks = lines(&odd.expect("a model").remarks);
     assert!(remarks.contains("`color` is not read"), "{remarks}");
 }
 
@@ -268,7 +270,7 @@ fn fixed_joints_follow_nothing() {
     );
     let imported = imported.expect("a model");
     assert_eq!(imported.joints.len(), 1);
-    let remarks = imported.remarks.join("\n");
+    let remarks = lines(&imported.remarks);
     assert!(
         remarks.contains("`one` is fixed and follows nothing"),
         "{remarks}"

@@ -187,7 +187,8 @@ impl WorkbenchSession {
             significant(found.found.start_condition_number, 4),
             found.found.feasible_starts
         ));
-        told["notes"] = json!(found.notes);
+        let notes = found.notes.iter();
+        told["notes"] = notes.map(|note| note.json(&*self.commands)).collect();
         Ok(PlannedTrajectory {
             view: told,
             csv: found.csv(),

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use modelmill::compare::ModelComparison;
 use modelmill::diagnose::{DiagnosisFindings, FixedParameters, DiagnosisOptions, words};
-use modelmill::print::{AdviceFormatter, edit};
+use modelmill::print::{StepSpelling, edit};
 use modelmill::recording::{RecordingOptions, PreparedRecording};
 use modelmill::report::page;
 use modelmill::{Host, Model, along, bundled};
@@ -16,7 +16,7 @@ use modelmill_recordings::{PLAIN, BundledRuns, WITH_RODS};
 
 use crate::args::TourArgs;
 use crate::failure::{CommandFailure, CommandOutcome};
-use crate::flags::{CommandLineAdvice, quote_word};
+use crate::flags::{CommandLineSpelling, quote_word};
 use crate::output;
 use crate::terminal;
 
@@ -125,20 +125,26 @@ impl TourFolder {
     }
 
     /// How the command line asks for the same.
-    fn flags(&self, runs: &BundledRuns) -> CommandLineAdvice {
+    fn flags(&self, runs: &BundledRuns) -> CommandLineSpelling {
         let [fit, check] = [runs.fit.0, runs.check.0].map(|name| self.path(name));
-        CommandLineAdvice::new(&[fit], &[check], &RecordingOptions::default())
+        CommandLineSpelling::new(&[fit], &[check], &RecordingOptions::default())
     }
 
     /// Writes the model with what was found beside the one it came from; the commands for it, and the difference.
-    fn add(&self, findings: &DiagnosisFindings, flags: &CommandLineAdvice) -> CommandOutcome<Option<(Vec<String>, String)>> {
+    fn add(
+        &self,
+        findings: &DiagnosisFindings,
+        flags: &CommandLineSpelling,
+    ) -> CommandOutcome<Option<(Vec<String>, String)>> {
         let Some(edited) = &findings.edited else {
             return Ok(None);
         };
         self.write(EDITED, &edited.text)?;
         let model = &findings.before.model;
         let commands = findings.entries.iter();
-        let commands = commands.map(|entry| flags.add_effect(model, entry)).collect();
+        let commands = commands
+            .map(|entry| flags.spell_effect(model, entry))
+            .collect();
         let names = ["spidermill.toml", EDITED];
         let difference = edit::difference(model.text(), &edited.text, names);
         let coloured = edit::colour_diff(&difference, terminal::style());

@@ -7,6 +7,8 @@ mod essential;
 mod physical;
 mod prior;
 
+use modelmill_boundary::message;
+use modelmill_boundary::text::{OptionName, Remedy};
 use modelmill_identify::estimate::{DroppedParameter, WeightedEstimate, PhysicalParameters};
 
 use crate::error::{Error, Outcome};
@@ -62,11 +64,14 @@ pub(crate) fn refine(
 ) -> Outcome<RefinementResult> {
     let solution = &found.solution;
     if refinement != EstimateRefinement::None && solution.rows <= solution.rank {
-        return Err(Error::input(format!(
-            "{} for {}: no degree of freedom is left for the residuals, from which option `prior`, option `essential` \
-             and option `physical` learn what the recording is worth; use a longer recording",
+        return Err(Error::input(message!(
+            "{} for {}: no degree of freedom is left for the residuals, from which {}, {} \
+             and {} learn what the recording is worth; use a longer recording",
             count(solution.rows, "equation", "equations"),
-            count(solution.rank, "base parameter", "base parameters")
+            count(solution.rank, "base parameter", "base parameters"),
+            Remedy::option(OptionName::Prior),
+            Remedy::option(OptionName::Essential),
+            Remedy::option(OptionName::Physical)
         )));
     }
     match refinement {

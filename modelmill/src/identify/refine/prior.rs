@@ -1,5 +1,7 @@
 //! Nominal values as soft constraints.
 
+use modelmill_boundary::message;
+use modelmill_boundary::text::{OptionName, Remedy};
 use modelmill_identify::estimate::{WeightedEstimate, solve_with_prior};
 
 use super::RefinementResult;
@@ -18,15 +20,18 @@ pub(super) fn refine(
     let beliefs = model.beliefs(unknown, sigma);
     if beliefs.is_empty() {
         let parameters = &model.derivation.mechanism.parameters;
-        return Err(Error::input(format!(
-            "{}: option `prior` takes {} of each nominal value for its uncertainty, but the nominal values of {} are 0 or not \
-             given, which says nothing of their size; write others in [parameters] (`nominal = ...`), or leave option `prior` out",
+        let prior = Remedy::option(OptionName::Prior);
+        return Err(Error::input(message!(
+            "{}: {} takes {} of each nominal value for its uncertainty, but the nominal values of {} are 0 or not \
+             given, which says nothing of their size; write others in [parameters] (`nominal = ...`), or leave {} out",
             model.path,
+            prior,
             percent(Some(sigma)),
             match parameters.as_slice() {
                 [one] => format!("the only parameter `{}`", one.name),
                 all => format!("all {} parameters", all.len()),
-            }
+            },
+            prior
         )));
     }
     (found.solution, found.uncertainty) = solve_with_prior(

@@ -2,6 +2,8 @@
 
 use std::fmt::Write as _;
 
+use modelmill_boundary::message;
+
 use super::super::chain::FrameChain;
 use super::super::closing::LoopSolution;
 use super::super::description::StraightDrive;
@@ -109,9 +111,10 @@ impl ModelTextBuilder<'_> {
                 self.has_surplus = true;
                 kept.push(line);
             } else {
-                self.remarks.push(format!(
+                self.remarks.push(message!(
                     "line {}: `{}` pulls what other drives move already, and is left out",
-                    line.line, line.name
+                    line.line,
+                    line.name
                 ));
             }
         }
@@ -177,7 +180,7 @@ impl ModelTextBuilder<'_> {
                 ("drive_inertia", "Ia", line.armature),
             ] {
                 if value != 0.0 && self.has_surplus {
-                    self.remarks.push(format!(
+                    self.remarks.push(message!(
                         "{kind} of `{place}` is left out: there are more drives than freedoms"
                     ));
                 } else if value != 0.0 {
@@ -199,9 +202,8 @@ impl ModelTextBuilder<'_> {
         }
         if self.has_surplus && !forces.is_empty() {
             forces.clear();
-            self.remarks.push(
-                "limits of forces are left out: there are more drives than freedoms".to_owned(),
-            );
+            self.remarks
+                .push("limits of forces are left out: there are more drives than freedoms".into());
         }
     }
 }

@@ -1,0 +1,310 @@
+//! Messages: plain text with typed remedies in between, which each front end spells in its own words.
+//!
+//! The library names what helps by a value (an option, a command, an entry of the model file) and never by words that a program
+//! has to find in a finished sentence. So a program changes remedies only: names of files, columns and snippets of a user
+//! are plain text, whatever they hold.
+//!
+//! A message and a remedy have no `Display`. Who formats one into a text has to say in whose words, or makes a message of the
+//! whole by [`message!`](crate::message), which keeps remedies as they are.
+
+use std::cell::RefCell;
+use std::fmt::{self, Write as _};
+
+use super::remedy::{LibrarySpelling, Remedy, RemedySpelling};
+use crate::files::FileError;
+
+/// A text for people with typed remedies in it.
+///
+/// ```
+/// use modelmill_boundary::message;
+/// use modelmill_boundary::text::{LibrarySpelling, OptionName, Remedy};
+/// let file = "run.csv";
+/// let map = Remedy::option(OptionName::Columns).with_value("q=angle [deg]");
+/// let text = message!("{file}: check the unit: {}", map);
+/// assert_eq!(text.spell(&LibrarySpelling), "run.csv: check the unit: option `columns` = `q=angle [deg]`");
+/// ```
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Message {
+    /// Pieces in their order, no two texts side by side.
+    pieces: Vec<MessagePiece>,
+}
+
+/// A piece of a message.
+#[derive(Clone, Debug, PartialEq, Eq)]
+enum MessagePiece {
+    /// Words that stay as they are.
+    Text(String),
+    /// What each front end spells.
+    Remedy(Remedy),
+}
+
+impl Message {
+    /// A message without any text.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Whether there is nothing in it.
+    pub fn is_empty(&self) -> bool {
+        self.pieces.is_empty()
+    }
+
+    /// Appends plain text.
+    pub fn push_text(&mut self, text: &str) {
+        match self.pieces.last_mut() {
+            _ if text.is_empty() => {}
+            Some(MessagePiece::Text(last)) => last.push_str(text),
+            _ => self.pieces.push(MessagePiece::Text(text.to_owned())),
+        }
+    }
+
+    /// Appends a remedy.
+    pub fn push_remedy(&mut self, remedy: Remedy) {
+        self.pieces.push(MessagePiece::Remedy(remedy));
+    }
+
+    /// Appends a text, a remedy or another message.
+    pub fn push(&mut self, other: impl Into<Self>) {
+        for piece in other.into().pieces {
+            match piece {
+                MessagePiece::Text(text) => self.push_text(&text),
+                MessagePiece::Remedy(remedy) => self.push_remedy(remedy),
+            }
+        }
+    }
+
+    /// Messages one after the other, with a text between each two.
+    pub fn join(messages: impl IntoIterator<Item = Self>, between: &str) -> Self {
+        let mut all = Self::new();
+        for (k, message) in messages.into_iter().enumerate() {
+            if k > 0 {
+                all.push_text(between);
+            }
+            all.push(message);
+        }
+        all
+    }
+
+    /// The text in the words of whoever reads it.
+    pub fn spell(&self, spelling: &dyn RemedySpelling) -> String {
+        let mut text = String::new();
+        for piece in &self.pieces {
+            match piece {
+                MessagePiece::Text(words) => text.push_str(words),
+                MessagePiece::Remedy(remedy) => text.push_str(&remedy.spell(spelling)),
+            }
+        }
+        text
+    }
+
+    /// The text in the words of the library, for those who call it.
+    pub fn in_library_words(&self) -> String {
+        self.spell(&LibrarySpelling)
+    }
+}
+
+impl From<String> for Message {
+    fn from(text: String) -> Self {
+        let mut message = Self::new();
+        message.push_text(&text);
+        message
+    }
+}
+
+impl From<&str> for Message {
+    fn from(text: &str) -> Self {
+        text.to_owned().into()
+    }
+}
+
+impl From<&String> for Message {
+    fn from(text: &String) -> Self {
+        text.clone().into()
+    }
+}
+
+impl From<FileError> for Message {
+    fn from(error: FileError) -> Self {
+        error.to_string().into()
+    }
+}
+
+impl From<Remedy> for Message {
+    fn from(remedy: Remedy) -> Self {
+        Self {
+            pieces: vec![MessagePiece::Remedy(remedy)],
+        }
+    }
+}
+
+/// Makes a [`Message`](crate::text::Message) as `format!` makes a text. Arguments behind the text may be messages and remedies,
+/// which keep what they are; all else, also what stands inside of braces, is plain text.
+#[macro_export]
+macro_rules! message {
+    ($format:literal $(, $argument:expr)* $(,)?) => {{
+        let sink = $crate::text::MessageSink::default();
+        sink.write(format_args!($format $(, $crate::text::MessageSlot::new(&sink, &$argument))*));
+        sink.into_message()
+    }};
+}
+
+/// Collects a message while its text is formatted; for [`message!`](crate::message).
+#[doc(hidden)]
+#[derive(Debug, Default)]
+pub struct MessageSink {
+    message: RefCell<Message>,
+}
+
+impl MessageSink {
+    /// Formats a text whose slots put messages and remedies here in their turn.
+    ///
+    /// # Panics
+    ///
+    /// When a value refuses to be formatted, as `format!` does.
+    pub fn write(&self, arguments: fmt::Arguments<'_>) {
+        let written = TextEnd(self).write_fmt(arguments);
+        written.expect("a value that is formatted returns no error");
+    }
+
+    /// The message.
+    pub fn into_message(self) -> Message {
+        self.message.into_inner()
+    }
+}
+
+/// Where plain text goes that is formatted.
+struct TextEnd<'a>(&'a MessageSink);
+
+impl fmt::Write for TextEnd<'_> {
+    fn write_str(&mut self, text: &str) -> fmt::Result {
+        self.0.message.borrow_mut().push_text(text);
+        Ok(())
+    }
+}
+
+/// An argument of [`message!`](crate::message) in its place.
+#[doc(hidden)]
+pub struct MessageSlot<'a, T: ?Sized> {
+    sink: &'a MessageSink,
+    argument: &'a T,
+}
+
+impl<'a, T: ?Sized> MessageSlot<'a, T> {
+    /// A slot of the message that goes into a sink.
+    pub fn new(sink: &'a MessageSink, argument: &'a T) -> Self {
+        Self { sink, argument }
+    }
+}
+
+impl<T: MessageArgument + ?Sized> fmt::Display for MessageSlot<'_, T> {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.argument.write(self.sink, formatter)
+    }
+}
+
+impl<T: fmt::Debug + ?Sized> fmt::Debug for MessageSlot<'_, T> {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.argument.fmt(formatter)
+    }
+}
+
+/// What may stand behind the text of [`message!`](crate::message).
+#[doc(hidden)]
+pub trait MessageArgument {
+    /// Puts the argument into the sink, text by way of the formatter.
+    fn write(&self, sink: &MessageSink, formatter: &mut fmt::Formatter<'_>) -> fmt::Result;
+}
+
+impl<T: fmt::Display + ?Sized> MessageArgument for T {
+    fn write(&self, _: &MessageSink, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.fmt(formatter)
+    }
+}
+
+impl MessageArgument for Message {
+    fn write(&self, sink: &MessageSink, _: &mut fmt::Formatter<'_>) -> fmt::Result {
+        sink.message.borrow_mut().push(self.clone());
+        Ok(())
+    }
+}
+
+impl MessageArgument for &Message {
+    fn write(&self, sink: &MessageSink, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        (**self).write(sink, formatter)
+    }
+}
+
+impl MessageArgument for Remedy {
+    fn write(&self, sink: &MessageSink, _: &mut fmt::Formatter<'_>) -> fmt::Result {
+        sink.message.borrow_mut().push_remedy(self.clone());
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::remedy::{CommandName, OptionName, OptionSetting};
+    use super::*;
+
+    struct UpperCase;
+
+    impl RemedySpelling for UpperCase {
+        fn spell_options(&self, settings: &[OptionSetting]) -> String {
+            let one = |setting: &OptionSetting| {
+                let value = setting.value.as_deref().map(|value| format!("({value})"));
+                setting.name.name().to_uppercase() + &value.unwrap_or_default()
+            };
+            settings.iter().map(one).collect::<Vec<_>>().join("+")
+        }
+
+        fn spell_command(&self, command: CommandName) -> String {
+            format!("<{}>", command.name())
+        }
+    }
+
+    #[test]
+    fn remedies_are_spelled_and_the_rest_stays() {
+        let file = "verb `identify`, option `columns`.toml";
+        let between = Remedy::option(OptionName::Between).with_value("1,2");
+        let identify = Remedy::command(CommandName::Identify);
+        let message = message!(
+            "{file}: give {} with {}, {:.2} of {:?}",
+            identify,
+            between,
+            0.125,
+            "option `prior`"
+        );
+        let expected =
+            format!("{file}: give <identify> with BETWEEN(1,2), 0.12 of \"option `prior`\"");
+        assert_eq!(message.spell(&UpperCase), expected);
+        assert_eq!(
+            message.in_library_words(),
+            format!(
+                "{file}: give verb `identify` with option `between` = `1,2`, 0.12 of \"option `prior`\""
+            )
+        );
+    }
+
+    #[test]
+    fn messages_keep_their_remedies_inside_of_others() {
+        let prior = Message::from(Remedy::option(OptionName::Prior));
+        let both = Message::join([prior.clone(), "nothing".into()], " or ");
+        let mut says = message!("{{}} {}: {}", &prior, both);
+        says.push(".");
+        assert_eq!(says.spell(&UpperCase), "{} PRIOR: PRIOR or nothing.");
+        assert!(!says.is_empty() && message!("").is_empty());
+        // Pieces of text side by side are one, so that equal messages are equal.
+        assert_eq!(message!("{}b", "a"), Message::from("ab"));
+    }
+
+    #[test]
+    fn options_side_by_side_are_one_remedy() {
+        let maps = ["q=a", "w=b"].map(|map| OptionSetting::new(OptionName::Columns, map));
+        let message = message!("say {}", Remedy::options(maps));
+        assert_eq!(message.spell(&UpperCase), "say COLUMNS(q=a)+COLUMNS(w=b)");
+        assert_eq!(
+            message.in_library_words(),
+            "say option `columns` = `q=a` option `columns` = `w=b`"
+        );
+    }
+}
