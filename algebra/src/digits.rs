@@ -217,7 +217,9 @@ impl BigFloat {
     pub fn cos_sin(&self) -> Option<(Self, Self)> {
         let (n, places) = self.argument_halvings()?;
         let one = BigInt::from(1) << places;
-        let x = self.scale_by_power_of_two(-i64::try_from(n).ok()?).to_fixed_point(places);
+        let x = self
+            .scale_by_power_of_two(-i64::try_from(n).ok()?)
+            .to_fixed_point(places);
         let square: BigInt = (&x * &x) >> places;
         // 1 - cos by its series, since doubling it loses nothing.
         let (mut term, mut versed) = (square.clone() >> 1_u32, BigInt::zero());
@@ -251,7 +253,9 @@ impl BigFloat {
             return None;
         }
         let (n, places) = self.argument_halvings()?;
-        let x = self.scale_by_power_of_two(-i64::try_from(n).ok()?).to_fixed_point(places);
+        let x = self
+            .scale_by_power_of_two(-i64::try_from(n).ok()?)
+            .to_fixed_point(places);
         let mut total = BigInt::zero();
         let (mut term, mut k) = (BigInt::from(1) << places, 1_u64);
         while !term.is_zero() {
@@ -319,7 +323,9 @@ impl Add for &BigFloat {
             (other, self)
         };
         // What lies below the last bit of the larger one is left out.
-        if high.binary_magnitude() - low.binary_magnitude() > i64::try_from(BITS + GUARD_BITS).expect("some bits") {
+        if high.binary_magnitude() - low.binary_magnitude()
+            > i64::try_from(BITS + GUARD_BITS).expect("some bits")
+        {
             return high.clone();
         }
         let shift = (high.exponent - low.exponent).unsigned_abs();

@@ -52,7 +52,9 @@ impl<const P: u64> RowEchelonForm<P> {
 
     /// Whether a column has shown any value but zero. Rows that say nothing new cannot be the first to show one.
     pub fn has_nonzero_value(&self, column: usize) -> bool {
-        self.rows.iter().any(|row| row[column] != FieldElement::ZERO)
+        self.rows
+            .iter()
+            .any(|row| row[column] != FieldElement::ZERO)
     }
 
     /// The entry of a column in the row of a pivot; `None` if that column holds no pivot.
@@ -62,7 +64,11 @@ impl<const P: u64> RowEchelonForm<P> {
     }
 }
 
-fn add_multiple<const P: u64>(row: &mut [FieldElement<P>], factor: FieldElement<P>, other: &[FieldElement<P>]) {
+fn add_multiple<const P: u64>(
+    row: &mut [FieldElement<P>],
+    factor: FieldElement<P>,
+    other: &[FieldElement<P>],
+) {
     if factor == FieldElement::ZERO {
         return;
     }

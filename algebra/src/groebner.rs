@@ -61,7 +61,10 @@ pub fn remainder(
 }
 
 /// The reduced Groebner basis, by ascending leading terms; `[1]` where there are no solutions.
-pub fn groebner_basis(equations: &[Polynomial], work: &mut GroebnerWork) -> Result<Vec<Polynomial>, GroebnerLimitExceeded> {
+pub fn groebner_basis(
+    equations: &[Polynomial],
+    work: &mut GroebnerWork,
+) -> Result<Vec<Polynomial>, GroebnerLimitExceeded> {
     let mut basis: Vec<Polynomial> = Vec::new();
     let mut pairs: Vec<(TermExponents, usize, usize)> = Vec::new();
     // Low degrees first: linear equations then act as a plain elimination.
@@ -138,12 +141,23 @@ fn is_redundant_pair(
 }
 
 /// Drops members whose leading terms others divide, and divides each by the rest.
-fn reduce_basis(mut basis: Vec<Polynomial>, work: &mut GroebnerWork) -> Result<Vec<Polynomial>, GroebnerLimitExceeded> {
-    basis.sort_by(|a, b| a.leading_term().map(|l| l.0).cmp(&b.leading_term().map(|l| l.0)));
+fn reduce_basis(
+    mut basis: Vec<Polynomial>,
+    work: &mut GroebnerWork,
+) -> Result<Vec<Polynomial>, GroebnerLimitExceeded> {
+    basis.sort_by(|a, b| {
+        a.leading_term()
+            .map(|l| l.0)
+            .cmp(&b.leading_term().map(|l| l.0))
+    });
     let mut kept: Vec<Polynomial> = Vec::new();
     for member in basis {
         let leading = member.leading_term().expect("members are not zero").0;
-        let divides = |g: &Polynomial| leading.quotient(g.leading_term().expect("not zero").0).is_some();
+        let divides = |g: &Polynomial| {
+            leading
+                .quotient(g.leading_term().expect("not zero").0)
+                .is_some()
+        };
         if !kept.iter().any(divides) {
             kept.push(member);
         }
@@ -160,9 +174,9 @@ fn reduce_basis(mut basis: Vec<Polynomial>, work: &mut GroebnerWork) -> Result<V
 
 /// Whether a basis says that there are no solutions, not even complex ones.
 pub fn has_no_solution(basis: &[Polynomial]) -> bool {
-    basis
-        .first()
-        .is_some_and(|p| p.degree() == 0 && p.leading_term().is_some_and(|(_, factor)| factor.is_one()))
+    basis.first().is_some_and(|p| {
+        p.degree() == 0 && p.leading_term().is_some_and(|(_, factor)| factor.is_one())
+    })
 }
 
 /// The terms that no leading term divides, by ascending order; `None` where they never end, because solutions form
@@ -172,7 +186,10 @@ pub fn standard_terms(
     n: usize,
     most: usize,
 ) -> Result<Option<Vec<TermExponents>>, GroebnerLimitExceeded> {
-    let leading: Vec<&TermExponents> = basis.iter().filter_map(|g| Some(g.leading_term()?.0)).collect();
+    let leading: Vec<&TermExponents> = basis
+        .iter()
+        .filter_map(|g| Some(g.leading_term()?.0))
+        .collect();
     let is_bounded = |i: usize| leading.iter().any(|term| term.degree() == term.0[i]);
     if !(0..n).all(is_bounded) {
         return Ok(None);

@@ -239,7 +239,10 @@ mod tests {
 
     #[test]
     fn decimals_are_taken_as_they_are_printed() {
-        assert_eq!(exact_decimal(1.13), BigRational::new(113.into(), 100.into()));
+        assert_eq!(
+            exact_decimal(1.13),
+            BigRational::new(113.into(), 100.into())
+        );
         assert_eq!(
             exact_decimal(-2.5e-7),
             BigRational::new((-1).into(), 4_000_000.into())
@@ -248,6 +251,9 @@ mod tests {
             exact_decimal(3e20),
             BigRational::from_integer(300_000_000_000_000_000_000_i128.into())
         );
-        assert_eq!(nearest_f64(&exact_decimal(0.1)).to_bits(), 0.1_f64.to_bits());
+        assert_eq!(
+            nearest_f64(&exact_decimal(0.1)).to_bits(),
+            0.1_f64.to_bits()
+        );
     }
 }

@@ -77,7 +77,10 @@ impl Rational {
             (common, rest) = (rest, common % rest);
         }
         let common = if denominator < 0 { -common } else { common };
-        Self(RationalRepr::Small(numerator / common, denominator / common))
+        Self(RationalRepr::Small(
+            numerator / common,
+            denominator / common,
+        ))
     }
 
     /// The same number as a fraction of big integers.

@@ -73,7 +73,8 @@ pub fn isolate_roots(polynomial: &[BigRational]) -> Vec<RationalInterval> {
     let mut open = vec![whole];
     while let Some(interval) = open.pop() {
         // Roots in (low, high].
-        let count = sign_variations(&chain, &interval.low) - sign_variations(&chain, &interval.high);
+        let count =
+            sign_variations(&chain, &interval.low) - sign_variations(&chain, &interval.high);
         match count {
             0 => {}
             1 => roots.push(interval),
@@ -146,7 +147,10 @@ fn primitive_part(mut polynomial: UnivariatePolynomial) -> UnivariatePolynomial 
 }
 
 /// Quotient and remainder.
-fn divide(polynomial: &[BigRational], by: &[BigRational]) -> (UnivariatePolynomial, UnivariatePolynomial) {
+fn divide(
+    polynomial: &[BigRational],
+    by: &[BigRational],
+) -> (UnivariatePolynomial, UnivariatePolynomial) {
     let mut rest = polynomial.to_vec();
     let leading = by.last().expect("no division by zero");
     let steps = (rest.len() + 1).saturating_sub(by.len());

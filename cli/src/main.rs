@@ -40,7 +40,9 @@ fn main() -> ExitCode {
             match &failure {
                 CommandFailure::Library(Error::Model(faults)) => {
                     let in_colour = terminal::is_stderr_coloured();
-                    terminal::print_to_stderr(faults.render_spelled(in_colour, &FlagSpelling).trim_end());
+                    terminal::print_to_stderr(
+                        faults.render_spelled(in_colour, &FlagSpelling).trim_end(),
+                    );
                 }
                 CommandFailure::Library(error) => terminal::error(&error.spell(&FlagSpelling)),
                 CommandFailure::Input(says) | CommandFailure::Usage(says) => terminal::error(says),

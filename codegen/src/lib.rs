@@ -18,18 +18,21 @@ mod tree;
 pub use derive::base::BaseParameterEntry;
 pub use derive::{Derivation, derive_columns};
 pub use emit::{
-    EmittedModule, EmittedFile, OutputForm, LANGUAGES, OutputLanguage, EmissionRequest, emit, emit_with_dynamics, module_name,
-    vectors_c,
+    EmissionRequest, EmittedFile, EmittedModule, LANGUAGES, OutputForm, OutputLanguage, emit,
+    emit_with_dynamics, module_name, vectors_c,
 };
 pub use error::DeriveError;
-pub use evaluate::{ModelEvaluator, PoseFault, PoseReason, MotionStates};
-pub use lower::{PoseGuard, ProgramOp, OperationCount, StraightLineProgram, ProgramStage, ValueId};
+pub use evaluate::{ModelEvaluator, MotionStates, PoseFault, PoseReason};
+pub use lower::{OperationCount, PoseGuard, ProgramOp, ProgramStage, StraightLineProgram, ValueId};
 pub use modelmill_algebra::field;
 pub use on_request::dynamics::DynamicsPrograms;
 pub use on_request::passes::PassCount;
 pub use on_request::reactions::{JointReaction, LoopReaction, ReactionPrograms};
-pub use programs::{LoopPrograms, PassivePosition, ModelPrograms};
-pub use reduce::{ColumnDependency, ReductionMethod, TrigonometricPolynomial, PowerProduct, RationalFunction, BaseReduction, FactorVariable};
+pub use programs::{LoopPrograms, ModelPrograms, PassivePosition};
+pub use reduce::{
+    BaseReduction, ColumnDependency, FactorVariable, PowerProduct, RationalFunction,
+    ReductionMethod, TrigonometricPolynomial,
+};
 pub use tree::expressions::ParameterMonomial;
 
 use modelmill_spec::Mechanism;

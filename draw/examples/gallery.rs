@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use modelmill_draw::{MechanismScene, DrawingStyle, svg};
+use modelmill_draw::{DrawingStyle, MechanismScene, svg};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let folder = std::env::args()

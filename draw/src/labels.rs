@@ -81,7 +81,11 @@ impl LabelLayout {
                 if is_outside {
                     continue;
                 }
-                let cost: f64 = self.taken.iter().map(|other| room.overlap_area(other)).sum();
+                let cost: f64 = self
+                    .taken
+                    .iter()
+                    .map(|other| room.overlap_area(other))
+                    .sum();
                 if best.as_ref().is_none_or(|(least, ..)| cost < *least) {
                     best = Some((cost, (at_x, at_y, anchor), room));
                 }

@@ -44,5 +44,5 @@ mod view;
 
 pub use loads::DriveArrow;
 pub use paint::{DrawingStyle, inline_svg, loaded_svg, svg};
-pub use scene::{JointMark, SceneMark, MechanismScene, MarkShape, JointActuation};
+pub use scene::{JointActuation, JointMark, MarkShape, MechanismScene, SceneMark};
 pub use view::ViewDirection;

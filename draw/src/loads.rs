@@ -1,7 +1,7 @@
 //! Forces of drives as arrows: along what slides or pushes, around what turns, as long as they are large, in the colour of how
 //! far a model is off there.
 
-use crate::scene::{JointMark, SceneMark, MarkShape};
+use crate::scene::{JointMark, MarkShape, SceneMark};
 use crate::symbols::polygon;
 
 /// The force or torque of a drive at one moment.
@@ -47,13 +47,15 @@ pub(crate) fn drive_arrow(
             // A positive force pushes the ends apart.
             straight_arrow(b, along, force) + &straight_arrow(a, along.map(|x| -x), force)
         }
-        MarkShape::Joint(joint) if joint.drive.as_deref() == Some(load.drive.as_str()) => joint_arrow(
-            joint,
-            at(&joint.at),
-            direction(&joint.axis),
-            towards(&joint.axis),
-            force,
-        ),
+        MarkShape::Joint(joint) if joint.drive.as_deref() == Some(load.drive.as_str()) => {
+            joint_arrow(
+                joint,
+                at(&joint.at),
+                direction(&joint.axis),
+                towards(&joint.axis),
+                force,
+            )
+        }
         _ => return String::new(),
     };
     let error = if load.error.is_finite() {
@@ -65,7 +67,13 @@ pub(crate) fn drive_arrow(
     format!("<g class=\"load e{shade:.0}\">{drawn}</g>\n")
 }
 
-fn joint_arrow(joint: &JointMark, at: [f64; 2], axis: [f64; 2], towards: f64, force: f64) -> String {
+fn joint_arrow(
+    joint: &JointMark,
+    at: [f64; 2],
+    axis: [f64; 2],
+    towards: f64,
+    force: f64,
+) -> String {
     if joint.is_prismatic && !joint.is_revolute {
         let length = axis[0].hypot(axis[1]);
         return straight_arrow(at, axis, force * length.max(0.2));
@@ -104,7 +112,12 @@ fn circular_arrow(at: [f64; 2], force: f64) -> String {
     if turn.abs() * ARC_RADIUS < SHORTEST_ARROW {
         return String::new();
     }
-    let place = |angle: f64| [at[0] + ARC_RADIUS * angle.cos(), at[1] - ARC_RADIUS * angle.sin()];
+    let place = |angle: f64| {
+        [
+            at[0] + ARC_RADIUS * angle.cos(),
+            at[1] - ARC_RADIUS * angle.sin(),
+        ]
+    };
     let (start, end) = (place(0.0), place(turn));
     let along = [-turn.signum() * turn.sin(), -turn.signum() * turn.cos()];
     format!(

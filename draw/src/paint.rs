@@ -5,9 +5,9 @@ use std::fmt::Write as _;
 use modelmill_boundary::text::html as escape;
 use nalgebra::Vector3;
 
-use crate::labels::{LabelLayout, LETTER_HEIGHT};
+use crate::labels::{LETTER_HEIGHT, LabelLayout};
 use crate::loads::{DriveArrow, drive_arrow};
-use crate::scene::{SceneMark, MechanismScene, MarkShape};
+use crate::scene::{MarkShape, MechanismScene, SceneMark};
 use crate::symbols::{self, SymbolPlace};
 use crate::view::ViewDirection;
 
@@ -54,7 +54,12 @@ pub fn svg(scenes: &[&MechanismScene], view: &ViewDirection, style: &DrawingStyl
 }
 
 /// The same with forces of drives as arrows over the last scene.
-pub fn loaded_svg(scenes: &[&MechanismScene], view: &ViewDirection, style: &DrawingStyle, loads: &[DriveArrow]) -> String {
+pub fn loaded_svg(
+    scenes: &[&MechanismScene],
+    view: &ViewDirection,
+    style: &DrawingStyle,
+    loads: &[DriveArrow],
+) -> String {
     let paper = DrawingSheet::new(scenes, view, style);
     let mut body = String::new();
     let [shadows @ .., scene] = scenes else {
@@ -80,7 +85,11 @@ pub fn loaded_svg(scenes: &[&MechanismScene], view: &ViewDirection, style: &Draw
 }
 
 /// The same as a part of a page of HTML, which needs no namespace.
-pub fn inline_svg(scenes: &[&MechanismScene], view: &ViewDirection, style: &DrawingStyle) -> String {
+pub fn inline_svg(
+    scenes: &[&MechanismScene],
+    view: &ViewDirection,
+    style: &DrawingStyle,
+) -> String {
     svg(scenes, view, style).replacen(NAMESPACE, "", 1)
 }
 
@@ -230,7 +239,8 @@ impl<'a> DrawingSheet<'a> {
                 symbols::rail(self.project_point(at), along)
             }
             MarkShape::Plate(corners) => {
-                let corners: Vec<[f64; 2]> = corners.iter().map(|at| self.project_point(at)).collect();
+                let corners: Vec<[f64; 2]> =
+                    corners.iter().map(|at| self.project_point(at)).collect();
                 symbols::polygon("plate", &corners)
             }
             MarkShape::Joint(joint) => {
@@ -239,14 +249,24 @@ impl<'a> DrawingSheet<'a> {
                 symbols::joint(joint, spot(&joint.at), axis, towards)
             }
             MarkShape::Closing(at) => symbols::loop_closure(spot(at)),
-            MarkShape::Drive(ends) => symbols::drive(ends.each_ref().map(|at| self.project_point(at))),
+            MarkShape::Drive(ends) => {
+                symbols::drive(ends.each_ref().map(|at| self.project_point(at)))
+            }
             MarkShape::Ground(at) => {
                 let up = scene.down.map_or_else(Vector3::z, |down| -down);
-                symbols::ground(spot(at), self.project_direction(&up), up.dot(&self.view.viewer_direction()))
+                symbols::ground(
+                    spot(at),
+                    self.project_direction(&up),
+                    up.dot(&self.view.viewer_direction()),
+                )
             }
             MarkShape::Point(at) => symbols::point(self.project_point(at)),
-            MarkShape::Lump(at, mass) => symbols::lump(self.project_point(at), self.mass_radius(*mass), *mass < 0.0),
-            MarkShape::Centre(at, mass) => symbols::centre(self.project_point(at), self.mass_radius(*mass), *mass < 0.0),
+            MarkShape::Lump(at, mass) => {
+                symbols::lump(self.project_point(at), self.mass_radius(*mass), *mass < 0.0)
+            }
+            MarkShape::Centre(at, mass) => {
+                symbols::centre(self.project_point(at), self.mass_radius(*mass), *mass < 0.0)
+            }
             MarkShape::Frame(at, axes) if self.style.frames => {
                 let axes = axes.each_ref().map(|axis| self.project_direction(axis));
                 symbols::axes(self.project_point(at), &axes, 26.0, ["", "", ""])
@@ -281,7 +301,8 @@ impl<'a> DrawingSheet<'a> {
                 depth,
             ));
         }
-        let axes = [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| self.project_direction(&axis));
+        let axes =
+            [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| self.project_direction(&axis));
         out.push_str(&symbols::axes(
             [26.0, height - 24.0],
             &axes,

@@ -131,6 +131,8 @@ mod tests {
         assert!((around - 4.0).abs() < 1e-9, "{around}");
         // On a line, and in no plane.
         assert!(convex_hull(&[Vector3::zeros(), Vector3::x(), 2.0 * Vector3::x()]).is_none());
-        assert!(convex_hull(&[Vector3::zeros(), Vector3::x(), Vector3::y(), Vector3::z()]).is_none());
+        assert!(
+            convex_hull(&[Vector3::zeros(), Vector3::x(), Vector3::y(), Vector3::z()]).is_none()
+        );
     }
 }

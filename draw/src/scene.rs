@@ -1,8 +1,8 @@
 //! What stands where: a mechanism at given coordinates becomes bars, joints, loops, drives and masses in the base frame.
 
 use modelmill_spec::{
-    CoordinateIdx, DriveKind, ExactExpression, FrameIdx, PartInertia, Kinematics, LumpedMass, Mechanism, ModelPart,
-    PointIdx, FramePlacement, MechanismPoses, FrameStep, ModelSymbol,
+    CoordinateIdx, DriveKind, ExactExpression, FrameIdx, FramePlacement, FrameStep, Kinematics,
+    LumpedMass, Mechanism, MechanismPoses, ModelPart, ModelSymbol, PartInertia, PointIdx,
 };
 use nalgebra::Vector3;
 
@@ -138,7 +138,12 @@ impl MechanismScene {
         });
         let mut steps = mechanism.frames.iter().flat_map(|frame| &frame.steps);
         let flies = steps.any(|step| matches!(step, FrameStep::Free(_)));
-        let gravity = Vector3::from(mechanism.gravity.each_ref().map(|g| constant_value(mechanism, g)));
+        let gravity = Vector3::from(
+            mechanism
+                .gravity
+                .each_ref()
+                .map(|g| constant_value(mechanism, g)),
+        );
         let down = gravity.try_normalize(0.0);
         Self {
             title: (mechanism.title.clone()).unwrap_or_else(|| mechanism.name.clone()),
@@ -204,7 +209,11 @@ impl Builder<'_> {
         let pose = self.frame_pose(frame).clone();
         let mut body = self.bodies[own.parent.0];
         let mut from = Vector3::from(self.frame_pose(own.parent.0).origin);
-        if own.steps.iter().any(|step| matches!(step, FrameStep::Free(_))) {
+        if own
+            .steps
+            .iter()
+            .any(|step| matches!(step, FrameStep::Free(_)))
+        {
             // Nothing holds it, so no bar leads there.
             body = self.n_bodies;
             self.n_bodies += 1;
@@ -228,7 +237,10 @@ impl Builder<'_> {
                 let [p, q] = [first, other].map(|m| Vector3::from(m.origin));
                 (p - q).norm() < 1e-12 && (a - b).norm() < 1e-9
             };
-            let count = pose.joint_axes[next..].iter().take_while(|m| is_same(m)).count();
+            let count = pose.joint_axes[next..]
+                .iter()
+                .take_while(|m| is_same(m))
+                .count();
             let together = &pose.joint_axes[next..next + count];
             self.add_joint(together, frame, &mut body);
             next += count;
@@ -253,7 +265,12 @@ impl Builder<'_> {
     }
 
     /// A joint, behind which a body of its own begins.
-    fn add_joint(&mut self, together: &[modelmill_spec::CoordinateAxis], frame: usize, body: &mut usize) {
+    fn add_joint(
+        &mut self,
+        together: &[modelmill_spec::CoordinateAxis],
+        frame: usize,
+        body: &mut usize,
+    ) {
         let coordinates = &self.mechanism.coordinates;
         let names: Vec<&str> = (together.iter())
             .map(|moved| coordinates[moved.coordinate].name.as_str())
@@ -271,7 +288,9 @@ impl Builder<'_> {
             .find_map(|moved| driven_by(moved.coordinate));
         let moved_by = match drive {
             Some(_) => JointActuation::Drive,
-            None if together.iter().all(|m| coordinates[m.coordinate].passive) => JointActuation::Loops,
+            None if together.iter().all(|m| coordinates[m.coordinate].passive) => {
+                JointActuation::Loops
+            }
             None => JointActuation::Independent,
         };
         let [turns, slides] = [true, false].map(|turns| {
@@ -392,7 +411,8 @@ impl Builder<'_> {
 
     fn add_lump(&mut self, lump: &LumpedMass) {
         let share = modelmill_spec::ExactExpression::Rational(lump.share.clone());
-        let mass = constant_value(self.mechanism, &lump.mass) * constant_value(self.mechanism, &share);
+        let mass =
+            constant_value(self.mechanism, &lump.mass) * constant_value(self.mechanism, &share);
         let at = self.place_in_base(lump.frame, &lump.force_at);
         let says = format!("{} = {mass:.4} kg", self.mechanism.text_of(&lump.mass));
         let body = self.bodies[lump.frame.0];

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use crate::scene::{JointMark, JointActuation};
+use crate::scene::{JointActuation, JointMark};
 
 /// Radius of a joint's sign.
 const JOINT_RADIUS: f64 = 7.0;

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use modelmill_draw::{MechanismScene, MarkShape, DrawingStyle, svg};
+use modelmill_draw::{DrawingStyle, MarkShape, MechanismScene, svg};
 use modelmill_spec::Mechanism;
 
 fn bundled() -> Vec<PathBuf> {
@@ -163,7 +163,11 @@ fn what_is_wrong_is_seen() {
     q[passive] += 0.2;
     let open = MechanismScene::new(&mechanism, &q);
     assert_eq!(closings(&open), closings(&closed) + 1);
-    let text = svg(&[&closed, &open], &closed.best_view(), &DrawingStyle::default());
+    let text = svg(
+        &[&closed, &open],
+        &closed.best_view(),
+        &DrawingStyle::default(),
+    );
     assert_eq!(text.matches("class=\"shadow\"").count(), 1);
 }
 
@@ -177,7 +181,12 @@ fn forces_are_arrows_at_their_drives() {
             force,
             error: 1.0,
         };
-        let text = modelmill_draw::loaded_svg(&[&scene], &scene.best_view(), &DrawingStyle::default(), &[load]);
+        let text = modelmill_draw::loaded_svg(
+            &[&scene],
+            &scene.best_view(),
+            &DrawingStyle::default(),
+            &[load],
+        );
         let group = text.split("<g class=\"load e5\">").nth(1).expect("arrows");
         let d = group.split("d=\"M").nth(1).expect("a path");
         let numbers: Vec<f64> = d

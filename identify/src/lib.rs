@@ -44,24 +44,27 @@ mod test_noise;
 mod words;
 
 pub use audit::{
-    ChannelRegressor, DelayEstimate, DelayAudit, ForceDelays, ForceAudit, PositionFault, RobustFit, WiringFault, robust_fit,
+    ChannelRegressor, DelayAudit, DelayEstimate, ForceAudit, ForceDelays, PositionFault, RobustFit,
+    WiringFault, robust_fit,
 };
 pub use estimate::{
-    ParameterUncertainty, NullDirection, LeastSquares, LeastSquaresError, RANK_TOLERANCE, RegressionSolution, RFactor,
+    LeastSquares, LeastSquaresError, NullDirection, ParameterUncertainty, RANK_TOLERANCE, RFactor,
+    RegressionSolution,
 };
 pub use figures::{
-    BandError, ChannelFigures, ErrorAccumulator, EstimatorOutput, ErrorFigures, FiguresError, FilteredFigures,
-    FitFault, FitFile, FitFileError, FitParameter, FilteredChannelFigures, LocateOptions, ParameterInfo, ErrorRegion,
-    ParameterStatus, TIME_COLUMN, TRIMMED_PART, compare_forces, fit_parameters, add_filtered_forces, locate_errors,
+    BandError, ChannelFigures, ErrorAccumulator, ErrorFigures, ErrorRegion, EstimatorOutput,
+    FiguresError, FilteredChannelFigures, FilteredFigures, FitFault, FitFile, FitFileError,
+    FitParameter, LocateOptions, ParameterInfo, ParameterStatus, TIME_COLUMN, TRIMMED_PART,
+    add_filtered_forces, compare_forces, fit_parameters, locate_errors,
 };
 pub use motion::{
-    DerivativeSource, PreparationChoices, DECIMATION_PASSBAND, StatePreparation, PreparationRecord, RunRepeatability, PreparedRun, SmoothedCoordinate,
-    SmoothingMethod, decimate, decimate_columns, decimate_table, decimate_time, differentiate,
-    filter_and_differentiate,
+    DECIMATION_PASSBAND, DerivativeSource, PreparationChoices, PreparationRecord, PreparedRun,
+    RunRepeatability, SmoothedCoordinate, SmoothingMethod, StatePreparation, decimate,
+    decimate_columns, decimate_table, decimate_time, differentiate, filter_and_differentiate,
 };
 pub use recording::{
-    ColumnInfo, ComputedColumn, RecordingFault, NonFinitePolicy, RecordingNote, ReadOptions, SignalRecording, RecordingError,
-    RecordingFile, RecordingFiles, NoteSeverity, TableInfo, has_recording_extension, display_name_of_bytes,
-    sample_place_word,
+    ColumnInfo, ComputedColumn, NonFinitePolicy, NoteSeverity, ReadOptions, RecordingError,
+    RecordingFault, RecordingFile, RecordingFiles, RecordingNote, SignalRecording, TableInfo,
+    display_name_of_bytes, has_recording_extension, sample_place_word,
 };
 pub use signal::{FilterError, LowPass, MAX_FILTER_ORDER};

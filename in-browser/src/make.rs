@@ -71,7 +71,11 @@ pub fn load_bundle() -> Result<PageBundle, String> {
         bundle.models.push((name.into_owned(), text(&path)?));
     }
     for (name, is_check) in [("with-rods-fit.csv", false), ("with-rods-check.csv", true)] {
-        let text = text(&workspace_root().join("recordings/spidermill-mbs").join(name))?;
+        let text = text(
+            &workspace_root()
+                .join("recordings/spidermill-mbs")
+                .join(name),
+        )?;
         let model = "spidermill.toml".to_owned();
         bundle
             .recordings
@@ -85,7 +89,10 @@ pub fn load_bundle() -> Result<PageBundle, String> {
 /// Fails with a sentence when a file cannot be read.
 pub fn build_page(module: &Path) -> Result<String, String> {
     let module = fs::read(module).map_err(|error| format!("{}: {error}", module.display()))?;
-    Ok(standalone_page(&strip_custom_sections(&module), &load_bundle()?))
+    Ok(standalone_page(
+        &strip_custom_sections(&module),
+        &load_bundle()?,
+    ))
 }
 
 /// A module without its custom sections, which tell debuggers of names and lines. A module is eight bytes and then sections, each

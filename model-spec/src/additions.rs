@@ -6,7 +6,7 @@ use crate::diagnostic::{DiagnosticLog, SourceSpan};
 use crate::document::TomlKey;
 use crate::formula::{FormulaAst, FormulaAstKind, SourceFormula};
 use crate::load::{LoadFailure, LoadedModel};
-use crate::mechanism::{ModelConstant, Mechanism};
+use crate::mechanism::{Mechanism, ModelConstant};
 use crate::parser::parse;
 use crate::record::{EntryList, NamedEntries, OneOrMany};
 use crate::schema::{ConstantEntry, EffectEntry, EffectParameterEntry};

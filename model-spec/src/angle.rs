@@ -12,7 +12,7 @@ use num_traits::{One, Signed, ToPrimitive, Zero};
 use crate::diagnostic::{Diagnostic, DiagnosticLog};
 use crate::exact::{ExactAngle, ExactExpression, ExactLength, ModelSymbol};
 use crate::formula::{FormulaAst, FormulaAstKind, SourceFormula};
-use crate::scope::{FormulaScope, SymbolSort, FormulaRequirement};
+use crate::scope::{FormulaRequirement, FormulaScope, SymbolSort};
 use crate::unit::UnitDimension;
 
 /// Largest integer factor of an angle's symbol.
@@ -20,7 +20,11 @@ const LARGEST_FACTOR: i32 = 16;
 const SYMBOLS: [SymbolSort; 2] = [SymbolSort::Constant, SymbolSort::Coordinate];
 
 /// Reads an angle over constants (unit rad) and coordinates.
-pub(crate) fn angle(formula: &SourceFormula, scope: &FormulaScope, log: &mut DiagnosticLog) -> Option<ExactAngle> {
+pub(crate) fn angle(
+    formula: &SourceFormula,
+    scope: &FormulaScope,
+    log: &mut DiagnosticLog,
+) -> Option<ExactAngle> {
     let before = log.n_errors();
     let wanted = FormulaRequirement {
         sorts: &SYMBOLS,
@@ -32,7 +36,10 @@ pub(crate) fn angle(formula: &SourceFormula, scope: &FormulaScope, log: &mut Dia
     if log.n_errors() > before {
         // The names that are no angles at all are reported by now; add the unknown ones.
         let mut rest = DiagnosticLog::default();
-        if scope.resolve_ast(&formula.ast, &SYMBOLS, &mut rest).is_none() {
+        if scope
+            .resolve_ast(&formula.ast, &SYMBOLS, &mut rest)
+            .is_none()
+        {
             for found in rest.finish() {
                 log.push(found);
             }
@@ -112,7 +119,9 @@ fn check_angle_symbols(ast: &FormulaAst, scope: &FormulaScope, log: &mut Diagnos
             check_angle_symbols(above, scope, log);
             check_angle_symbols(below, scope, log);
         }
-        FormulaAstKind::Negative(inner) | FormulaAstKind::Power(inner, _) | FormulaAstKind::Apply(_, inner) => {
+        FormulaAstKind::Negative(inner)
+        | FormulaAstKind::Power(inner, _)
+        | FormulaAstKind::Apply(_, inner) => {
             check_angle_symbols(inner, scope, log);
         }
         FormulaAstKind::Rational(_) | FormulaAstKind::Pi => {}
@@ -272,8 +281,13 @@ fn scale_exact(exact: &ExactExpression, factor: &BigRational) -> ExactExpression
     match exact {
         ExactExpression::Rational(value) => ExactExpression::Rational(value * factor),
         _ if (-factor).is_one() => ExactExpression::Negative(Box::new(exact.clone())),
-        _ if factor.is_negative() => ExactExpression::Negative(Box::new(scale_exact(exact, &-factor))),
-        _ => ExactExpression::Product(vec![ExactExpression::Rational(factor.clone()), exact.clone()]),
+        _ if factor.is_negative() => {
+            ExactExpression::Negative(Box::new(scale_exact(exact, &-factor)))
+        }
+        _ => ExactExpression::Product(vec![
+            ExactExpression::Rational(factor.clone()),
+            exact.clone(),
+        ]),
     }
 }
 

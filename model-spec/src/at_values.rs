@@ -5,8 +5,10 @@ use num_bigint::BigInt;
 use num_rational::BigRational;
 use num_traits::{One, ToPrimitive, Zero};
 
-use crate::exact::{ExactAngle, ConstantIdx, ExactExpression, ExactLength, ModelSymbol};
-use crate::mechanism::{EffectBodies, ModelConstant, PartInertia, LumpedMass, Mechanism, ModelPart, FrameStep};
+use crate::exact::{ConstantIdx, ExactAngle, ExactExpression, ExactLength, ModelSymbol};
+use crate::mechanism::{
+    EffectBodies, FrameStep, LumpedMass, Mechanism, ModelConstant, ModelPart, PartInertia,
+};
 
 /// How many significant digits every decimal keeps as a number of the machine; what stands behind them is rounding.
 const DIGITS: usize = 15;
@@ -95,21 +97,27 @@ impl ConstantSubstitutes {
             if !constant.is_angle {
                 let alike = constants.iter().filter(|c| c.unit == constant.unit);
                 let largest = alike.map(|c| c.value.abs()).fold(0.0, f64::max);
-                of.push(SubstituteValue::Number(if constant.value.abs() < ROUNDING_SHARE * largest {
-                    BigRational::zero()
-                } else {
-                    exact_decimal(constant.value)
-                }));
+                of.push(SubstituteValue::Number(
+                    if constant.value.abs() < ROUNDING_SHARE * largest {
+                        BigRational::zero()
+                    } else {
+                        exact_decimal(constant.value)
+                    },
+                ));
                 continue;
             }
             let twelfths = constant.value * 12.0 / std::f64::consts::PI;
             let whole = twelfths.round();
             if (twelfths - whole).abs() <= ROUNDING_SHARE * 12.0 * whole.abs().max(1.0) {
                 let whole = BigInt::from(whole.to_i64().unwrap_or(0));
-                of.push(SubstituteValue::Turn(BigRational::new(whole, BigInt::from(12))));
+                of.push(SubstituteValue::Turn(BigRational::new(
+                    whole,
+                    BigInt::from(12),
+                )));
                 continue;
             }
-            let same = |at: &usize| exact_decimal(constants[*at].value) == exact_decimal(constant.value);
+            let same =
+                |at: &usize| exact_decimal(constants[*at].value) == exact_decimal(constant.value);
             let at = kept.iter().position(same).unwrap_or(kept.len());
             if at == kept.len() {
                 kept.push(of.len());
@@ -125,13 +133,18 @@ impl ConstantSubstitutes {
         match exact {
             ExactExpression::Symbol(ModelSymbol::Constant(i)) => match &self.values[i.0] {
                 SubstituteValue::Number(value) => ExactExpression::Rational(value.clone()),
-                SubstituteValue::Turn(value) if value.is_zero() => ExactExpression::Rational(value.clone()),
-                SubstituteValue::Turn(value) => {
-                    ExactExpression::Product(vec![ExactExpression::Rational(value.clone()), ExactExpression::Pi])
+                SubstituteValue::Turn(value) if value.is_zero() => {
+                    ExactExpression::Rational(value.clone())
                 }
+                SubstituteValue::Turn(value) => ExactExpression::Product(vec![
+                    ExactExpression::Rational(value.clone()),
+                    ExactExpression::Pi,
+                ]),
                 SubstituteValue::Constant(i) => ExactExpression::Symbol(ModelSymbol::Constant(*i)),
             },
-            ExactExpression::Rational(_) | ExactExpression::Pi | ExactExpression::Symbol(_) => exact.clone(),
+            ExactExpression::Rational(_) | ExactExpression::Pi | ExactExpression::Symbol(_) => {
+                exact.clone()
+            }
             ExactExpression::Sum(operands) => ExactExpression::Sum(all(operands)),
             ExactExpression::Product(operands) => ExactExpression::Product(all(operands)),
             ExactExpression::Quotient(a, b) => ExactExpression::Quotient(inner(a), inner(b)),

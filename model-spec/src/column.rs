@@ -137,7 +137,9 @@ impl Mechanism {
                     // Rates of the vector part are angular velocities; the scalar part has none.
                     CoordinateMotion::Quaternion if order > 0 => ColumnQuantity::Angle(order),
                     CoordinateMotion::QuaternionScalar if order > 0 => continue,
-                    CoordinateMotion::Quaternion | CoordinateMotion::QuaternionScalar => ColumnQuantity::Number,
+                    CoordinateMotion::Quaternion | CoordinateMotion::QuaternionScalar => {
+                        ColumnQuantity::Number
+                    }
                 };
                 columns.push((format!("{}{suffix}", coordinate.name), quantity));
             }
@@ -376,7 +378,10 @@ impl AffineValue {
 }
 
 /// The affine value of an expression.
-fn affine_value(ast: &FormulaAst, look_up: &dyn Fn(&str) -> Option<AffineValue>) -> Result<AffineValue, AffineFault> {
+fn affine_value(
+    ast: &FormulaAst,
+    look_up: &dyn Fn(&str) -> Option<AffineValue>,
+) -> Result<AffineValue, AffineFault> {
     let of = |ast: &FormulaAst| affine_value(ast, look_up);
     let number = |ast: &FormulaAst, what: &str| {
         let value = affine_value(ast, look_up)?;
@@ -390,7 +395,9 @@ fn affine_value(ast: &FormulaAst, look_up: &dyn Fn(&str) -> Option<AffineValue>)
     let value = match &ast.kind {
         FormulaAstKind::Rational(value) => AffineValue::number(value.to_f64().unwrap_or(f64::NAN)),
         FormulaAstKind::Pi => AffineValue::number(std::f64::consts::PI),
-        FormulaAstKind::Name(name) => look_up(name).ok_or_else(|| AffineFault::Name(name.clone()))?,
+        FormulaAstKind::Name(name) => {
+            look_up(name).ok_or_else(|| AffineFault::Name(name.clone()))?
+        }
         FormulaAstKind::Sum(terms) => {
             let mut sum = AffineValue::default();
             for term in terms {
@@ -518,7 +525,8 @@ mod tests {
             "lab/split.effort.arm/wrist",
         ]
         .map(str::to_owned);
-        let read = |text: &str| read_column(text, ColumnQuantity::Angle(0), &names, &|_| None).unwrap();
+        let read =
+            |text: &str| read_column(text, ColumnQuantity::Angle(0), &names, &|_| None).unwrap();
         let sum = read("-joints.position.q/2 + 3*joints.position.q2");
         assert_eq!(
             sum.terms,
@@ -530,7 +538,12 @@ mod tests {
         let sum = read("2*lab/split.effort.arm/wrist - 1");
         assert_eq!(sum.terms, [("lab/split.effort.arm/wrist".to_owned(), 2.0)]);
         assert!((sum.offset + 1.0).abs() < 1e-15);
-        let missing = read_column("-joints.position.q3", ColumnQuantity::Angle(0), &names, &|_| None);
+        let missing = read_column(
+            "-joints.position.q3",
+            ColumnQuantity::Angle(0),
+            &names,
+            &|_| None,
+        );
         assert!(missing.is_err());
     }
 }

@@ -89,7 +89,11 @@ impl Diagnostic {
 
     /// Points to where a variant removes what is missing; otherwise gives other advice.
     #[must_use]
-    pub(crate) fn with_removal_or(self, removal: Option<SourceSpan>, advice: impl FnOnce() -> String) -> Self {
+    pub(crate) fn with_removal_or(
+        self,
+        removal: Option<SourceSpan>,
+        advice: impl FnOnce() -> String,
+    ) -> Self {
         match removal {
             Some(span) => self
                 .related(span, "the variant removes it here")

@@ -14,7 +14,7 @@ use crate::document::{self, TomlNode, TomlValue, find_key, quote};
 use crate::exact::ExactExpression;
 use crate::kinds::EffectKind;
 use crate::load::{LoadFailure, LoadedModel, load_with};
-use crate::mechanism::{ModelEffect, Mechanism, EffectPlace};
+use crate::mechanism::{EffectPlace, Mechanism, ModelEffect};
 use crate::suggest;
 use crate::values::is_name;
 
@@ -106,7 +106,12 @@ const NEW_EFFECT: &str = "the effect to be added";
 
 /// A failure of the edited text with its places in what the user knows: the file as it is, and the effect as a text of
 /// its own. Lines of the edited text are those of no file.
-fn relocate_failure(mut failure: LoadFailure, old: &str, new: &str, effect: &NewEffect) -> LoadFailure {
+fn relocate_failure(
+    mut failure: LoadFailure,
+    old: &str,
+    new: &str,
+    effect: &NewEffect,
+) -> LoadFailure {
     let line_end = if old.contains("\r\n") { "\r\n" } else { "\n" };
     let same = old
         .bytes()
@@ -622,7 +627,8 @@ impl ModelEffect {
     /// The value of a constant of its kind, in SI units; `None` if the kind has none of this symbol or it is left away.
     pub fn constant(&self, symbol: &str, mechanism: &Mechanism) -> Option<f64> {
         let found = self.constants.iter().find(|(name, _)| name == symbol);
-        let value = |exact: &ExactExpression| exact.evaluate(&|symbol| mechanism.symbol_nominal(symbol));
+        let value =
+            |exact: &ExactExpression| exact.evaluate(&|symbol| mechanism.symbol_nominal(symbol));
         found.map(|(_, exact)| value(exact))
     }
 }

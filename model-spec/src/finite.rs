@@ -36,7 +36,13 @@ pub(crate) fn value<'a>(
     ast: &'a FormulaAst,
     known: &dyn Fn(&str) -> Option<f64>,
 ) -> Result<Option<f64>, ValueFault<'a>> {
-    let fault = |piece: &'a FormulaAst, value: f64, why: ValueFaultCause| Err(ValueFault { piece, value, cause: why });
+    let fault = |piece: &'a FormulaAst, value: f64, why: ValueFaultCause| {
+        Err(ValueFault {
+            piece,
+            value,
+            cause: why,
+        })
+    };
     let found = match &ast.kind {
         FormulaAstKind::Rational(value) => value.to_f64(),
         FormulaAstKind::Pi => Some(std::f64::consts::PI),
@@ -116,14 +122,18 @@ impl ValueFault<'_> {
             ),
         };
         let label = match self.cause {
-            ValueFaultCause::TooLarge => "it is too large with the constants of this file".to_owned(),
+            ValueFaultCause::TooLarge => {
+                "it is too large with the constants of this file".to_owned()
+            }
             _ => format!("this is {} with the constants of this file", self.value),
         };
         let found = Diagnostic::error(self.piece.span, message)
             .label(label)
             .help(help);
         match (declared, &self.piece.kind) {
-            (Some(declared), FormulaAstKind::Name(_)) => found.related(declared, "its value stands here"),
+            (Some(declared), FormulaAstKind::Name(_)) => {
+                found.related(declared, "its value stands here")
+            }
             _ => found,
         }
     }
@@ -138,8 +148,8 @@ pub(crate) fn mentions(ast: &FormulaAst, name: &str) -> bool {
             inner.iter().any(|one| mentions(one, name))
         }
         FormulaAstKind::Quotient(above, below) => mentions(above, name) || mentions(below, name),
-        FormulaAstKind::Negative(inner) | FormulaAstKind::Power(inner, _) | FormulaAstKind::Apply(_, inner) => {
-            mentions(inner, name)
-        }
+        FormulaAstKind::Negative(inner)
+        | FormulaAstKind::Power(inner, _)
+        | FormulaAstKind::Apply(_, inner) => mentions(inner, name),
     }
 }

@@ -1,7 +1,7 @@
 //! How a coordinate moves what stands behind its joint, and what follows from that: units, and what a drive carries.
 
 use crate::kinds::PlaceLoad;
-use crate::mechanism::{JointCoordinate, DriveKind};
+use crate::mechanism::{DriveKind, JointCoordinate};
 use crate::unit::UnitDimension;
 
 /// Kind of motion of a coordinate.

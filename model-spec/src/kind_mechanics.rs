@@ -9,7 +9,10 @@ use crate::values::UnitByPlace;
 
 /// Checks what a kind adds: an expression at places that have one, or mechanics with their own symbols and places.
 /// False if it has mechanics or is faulty, so that there is no expression to check.
-pub(crate) fn check_expression_or_mechanics(entry: &EffectKindEntry, log: &mut DiagnosticLog) -> bool {
+pub(crate) fn check_expression_or_mechanics(
+    entry: &EffectKindEntry,
+    log: &mut DiagnosticLog,
+) -> bool {
     let name_span = entry.name.as_ref().map_or(entry.span, |name| name.span);
     let mut places = entry.on.iter().flat_map(|on| &on.entries);
     let Some(way) = entry.mechanics else {
@@ -27,7 +30,10 @@ pub(crate) fn check_expression_or_mechanics(entry: &EffectKindEntry, log: &mut D
         if let (Some(found), Some(on)) = (elsewhere, &entry.on) {
             log.push(
                 Diagnostic::error(on.span, "an expression cannot act here")
-                    .label(format!("on {} there is nothing to add to", found.description()))
+                    .label(format!(
+                        "on {} there is nothing to add to",
+                        found.description()
+                    ))
                     .help("expressions act on a drive, a coordinate or a point"),
             );
             return false;

@@ -3,11 +3,11 @@
 use std::cell::Cell;
 
 use crate::diagnostic::{Diagnostic, DiagnosticLog};
-use crate::exact::{ExactExpression, ParameterIdx, PlaceQuantity, ModelSymbol};
-use crate::kinds::{PlaceLoad, OtherMotion};
+use crate::exact::{ExactExpression, ModelSymbol, ParameterIdx, PlaceQuantity};
+use crate::kinds::{OtherMotion, PlaceLoad};
 use crate::schema::EffectKindEntry;
-use crate::scope::{SymbolMeaning, FormulaScope, SymbolSort, FormulaRequirement, symbol_meaning};
-use crate::unit::{UnitDimension, ModelUnit};
+use crate::scope::{FormulaRequirement, FormulaScope, SymbolMeaning, SymbolSort, symbol_meaning};
+use crate::unit::{ModelUnit, UnitDimension};
 use crate::values::UnitByPlace;
 
 /// Symbols of a kind that have no unit where the place carries this.
@@ -59,7 +59,11 @@ pub(crate) fn factors(
     let exact = scope.resolve(
         expression,
         FormulaRequirement {
-            sorts: &[SymbolSort::Parameter, SymbolSort::Constant, SymbolSort::Place],
+            sorts: &[
+                SymbolSort::Parameter,
+                SymbolSort::Constant,
+                SymbolSort::Place,
+            ],
             dimension: carries.dimension(),
             what: &what,
         },
@@ -201,17 +205,29 @@ fn is_parameter(symbol: ModelSymbol) -> bool {
 }
 
 /// Splits `factor * exact` into terms per parameter; false if it is not linear and homogeneous in them.
-fn split_into_factors(exact: &ExactExpression, factor: &ExactExpression, factors: &mut [Vec<ExactExpression>]) -> bool {
+fn split_into_factors(
+    exact: &ExactExpression,
+    factor: &ExactExpression,
+    factors: &mut [Vec<ExactExpression>],
+) -> bool {
     match exact {
-        ExactExpression::Symbol(ModelSymbol::Parameter(ParameterIdx(i))) => match factors.get_mut(*i) {
-            Some(terms) => {
-                terms.push(factor.clone());
-                true
+        ExactExpression::Symbol(ModelSymbol::Parameter(ParameterIdx(i))) => {
+            match factors.get_mut(*i) {
+                Some(terms) => {
+                    terms.push(factor.clone());
+                    true
+                }
+                None => false,
             }
-            None => false,
-        },
-        ExactExpression::Sum(terms) => terms.iter().all(|term| split_into_factors(term, factor, factors)),
-        ExactExpression::Negative(inner) => split_into_factors(inner, &ExactExpression::Negative(Box::new(factor.clone())), factors),
+        }
+        ExactExpression::Sum(terms) => terms
+            .iter()
+            .all(|term| split_into_factors(term, factor, factors)),
+        ExactExpression::Negative(inner) => split_into_factors(
+            inner,
+            &ExactExpression::Negative(Box::new(factor.clone())),
+            factors,
+        ),
         ExactExpression::Product(members) => {
             let (with, without): (Vec<&ExactExpression>, Vec<&ExactExpression>) = members
                 .iter()

@@ -7,14 +7,14 @@ use std::sync::OnceLock;
 
 use crate::diagnostic::{Diagnostic, DiagnosticLog};
 use crate::document;
-use crate::exact::{ConstantIdx, ExactExpression, PlaceQuantity, ModelSymbol};
+use crate::exact::{ConstantIdx, ExactExpression, ModelSymbol, PlaceQuantity};
 use crate::finite;
 use crate::kind_mechanics::check_expression_or_mechanics;
 use crate::kind_terms::{factors, symbols_without_unit};
 use crate::mechanics::Mechanics;
 use crate::schema::{EffectKindEntry, LibraryEntry, ModelEntry};
 use crate::scope::FormulaScope;
-use crate::unit::{UnitDimension, ModelUnit};
+use crate::unit::{ModelUnit, UnitDimension};
 use crate::values::{self, SpannedText, UnitByPlace};
 use crate::words::words;
 
@@ -262,7 +262,11 @@ pub(crate) fn library_entries() -> &'static [EffectKindEntry] {
 }
 
 /// The tables of a library that a file names.
-pub(crate) fn own_library(text: &str, file: usize, log: &mut DiagnosticLog) -> Vec<EffectKindEntry> {
+pub(crate) fn own_library(
+    text: &str,
+    file: usize,
+    log: &mut DiagnosticLog,
+) -> Vec<EffectKindEntry> {
     let table = document::parse_toml(text, file, log);
     let span = crate::SourceSpan {
         file,
@@ -286,7 +290,8 @@ pub(crate) fn describe(entry: &EffectKindEntry, is_own: bool) -> EffectKind {
             })
             .collect()
     };
-    let words = |text: &Option<SpannedText>| text.as_ref().map_or_else(String::new, |t| t.text.clone());
+    let words =
+        |text: &Option<SpannedText>| text.as_ref().map_or_else(String::new, |t| t.text.clone());
     let parameters = entry.parameters.iter().flat_map(|table| &table.entries);
     let constants = entry.constants.iter().flat_map(|table| &table.entries);
     EffectKind {

@@ -1,7 +1,7 @@
 //! Positions of frames and points in the base frame, in double precision, and how they move with the coordinates.
 
 use crate::exact::{CoordinateIdx, ModelSymbol};
-use crate::mechanism::{FrameAxis, Mechanism, PointIdx, FrameStep};
+use crate::mechanism::{FrameAxis, FrameStep, Mechanism, PointIdx};
 
 pub(crate) type Vec3 = [f64; 3];
 

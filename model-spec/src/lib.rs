@@ -49,19 +49,19 @@ mod values;
 mod words;
 
 pub use additions::{AddedEffect, ConstantValue};
-pub use column::{ColumnFault, ColumnSum, ColumnQuantity, read_column};
+pub use column::{ColumnFault, ColumnQuantity, ColumnSum, read_column};
 pub use diagnostic::{Diagnostic, DiagnosticSeverity, SourceFile, SourceFiles, SourceSpan};
 pub use document::LARGEST_FILE;
 pub use exact::*;
 pub use joint_motion::CoordinateMotion;
 pub use kinds::{
-    ActsOn, PlaceLoad, EffectKind, KindConstant, KindParameter, LIBRARY, OtherMotion, Scale, ConstantSearch,
-    Sign, library,
+    ActsOn, ConstantSearch, EffectKind, KindConstant, KindParameter, LIBRARY, OtherMotion,
+    PlaceLoad, Scale, Sign, library,
 };
 pub use load::{LoadFailure, LoadedModel, kinds_with, load, load_file, load_file_with, load_with};
 pub use mechanics::Mechanics;
 pub use mechanism::*;
-pub use motion::{Kinematics, CoordinateAxis, FramePlacement, MechanismPoses};
+pub use motion::{CoordinateAxis, FramePlacement, Kinematics, MechanismPoses};
 pub use reading::{read_referenced, read_text};
 pub use unit::unit_product;
 

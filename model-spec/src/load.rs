@@ -127,7 +127,11 @@ pub fn load_file_with(
 /// let failure = modelmill_spec::load("p.toml", &text.replace("\"angle\" }", "\"angel\" }"), &files);
 /// assert!(failure.unwrap_err().render(false).contains("did you mean `angle`?"));
 /// ```
-pub fn load(path_name: &str, text: &str, files: &dyn FileSource) -> Result<LoadedModel, LoadFailure> {
+pub fn load(
+    path_name: &str,
+    text: &str,
+    files: &dyn FileSource,
+) -> Result<LoadedModel, LoadFailure> {
     load_with(path_name, text, &[], files)
 }
 
@@ -183,7 +187,10 @@ pub fn load_with(
 /// The kinds of effects of the program's library and of further ones.
 ///
 /// Fails with every finding about those, each with its place.
-pub fn kinds_with(libraries: &[PathBuf], files: &dyn FileSource) -> Result<Vec<EffectKind>, LoadFailure> {
+pub fn kinds_with(
+    libraries: &[PathBuf],
+    files: &dyn FileSource,
+) -> Result<Vec<EffectKind>, LoadFailure> {
     let mut log = DiagnosticLog::default();
     let mut sources = SourceFiles::default();
     let named: Vec<NamedPath> = libraries.iter().map(|path| (path.clone(), None)).collect();
@@ -339,7 +346,11 @@ fn extended_file(
         // What the missing file would define is not reported as unknown.
         log.syntax_broken = true;
     };
-    if sources.files.iter().any(|file| normalise_path(&file.path) == next) {
+    if sources
+        .files
+        .iter()
+        .any(|file| normalise_path(&file.path) == next)
+    {
         refuse(
             "these files extend one another in a circle".to_owned(),
             "this file is being read already",

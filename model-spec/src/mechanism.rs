@@ -4,7 +4,9 @@
 
 use num_rational::BigRational;
 
-use crate::exact::{ExactAngle, CoordinateIdx, ExactExpression, ExactLength, ParameterIdx, ModelSymbol};
+use crate::exact::{
+    CoordinateIdx, ExactAngle, ExactExpression, ExactLength, ModelSymbol, ParameterIdx,
+};
 use crate::joint_motion::CoordinateMotion;
 use crate::mechanics::Mechanics;
 
@@ -269,7 +271,8 @@ impl CoordinateCoupling {
     /// The value of what follows, rad or m.
     pub fn value(&self, value: &dyn Fn(ModelSymbol) -> f64) -> f64 {
         let terms = self.terms.iter();
-        let moved = terms.map(|(i, factor)| factor.evaluate(value) * value(ModelSymbol::Coordinate(*i)));
+        let moved =
+            terms.map(|(i, factor)| factor.evaluate(value) * value(ModelSymbol::Coordinate(*i)));
         self.offset.evaluate(value) + moved.sum::<f64>()
     }
 }

@@ -85,13 +85,15 @@ fn merge_section(section: &str, old: &mut TomlNode, new: TomlNode, log: &mut Dia
 
 fn merge_entry(old: &mut TomlNode, new: TomlNode) {
     old.span = new.span;
-    let (TomlValue::Table(old_fields), TomlValue::Table(new_fields)) = (&mut old.value, &new.value) else {
+    let (TomlValue::Table(old_fields), TomlValue::Table(new_fields)) = (&mut old.value, &new.value)
+    else {
         old.value = new.value;
         return;
     };
     for choice in ALTERNATIVES {
-        let sets =
-            |table: &TomlTable, option: &[&str]| option.iter().any(|key| find_key(table, key).is_some());
+        let sets = |table: &TomlTable, option: &[&str]| {
+            option.iter().any(|key| find_key(table, key).is_some())
+        };
         // `joint` and `linear` stand in several kinds of entries; both sides of a choice must occur to matter.
         if let Some(taken) = choice.iter().find(|option| sets(new_fields, option)) {
             old_fields.retain(|(key, _)| {

@@ -3,7 +3,7 @@
 
 use crate::exact::{CoordinateIdx, ModelSymbol};
 use crate::kinematics::{Vec3, rotation_from_quaternion};
-use crate::mechanism::{FrameAxis, DriveKind, FreeBody, Mechanism, PointIdx, FrameStep};
+use crate::mechanism::{DriveKind, FrameAxis, FrameStep, FreeBody, Mechanism, PointIdx};
 
 /// The geometry of a mechanism with the file's constants.
 #[derive(Clone, Debug)]
@@ -153,7 +153,11 @@ impl Kinematics {
 
     /// All frames at given coordinates, rad and m, in the order of the file; one for each (asserted).
     pub fn poses(&self, coordinates: &[f64]) -> MechanismPoses {
-        assert_eq!(coordinates.len(), self.n_coordinates, "one value for each coordinate");
+        assert_eq!(
+            coordinates.len(),
+            self.n_coordinates,
+            "one value for each coordinate"
+        );
         let mut frames: Vec<FramePlacement> = Vec::with_capacity(self.frames.len());
         for (i, (parent, moves)) in self.frames.iter().enumerate() {
             let (rotation, origin) = if i == 0 {
@@ -257,7 +261,12 @@ impl Kinematics {
     }
 
     /// Shows each coordinate that moves a point, with the point's velocity for a rate of one, joint by joint.
-    fn visit_point_rates(&self, poses: &MechanismPoses, point: usize, show: &mut dyn FnMut(usize, Vec3)) {
+    fn visit_point_rates(
+        &self,
+        poses: &MechanismPoses,
+        point: usize,
+        show: &mut dyn FnMut(usize, Vec3),
+    ) {
         let at = self.position(poses, point);
         let mut frame = self.points[point].0;
         while frame != 0 {

@@ -48,7 +48,11 @@ pub(crate) fn rank(rows: &DenseRows, tolerance: f64) -> usize {
 }
 
 /// Solves the normal equations `(JᵀJ + damping) x = Jᵀ r` by elimination; `None` where they are singular.
-pub(crate) fn least_squares(jacobian: &DenseRows, residual: &[f64], damping: f64) -> Option<Vec<f64>> {
+pub(crate) fn least_squares(
+    jacobian: &DenseRows,
+    residual: &[f64],
+    damping: f64,
+) -> Option<Vec<f64>> {
     let n = jacobian.first()?.len();
     let mut matrix = vec![vec![0.0; n + 1]; n];
     for (row, r) in jacobian.iter().zip(residual) {

@@ -9,7 +9,7 @@ use num_traits::{One, Pow, Zero};
 
 use crate::diagnostic::{Diagnostic, DiagnosticLog, SourceSpan};
 use crate::document::quote;
-use crate::formula::{FormulaAst, FormulaAstKind, FUNCTIONS, LONGEST_FORMULA};
+use crate::formula::{FUNCTIONS, FormulaAst, FormulaAstKind, LONGEST_FORMULA};
 use crate::suggest;
 
 /// Deepest nesting of parentheses, functions and powers.
@@ -22,7 +22,12 @@ const LARGEST_EXPONENT: i32 = 16;
 const LARGEST_DEGREE: i32 = 64;
 
 /// Parses `text`, which stands in the file at `outer`, its characters from byte `inner` on if they can be told apart.
-pub(crate) fn parse(text: &str, outer: SourceSpan, inner: Option<usize>, log: &mut DiagnosticLog) -> Option<FormulaAst> {
+pub(crate) fn parse(
+    text: &str,
+    outer: SourceSpan,
+    inner: Option<usize>,
+    log: &mut DiagnosticLog,
+) -> Option<FormulaAst> {
     if text.len() > LONGEST_FORMULA {
         log.push(
             Diagnostic::error(outer, "this expression is too long")
@@ -217,7 +222,8 @@ impl FormulaParser<'_> {
                 .label(format!("exponents multiply to at most {LARGEST_DEGREE}")),
             ));
         }
-        if exponent < 0 && matches!(&base.kind, FormulaAstKind::Rational(value) if value.is_zero()) {
+        if exponent < 0 && matches!(&base.kind, FormulaAstKind::Rational(value) if value.is_zero())
+        {
             return Err(Box::new(Diagnostic::error(
                 self.span(start, self.at),
                 "this divides by zero",
@@ -494,7 +500,11 @@ fn negative(ast: FormulaAst, span: SourceSpan) -> FormulaAst {
 }
 
 /// Makes `a*c/(b*d)` of the chain `a/b*c/d`, its numbers collected into one, so that no chain is deep.
-fn fraction(above: Vec<FormulaAst>, below: Vec<FormulaAst>, span: SourceSpan) -> ParseResult<FormulaAst> {
+fn fraction(
+    above: Vec<FormulaAst>,
+    below: Vec<FormulaAst>,
+    span: SourceSpan,
+) -> ParseResult<FormulaAst> {
     let mut number = BigRational::one();
     let mut numerator = Vec::new();
     let mut denominator = Vec::new();

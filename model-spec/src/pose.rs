@@ -8,7 +8,7 @@ use crate::build::MechanismSpans;
 use crate::diagnostic::{Diagnostic, DiagnosticLog, SourceSpan};
 use crate::exact::ModelSymbol;
 use crate::kinematics::{Vec3, frame_poses, jacobian, position};
-use crate::mechanism::{CoordinateCoupling, DriveKind, Mechanism, FrameStep};
+use crate::mechanism::{CoordinateCoupling, DriveKind, FrameStep, Mechanism};
 use crate::numeric::{DenseRows, least_squares, rank};
 
 /// Passive angles may move this far, in rad, before it counts as another assembly.
@@ -22,7 +22,11 @@ const SINGULAR: f64 = 1e-8;
 const DEPENDENCE_TOLERANCE: f64 = 1e-5;
 
 /// Checks the nominal pose and refines the passive coordinates there.
-pub(crate) fn check_pose(mechanism: &mut Mechanism, places: &MechanismSpans, log: &mut DiagnosticLog) {
+pub(crate) fn check_pose(
+    mechanism: &mut Mechanism,
+    places: &MechanismSpans,
+    log: &mut DiagnosticLog,
+) {
     if !check_finite(mechanism, places, log) {
         return;
     }
@@ -153,7 +157,11 @@ fn check_finite(mechanism: &Mechanism, places: &MechanismSpans, log: &mut Diagno
 }
 
 /// Moves the passive coordinates until the loops close; false if they do not, or only far away.
-fn close_loops(mechanism: &mut Mechanism, places: &MechanismSpans, log: &mut DiagnosticLog) -> bool {
+fn close_loops(
+    mechanism: &mut Mechanism,
+    places: &MechanismSpans,
+    log: &mut DiagnosticLog,
+) -> bool {
     if mechanism.loops.is_empty() {
         return true;
     }
@@ -329,7 +337,11 @@ fn constraint_rows(mechanism: &Mechanism) -> DenseRows {
 }
 
 /// The loops must not tie more coordinates than are passive.
-fn check_constraint_count(mechanism: &Mechanism, places: &MechanismSpans, log: &mut DiagnosticLog) -> bool {
+fn check_constraint_count(
+    mechanism: &Mechanism,
+    places: &MechanismSpans,
+    log: &mut DiagnosticLog,
+) -> bool {
     let passive: Vec<usize> = (0..mechanism.coordinates.len())
         .filter(|&i| mechanism.coordinates[i].passive)
         .collect();

@@ -120,7 +120,9 @@ impl ExactLength {
             + self
                 .coordinates
                 .iter()
-                .map(|(coordinate, factor)| to_f64(factor) * value(ModelSymbol::Coordinate(*coordinate)))
+                .map(|(coordinate, factor)| {
+                    to_f64(factor) * value(ModelSymbol::Coordinate(*coordinate))
+                })
                 .sum::<f64>()
     }
 
@@ -172,14 +174,22 @@ enum OperandPrecedence {
     Power,
 }
 
-fn print_expression(exact: &ExactExpression, level: OperandPrecedence, name: &dyn Fn(ModelSymbol) -> String, text: &mut String) {
+fn print_expression(
+    exact: &ExactExpression,
+    level: OperandPrecedence,
+    name: &dyn Fn(ModelSymbol) -> String,
+    text: &mut String,
+) {
     let own = match exact {
         ExactExpression::Rational(value) if value.is_negative() => OperandPrecedence::Sum,
         ExactExpression::Rational(value) if !value.is_integer() => OperandPrecedence::Product,
         ExactExpression::Sum(_) | ExactExpression::Negative(_) => OperandPrecedence::Sum,
         ExactExpression::Product(_) | ExactExpression::Quotient(..) => OperandPrecedence::Product,
         ExactExpression::Power(..) => OperandPrecedence::Factor,
-        ExactExpression::Rational(_) | ExactExpression::Pi | ExactExpression::Symbol(_) | ExactExpression::Apply(..) => OperandPrecedence::Power,
+        ExactExpression::Rational(_)
+        | ExactExpression::Pi
+        | ExactExpression::Symbol(_)
+        | ExactExpression::Apply(..) => OperandPrecedence::Power,
     };
     let bracket = own < level;
     if bracket {
@@ -250,7 +260,9 @@ fn print_sum(terms: &[ExactExpression], name: &dyn Fn(ModelSymbol) -> String, te
                     text.push_str(" + ");
                 }
                 let inner = match term {
-                    ExactExpression::Negative(_) | ExactExpression::Rational(_) if i == 0 => OperandPrecedence::Sum,
+                    ExactExpression::Negative(_) | ExactExpression::Rational(_) if i == 0 => {
+                        OperandPrecedence::Sum
+                    }
                     _ => OperandPrecedence::Product,
                 };
                 print_expression(term, inner, name, text);

@@ -6,9 +6,9 @@
 
 use std::path::Path;
 
-use crate::exact::{ExactExpression, ParameterIdx, PlaceQuantity, ModelSymbol};
+use crate::exact::{ExactExpression, ModelSymbol, ParameterIdx, PlaceQuantity};
 use crate::kinematics::{FramePose, Vec3, frame_poses, position};
-use crate::mechanism::{PartInertia, Mechanism, EffectPlace};
+use crate::mechanism::{EffectPlace, Mechanism, PartInertia};
 use crate::numeric::{DenseRows, least_squares, rank};
 use crate::pose::loop_gaps;
 
@@ -112,7 +112,11 @@ fn try_draw(mechanism: &mut Mechanism, nominal: &[f64], random: &mut Random) -> 
                 }
             }
         }
-        if loop_gaps(mechanism).values.iter().any(|gap| gap.abs() > 1e-12) {
+        if loop_gaps(mechanism)
+            .values
+            .iter()
+            .any(|gap| gap.abs() > 1e-12)
+        {
             return None;
         }
     }

@@ -26,7 +26,11 @@ pub fn read_text(files: &dyn FileSource, path: &Path, advice: &str) -> Result<St
 ///
 /// Fails with what the file is not, in one line and without a word of its text: nobody who hands on a model file shall
 /// learn in this way what else is on the reader's disk.
-pub fn read_referenced(files: &dyn FileSource, path: &Path, keys: &[&str]) -> Result<String, FileError> {
+pub fn read_referenced(
+    files: &dyn FileSource,
+    path: &Path,
+    keys: &[&str],
+) -> Result<String, FileError> {
     let text = files.read_text(path, LARGEST_FILE as u64)?;
     let (table, _) = DeTable::parse_recoverable(&text);
     if keys.iter().any(|key| table.get_ref().contains_key(*key)) {

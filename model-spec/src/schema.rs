@@ -7,8 +7,8 @@ use crate::range::ValueRange;
 use crate::record::{EntryList, NamedEntries, OneOrMany, record};
 use crate::unit::ModelUnit;
 use crate::values::{
-    AxisName, BooleanFlag, SpannedName, SpannedNumber, QuaternionOrder, SearchEntry, LumpedMassPlace, NameSuffix, SpannedText, TwistName,
-    UnitByPlace, FormulaVector, SchemaVersion,
+    AxisName, BooleanFlag, FormulaVector, LumpedMassPlace, NameSuffix, QuaternionOrder,
+    SchemaVersion, SearchEntry, SpannedName, SpannedNumber, SpannedText, TwistName, UnitByPlace,
 };
 
 record! {

@@ -69,7 +69,12 @@ pub(crate) struct FormulaRequirement<'a> {
 
 impl FormulaScope {
     /// Adds a name; a second definition is reported and gives false.
-    pub(crate) fn declare(&mut self, name: &str, meaning: SymbolMeaning, log: &mut DiagnosticLog) -> bool {
+    pub(crate) fn declare(
+        &mut self,
+        name: &str,
+        meaning: SymbolMeaning,
+        log: &mut DiagnosticLog,
+    ) -> bool {
         if let (Some(span), Some(first)) = (meaning.declared, self.names.get(name)) {
             let mut diagnostic =
                 Diagnostic::error(span, format!("`{}` is defined twice", quote(name)))
@@ -212,7 +217,9 @@ impl FormulaScope {
         log: &mut DiagnosticLog,
     ) -> Option<(ExactExpression, Option<UnitDimension>)> {
         match &ast.kind {
-            FormulaAstKind::Rational(value) => Some((ExactExpression::Rational(value.clone()), None)),
+            FormulaAstKind::Rational(value) => {
+                Some((ExactExpression::Rational(value.clone()), None))
+            }
             FormulaAstKind::Pi => Some((ExactExpression::Pi, None)),
             FormulaAstKind::Name(name) => {
                 let meaning = self.look_up(name, ast.span, sorts, log)?;
@@ -261,7 +268,8 @@ impl FormulaScope {
                     };
                     product.push(exact);
                     if let Some(found) = found {
-                        dimension = Some(dimension.map_or(found, |before| before.multiplied_by(found)));
+                        dimension =
+                            Some(dimension.map_or(found, |before| before.multiplied_by(found)));
                     }
                 }
                 (!faulty).then_some((ExactExpression::Product(product), dimension))
@@ -278,7 +286,10 @@ impl FormulaScope {
                             .divided_by(lower.unwrap_or(UnitDimension::ONE)),
                     ),
                 };
-                Some((ExactExpression::Quotient(Box::new(above), Box::new(below)), dimension))
+                Some((
+                    ExactExpression::Quotient(Box::new(above), Box::new(below)),
+                    dimension,
+                ))
             }
             FormulaAstKind::Negative(inner) => {
                 let (exact, dimension) = self.resolve_ast(inner, sorts, log)?;
@@ -294,7 +305,10 @@ impl FormulaScope {
             FormulaAstKind::Apply(function, inner) => {
                 let (exact, dimension) = self.resolve_ast(inner, sorts, log)?;
                 let dimension = function_dimension(*function, dimension, inner.span, log)?;
-                Some((ExactExpression::Apply(*function, Box::new(exact)), dimension))
+                Some((
+                    ExactExpression::Apply(*function, Box::new(exact)),
+                    dimension,
+                ))
             }
         }
     }
@@ -322,7 +336,10 @@ fn function_dimension(
             }
             root.map(Some)
         }
-        (ExactFunction::Sin | ExactFunction::Cos | ExactFunction::Tanh | ExactFunction::Exp, operand) => {
+        (
+            ExactFunction::Sin | ExactFunction::Cos | ExactFunction::Tanh | ExactFunction::Exp,
+            operand,
+        ) => {
             if let Some(found) = operand
                 && found != UnitDimension::ONE
             {

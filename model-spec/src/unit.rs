@@ -355,7 +355,7 @@ fn factors(text: &str, offset: usize) -> Result<(UnitDimension, usize), UnitFaul
 
 #[cfg(test)]
 mod tests {
-    use super::{UnitDimension, UNITS, parse_unit};
+    use super::{UNITS, UnitDimension, parse_unit};
 
     #[test]
     fn units_multiply_and_divide() {

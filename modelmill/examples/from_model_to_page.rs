@@ -18,8 +18,14 @@ fn main() -> Outcome {
     }
 
     let recordings = root.join("recordings/spidermill-mbs");
-    let fit = model.recording(recordings.join("with-rods-fit.csv"), &RecordingOptions::default())?;
-    let check = model.recording(recordings.join("with-rods-check.csv"), &RecordingOptions::default())?;
+    let fit = model.recording(
+        recordings.join("with-rods-fit.csv"),
+        &RecordingOptions::default(),
+    )?;
+    let check = model.recording(
+        recordings.join("with-rods-check.csv"),
+        &RecordingOptions::default(),
+    )?;
     let before = model.identify(&[&fit], &[&check], &EstimatorOptions::default())?;
     println!("identified: {:.2} % off on the check run", percent(&before));
 

@@ -3,7 +3,7 @@
 //! A fit of physical parameters (`identify --physical`) becomes values of parameters, which bodies can have; any other one
 //! becomes values of base parameters, which say nothing of single bodies.
 
-use modelmill_identify::{FitFile, RecordingNote, ParameterStatus};
+use modelmill_identify::{FitFile, ParameterStatus, RecordingNote};
 use modelmill_spec::LoadedModel;
 use modelmill_spec::edit::{AdoptedValues, write_identified};
 

@@ -1,6 +1,6 @@
 //! A model along a recording: its forces and reactions, the measured ones, and variables on which an error may depend.
 
-use modelmill_codegen::{ModelEvaluator, PoseFault, PoseReason, ReactionPrograms, MotionStates};
+use modelmill_codegen::{ModelEvaluator, MotionStates, PoseFault, PoseReason, ReactionPrograms};
 use modelmill_identify::{DECIMATION_PASSBAND, decimate_columns};
 use modelmill_spec::DriveKind;
 
@@ -17,7 +17,11 @@ pub fn forces(model: &Model, data: &RecordingSegment, values: &[f64]) -> Outcome
 }
 
 /// Determined components of the reactions along a recording for nominal parameters, `[component][sample]`, decimated.
-pub fn reactions(model: &Model, data: &RecordingSegment, reactions: &ReactionPrograms) -> Outcome<Vec<Vec<f64>>> {
+pub fn reactions(
+    model: &Model,
+    data: &RecordingSegment,
+    reactions: &ReactionPrograms,
+) -> Outcome<Vec<Vec<f64>>> {
     let evaluator = ModelEvaluator::new(&model.derivation);
     let columns = columns(model, data, |states| evaluator.reactions(reactions, states))?;
     filter_and_decimate(columns, data)
@@ -61,7 +65,8 @@ pub fn variables(model: &Model, data: &RecordingSegment) -> Outcome<Vec<(String,
     let evaluator = ModelEvaluator::new(&model.derivation);
     let passive = model.passive_coordinates();
     if !passive.is_empty() {
-        let mut columns = columns(model, data, |states| evaluator.passive_motion(states))?.into_iter();
+        let mut columns =
+            columns(model, data, |states| evaluator.passive_motion(states))?.into_iter();
         variables.extend(passive.iter().cloned().zip(columns.by_ref()));
         variables.extend(passive.iter().map(|name| format!("{name}_d")).zip(columns));
     }
@@ -139,7 +144,10 @@ fn check_finite(block: Vec<Vec<f64>>) -> Result<Vec<Vec<f64>>, PoseFault> {
 }
 
 /// The parallel filter, on every column; one of zeros stays one.
-pub fn filter_and_decimate(columns: Vec<Vec<f64>>, data: &RecordingSegment) -> Outcome<Vec<Vec<f64>>> {
+pub fn filter_and_decimate(
+    columns: Vec<Vec<f64>>,
+    data: &RecordingSegment,
+) -> Outcome<Vec<Vec<f64>>> {
     let factor = data.decimation();
     if factor == 1 {
         return Ok(columns);

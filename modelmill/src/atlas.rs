@@ -5,8 +5,8 @@
 
 use std::fmt::Write as _;
 
-use modelmill_codegen::{ReductionMethod, OperationCount, ProgramStage};
-use modelmill_spec::{ExactExpression, LoadedModel, Mechanism, CoordinateMotion};
+use modelmill_codegen::{OperationCount, ProgramStage, ReductionMethod};
+use modelmill_spec::{CoordinateMotion, ExactExpression, LoadedModel, Mechanism};
 
 use crate::error::Outcome;
 use crate::model::Model;
@@ -63,7 +63,10 @@ impl Model {
             self.derive_variant(bodies)?
         };
         let base = [&general, &self.derive_variant(weightless)?].map(|m| m.base.len());
-        let at_values = general.check()?.rank.map_or(0, |rank| rank.numeric_rank.rank);
+        let at_values = general
+            .check()?
+            .rank
+            .map_or(0, |rank| rank.numeric_rank.rank);
         let of = |motion: CoordinateMotion| {
             let coordinates = mechanism.coordinates.iter();
             coordinates.filter(|c| c.motion == motion).count()
@@ -74,7 +77,10 @@ impl Model {
             name: self.name.clone(),
             title: mechanism.title.clone().unwrap_or_default(),
             // The position of a free body is no joint.
-            joints: [of(CoordinateMotion::Revolute), of(CoordinateMotion::Prismatic) - 3 * free],
+            joints: [
+                of(CoordinateMotion::Revolute),
+                of(CoordinateMotion::Prismatic) - 3 * free,
+            ],
             free,
             passive: mechanism.coordinates.iter().filter(|c| c.passive).count(),
             loops: mechanism.loops.len(),
@@ -86,7 +92,9 @@ impl Model {
             effects: [mechanism.effects.len(), derivation.reduction.retained.len()],
             operations: [
                 programs.regressor.count_operations(ProgramStage::State),
-                programs.inverse_dynamics.count_operations(ProgramStage::State),
+                programs
+                    .inverse_dynamics
+                    .count_operations(ProgramStage::State),
             ],
             seconds,
             is_imported: false,

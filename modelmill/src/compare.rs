@@ -1,8 +1,8 @@
 //! `compare`: how far a model is off along recordings, and where the error lives.
 
 use modelmill_identify::{
-    BandError, ErrorAccumulator, ErrorFigures, FilteredFigures, LocateOptions, RecordingNote, ErrorRegion, TIME_COLUMN,
-    add_filtered_forces, locate_errors,
+    BandError, ErrorAccumulator, ErrorFigures, ErrorRegion, FilteredFigures, LocateOptions,
+    RecordingNote, TIME_COLUMN, add_filtered_forces, locate_errors,
 };
 
 use crate::along::{self, interleave, variables};
@@ -29,7 +29,11 @@ impl Model {
     /// Holds the model against recordings; `values` are those of its base parameters, in its order and their units.
     ///
     /// Fails when a recording lacks the force of a drive, or leads where the mechanism cannot stand.
-    pub fn compare(&self, recordings: &[&PreparedRecording], values: &[f64]) -> Outcome<ModelComparison> {
+    pub fn compare(
+        &self,
+        recordings: &[&PreparedRecording],
+        values: &[f64],
+    ) -> Outcome<ModelComparison> {
         let [data, _] = recording::segments(self, recordings, &[]);
         let forces = data
             .iter()

@@ -35,7 +35,10 @@ impl Model {
         let mut found = RecordingEvaluation::new(self.drives(), Vec::new());
         for stretch in &recording::read_as_recorded(self, path.as_ref(), reading)? {
             let forces = along::forces(self, stretch, values)?;
-            found.extend(&stretch.time(), along::filter_and_decimate(forces, stretch)?);
+            found.extend(
+                &stretch.time(),
+                along::filter_and_decimate(forces, stretch)?,
+            );
         }
         Ok(found)
     }

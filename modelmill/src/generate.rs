@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use modelmill_codegen::{OutputForm, LANGUAGES, EmissionRequest};
+use modelmill_codegen::{EmissionRequest, LANGUAGES, OutputForm};
 
 use crate::error::{Error, Outcome};
 use crate::model::Model;

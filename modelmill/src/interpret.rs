@@ -3,9 +3,10 @@
 use modelmill_boundary::message;
 use modelmill_boundary::text::{OptionName, Remedy};
 use modelmill_identify::interpret::{
-    PhysicalInterpretation, PhysicalSolution, Polynomial, InterpretationProblem, exact_decimal, interpret,
+    InterpretationProblem, PhysicalInterpretation, PhysicalSolution, Polynomial, exact_decimal,
+    interpret,
 };
-use modelmill_identify::{NullDirection, FitFile, RecordingNote, ParameterStatus};
+use modelmill_identify::{FitFile, NullDirection, ParameterStatus, RecordingNote};
 use modelmill_spec::Sign;
 
 use crate::error::{Error, Outcome};
@@ -32,7 +33,12 @@ impl Model {
     ///
     /// Fails when a name is none of the model's parameters, when the fit belongs to another model, or when the equations
     /// are too many to be solved exactly.
-    pub fn interpret(&self, fit: &FitFile, file: &str, unknown: &[String]) -> Outcome<InterpretationResult> {
+    pub fn interpret(
+        &self,
+        fit: &FitFile,
+        file: &str,
+        unknown: &[String],
+    ) -> Outcome<InterpretationResult> {
         let unknown = self::unknown_indices(self, unknown)?;
         let values = self.values_of(fit, file)?;
         let (system, used) = system(self, &unknown, &values.values, fit);
@@ -49,7 +55,10 @@ impl Model {
             found,
             notes: values.notes,
         };
-        let remarks = interpreted.remarks(fit).into_iter().map(RecordingNote::warning);
+        let remarks = interpreted
+            .remarks(fit)
+            .into_iter()
+            .map(RecordingNote::warning);
         interpreted.notes.extend(remarks);
         for note in &interpreted.notes {
             self.host().note(note);
@@ -91,7 +100,11 @@ pub fn system(
     fit: &FitFile,
 ) -> (InterpretationProblem, Vec<usize>) {
     let mechanism = &model.derivation.mechanism;
-    let constants: Vec<_> = mechanism.constants.iter().map(|c| exact_decimal(c.value)).collect();
+    let constants: Vec<_> = mechanism
+        .constants
+        .iter()
+        .map(|c| exact_decimal(c.value))
+        .collect();
     let nominal: Vec<_> = mechanism
         .parameters
         .iter()

@@ -192,7 +192,7 @@ pub mod text;
 pub mod variants;
 
 pub use modelmill_boundary::files;
-pub use modelmill_identify::{FitFile, RecordingNote, NoteSeverity};
+pub use modelmill_identify::{FitFile, NoteSeverity, RecordingNote};
 pub use modelmill_spec::{EffectKind, SCHEMA, bundled, edit};
 
 pub use error::{Error, Outcome};

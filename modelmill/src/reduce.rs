@@ -77,7 +77,11 @@ pub struct DriveForceError {
 
 /// The model's forces with its nominal values against the rig's own: two programs that share no mechanics.
 fn compare(rig: &Rig, reduction: &PlanarReduction) -> Outcome<Vec<DriveForceError>> {
-    let loaded = modelmill_spec::load("the reduced model", &reduction.model, &MemoryFiles::default())?;
+    let loaded = modelmill_spec::load(
+        "the reduced model",
+        &reduction.model,
+        &MemoryFiles::default(),
+    )?;
     let derivation = modelmill_codegen::derive(&loaded.mechanism)
         .map_err(|error| Error::derivation("the reduced model", error))?;
     let mechanism = &derivation.mechanism;

@@ -5,8 +5,10 @@ use std::path::Path;
 use modelmill_boundary::files::PathKind;
 use modelmill_boundary::message;
 use modelmill_boundary::text::{CommandName, Remedy};
-use modelmill_identify::{ReadOptions, SignalRecording, RecordingFile};
-use modelmill_rig::{Rig, RigRecording, CoordinateSamples, SimulationError, Trajectory, TrajectoryError};
+use modelmill_identify::{ReadOptions, RecordingFile, SignalRecording};
+use modelmill_rig::{
+    CoordinateSamples, Rig, RigRecording, SimulationError, Trajectory, TrajectoryError,
+};
 
 use crate::error::{Error, Outcome};
 use crate::host::Host;
@@ -101,7 +103,11 @@ impl Host {
 }
 
 /// The columns `t` and, per coordinate, its values and what there is of its derivatives.
-fn trajectory(rig: &Rig, recording: &SignalRecording, notes: &mut Vec<String>) -> Outcome<Trajectory> {
+fn trajectory(
+    rig: &Rig,
+    recording: &SignalRecording,
+    notes: &mut Vec<String>,
+) -> Outcome<Trajectory> {
     let given = |name: String| -> Outcome<Option<Vec<f64>>> {
         if recording.has_column(&name) {
             Ok(Some(recording.column(&name)?.to_vec()))

@@ -231,7 +231,11 @@ fn check(name: &str, path: &Path) {
         .iter()
         .map(|found| &found.effect)
         .collect();
-    assert_eq!(diagnosis.verdict, DiagnosisVerdict::Adequate, "{name}: {effects:?}");
+    assert_eq!(
+        diagnosis.verdict,
+        DiagnosisVerdict::Adequate,
+        "{name}: {effects:?}"
+    );
     assert!(effects.is_empty(), "{name}: {effects:?}");
     for error in [diagnosis.steps[0].fit, diagnosis.steps[0].check] {
         assert!(

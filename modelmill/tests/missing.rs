@@ -9,7 +9,9 @@ mod made;
 use std::path::Path;
 
 use modelmill::Model;
-use modelmill::diagnose::{DiagnosisFindings, FixedParameters, MissingEffect, DiagnosisOptions, DiagnosisVerdict};
+use modelmill::diagnose::{
+    DiagnosisFindings, DiagnosisOptions, DiagnosisVerdict, FixedParameters, MissingEffect,
+};
 use modelmill::identify::EstimatorOptions;
 use modelmill::recording::RecordingOptions;
 

@@ -9,8 +9,11 @@ use std::path::PathBuf;
 
 use modelmill::Model;
 use modelmill::print::LibrarySpelling;
-use modelmill::recording::{RecordingOptions, PreparedRecording};
-use modelmill::runs::{RunsOptions, RunChange, RunsComparison, ChangeEstimate, KnownLoad, PerRunSelection, UnreadRun, PhysicalChange};
+use modelmill::recording::{PreparedRecording, RecordingOptions};
+use modelmill::runs::{
+    ChangeEstimate, KnownLoad, PerRunSelection, PhysicalChange, RunChange, RunsComparison,
+    RunsOptions, UnreadRun,
+};
 
 use made::{Made, bundled, run};
 
@@ -196,7 +199,8 @@ fn one_run_alone_is_refused() {
     let one = model
         .recording(&file, &RecordingOptions::default())
         .expect("the recording");
-    let runs = |all: Vec<Result<&PreparedRecording, UnreadRun>>| model.runs(all, &RunsOptions::default());
+    let runs =
+        |all: Vec<Result<&PreparedRecording, UnreadRun>>| model.runs(all, &RunsOptions::default());
     let error = runs(vec![Ok(&one)]).err().expect("a refusal");
     assert!(error.to_string().contains("two or more"), "{error}");
     // A run that cannot be read is no reason to fail, unless nothing is left.

@@ -13,7 +13,7 @@ use modelmill::identify::EstimatorOptions;
 use modelmill::recording::RecordingOptions;
 use modelmill::variants::VariantComparison;
 use modelmill_codegen::{DynamicsPrograms, ModelEvaluator, MotionStates};
-use modelmill_spec::{FreeBody, FrameStep, TwistAxes};
+use modelmill_spec::{FrameStep, FreeBody, TwistAxes};
 
 use draws::Draws;
 
@@ -406,7 +406,8 @@ fn told(name: &str, text: &str, effect: &str, push: f64) -> Vec<(String, Vec<Str
         (model.recording(&file, &RecordingOptions::default())).expect("a recording")
     };
     let (fit, check) = (run(17), run(29));
-    let found = (model.diagnose(&[&fit], &[&check], &DiagnosisOptions::default())).expect("a diagnosis");
+    let found =
+        (model.diagnose(&[&fit], &[&check], &DiagnosisOptions::default())).expect("a diagnosis");
     let diagnosis = found.diagnosis;
     let error = diagnosis.steps[0].check;
     assert!(!effect.is_empty() || error < 0.15, "{name}: {error}");
@@ -598,8 +599,11 @@ fn cables_are_more_than_freedoms() {
     }
 
     // Beside a variant, figures are those of the rows.
-    let found =
-        VariantComparison::along_recordings([&model, &model.clone()], [&[&recording], &[&recording]]).expect("figures");
+    let found = VariantComparison::along_recordings(
+        [&model, &model.clone()],
+        [&[&recording], &[&recording]],
+    )
+    .expect("figures");
     let drives: Vec<&str> = found.drives.iter().map(|one| &*one.drive).collect();
     assert_eq!(drives, model.drives());
     assert!(

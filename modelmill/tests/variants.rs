@@ -6,8 +6,8 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use modelmill::print::LibrarySpelling;
-use modelmill::recording::{RecordingOptions, PreparedRecording};
-use modelmill::variants::{LimitCrossing, DriveVariants, VariantComparison};
+use modelmill::recording::{PreparedRecording, RecordingOptions};
+use modelmill::variants::{DriveVariants, LimitCrossing, VariantComparison};
 use modelmill::{Model, NoteSeverity, along};
 
 /// Two links in a vertical plane with a tool at the end of the second.
@@ -114,7 +114,8 @@ fn along(before: &Model, after: &Model, file: &Path) -> VariantComparison {
             .expect("a recording")
     };
     let (first, second): (PreparedRecording, PreparedRecording) = (read(before), read(after));
-    VariantComparison::along_recordings([before, after], [&[&first], &[&second]]).expect("both along the motion")
+    VariantComparison::along_recordings([before, after], [&[&first], &[&second]])
+        .expect("both along the motion")
 }
 
 #[track_caller]

@@ -1,6 +1,6 @@
 //! The model in the making: numbers get names, names that several numbers share get their mean.
 
-use crate::report::{ReductionReport, AssumptionSize};
+use crate::report::{AssumptionSize, ReductionReport};
 
 /// A named number and all that it stands for.
 #[derive(Clone, Debug)]
@@ -80,7 +80,11 @@ impl DraftSymbols {
                 3,
                 &symbol.name,
                 format!("stands for {}", who.join(" and ")),
-                vec![AssumptionSize::new("hides", symbol.largest_deviation(), symbol.unit)],
+                vec![AssumptionSize::new(
+                    "hides",
+                    symbol.largest_deviation(),
+                    symbol.unit,
+                )],
             );
         }
     }

@@ -4,8 +4,8 @@ use modelmill_rig::BodyAnchor;
 use nalgebra::Vector2;
 
 use crate::part::SubstitutionPart;
-use crate::report::{ReductionReport, AssumptionSize};
-use crate::samples::{MotionSample, MotionPlane, MotionSamples};
+use crate::report::{AssumptionSize, ReductionReport};
+use crate::samples::{MotionPlane, MotionSample, MotionSamples};
 
 /// A place as the model has it: on a part, in its frame, or in the plane.
 #[derive(Clone, Copy, Debug)]
@@ -49,8 +49,10 @@ pub(crate) fn check_linear(
     report: &mut ReductionReport,
 ) {
     let vectors = |moment: &MotionSample| {
-        let truth = plane.plane_position(&moment.place(&ends[1])) - plane.plane_position(&moment.place(&ends[0]));
-        let [from, to] = contacts.map(|contact| contact.plane_position(parts, moment, plane, samples));
+        let truth = plane.plane_position(&moment.place(&ends[1]))
+            - plane.plane_position(&moment.place(&ends[0]));
+        let [from, to] =
+            contacts.map(|contact| contact.plane_position(parts, moment, plane, samples));
         (truth, to - from)
     };
     let length = samples.largest(|moment| {

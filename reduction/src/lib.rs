@@ -28,13 +28,13 @@ mod report;
 mod samples;
 mod write;
 
-pub use export::{ExportError, DescriptionExport, DescriptionFormat as ExportFormat, export};
+pub use export::{DescriptionExport, DescriptionFormat as ExportFormat, ExportError, export};
 pub use import::{
-    ImportError, DescriptionImport, ImportedJoint, LARGEST_DESCRIPTION, Options as ImportOptions,
+    DescriptionImport, ImportError, ImportedJoint, LARGEST_DESCRIPTION, Options as ImportOptions,
     expand_includes, import,
 };
 pub use plan::{ReductionPlan, plan, plan_file, plan_file_with};
 pub use plan_for::default_plan;
 pub use reduce::{PlanarReduction, reduce};
-pub use report::{ReductionFinding, ReductionReport, AssumptionSize};
+pub use report::{AssumptionSize, ReductionFinding, ReductionReport};
 pub use samples::sampled_forces;

@@ -1,9 +1,9 @@
 //! Names of a plan looked up in its rig: bodies, groups, points, parts. All findings are collected.
 
-use modelmill_rig::{BodyAnchor, RigLog, Rig, source_span};
+use modelmill_rig::{BodyAnchor, Rig, RigLog, source_span};
 
 use crate::part::SubstitutionPart;
-use crate::plan::{PlanName, PlanEntry};
+use crate::plan::{PlanEntry, PlanName};
 
 /// A name that leads nowhere, which was reported.
 pub(crate) struct UnknownName;
@@ -59,7 +59,9 @@ impl<'a> PlanNames<'a> {
                 .find(|(group, _)| group == name.get_ref())
             {
                 None => log.unknown_name(0, name, "group", &known),
-                Some(_) if used.contains(name.get_ref()) => report_duplicate(name, "part or lumped mass", log),
+                Some(_) if used.contains(name.get_ref()) => {
+                    report_duplicate(name, "part or lumped mass", log)
+                }
                 Some((group, members)) => {
                     used.push(group.clone());
                     bodies.extend(members);

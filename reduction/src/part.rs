@@ -8,8 +8,8 @@ use modelmill_rig::{BodyAnchor, Rig};
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 
 use crate::planar::{PlanarBody, planar_body};
-use crate::report::{ReductionReport, AssumptionSize};
-use crate::samples::{MotionSample, MotionPlane, MotionSamples};
+use crate::report::{AssumptionSize, ReductionReport};
+use crate::samples::{MotionPlane, MotionSample, MotionSamples};
 
 /// A substitution part in the making.
 #[derive(Clone, Debug)]
@@ -31,20 +31,31 @@ impl SubstitutionPart {
     /// Direction of its longitudinal axis in the nominal configuration, rad.
     pub(crate) fn nominal_angle(&self, plane: &MotionPlane, samples: &MotionSamples) -> f64 {
         let nominal = &samples.nominal;
-        let axis =
-            plane.plane_position(&nominal.place(&self.to)) - plane.plane_position(&nominal.place(&self.joint[1]));
+        let axis = plane.plane_position(&nominal.place(&self.to))
+            - plane.plane_position(&nominal.place(&self.joint[1]));
         axis.y.atan2(axis.x)
     }
 
     /// By how much it has turned since then, rad, within half a turn.
-    pub(crate) fn rotation_angle(&self, moment: &MotionSample, plane: &MotionPlane, samples: &MotionSamples) -> f64 {
+    pub(crate) fn rotation_angle(
+        &self,
+        moment: &MotionSample,
+        plane: &MotionPlane,
+        samples: &MotionSamples,
+    ) -> f64 {
         body_rotation(self.bodies[0], moment, plane, samples)
     }
 
     /// A place of its leading body, in the part's frame.
-    pub(crate) fn local_position(&self, anchor: &BodyAnchor, plane: &MotionPlane, samples: &MotionSamples) -> Vector2<f64> {
+    pub(crate) fn local_position(
+        &self,
+        anchor: &BodyAnchor,
+        plane: &MotionPlane,
+        samples: &MotionSamples,
+    ) -> Vector2<f64> {
         let nominal = &samples.nominal;
-        let d = plane.plane_position(&nominal.place(anchor)) - plane.plane_position(&nominal.place(&self.joint[1]));
+        let d = plane.plane_position(&nominal.place(anchor))
+            - plane.plane_position(&nominal.place(&self.joint[1]));
         rotation(-self.nominal_angle(plane, samples)) * d
     }
 
@@ -56,7 +67,8 @@ impl SubstitutionPart {
         plane: &MotionPlane,
         samples: &MotionSamples,
     ) -> Vector2<f64> {
-        let angle = self.nominal_angle(plane, samples) + self.rotation_angle(moment, plane, samples);
+        let angle =
+            self.nominal_angle(plane, samples) + self.rotation_angle(moment, plane, samples);
         plane.plane_position(&moment.place(&self.joint[1])) + self.shift + rotation(angle) * local
     }
 }
@@ -68,7 +80,12 @@ pub(crate) fn rotation(angle: f64) -> Matrix2<f64> {
 }
 
 /// By how much a body has turned about the normal since the nominal configuration.
-fn body_rotation(body: usize, moment: &MotionSample, plane: &MotionPlane, samples: &MotionSamples) -> f64 {
+fn body_rotation(
+    body: usize,
+    moment: &MotionSample,
+    plane: &MotionPlane,
+    samples: &MotionSamples,
+) -> f64 {
     let then = samples.nominal.motion.bodies[body].R_WB.transpose() * plane.x;
     let now = plane.components(&(moment.motion.bodies[body].R_WB * then));
     now.y.atan2(now.x)
@@ -94,7 +111,10 @@ pub(crate) fn substitute(
     for &body in &part.bodies {
         let seen = planar_body(rig, body, plane, samples);
         let twist = samples.largest(|moment| {
-            wrap_angle(body_rotation(body, moment, plane, samples) - body_rotation(lead, moment, plane, samples))
+            wrap_angle(
+                body_rotation(body, moment, plane, samples)
+                    - body_rotation(lead, moment, plane, samples),
+            )
         });
         let solid = crate::planar::spatial_body(rig, body);
         let at = BodyAnchor {
@@ -141,7 +161,8 @@ fn fit_carried_point(
     let moments = || samples.moments.iter().chain([&samples.nominal]);
     for (i, moment) in moments().enumerate() {
         let (s, c) = part.rotation_angle(moment, plane, samples).sin_cos();
-        let d = plane.plane_position(&moment.place(at)) - plane.plane_position(&moment.place(&part.joint[1]));
+        let d = plane.plane_position(&moment.place(at))
+            - plane.plane_position(&moment.place(&part.joint[1]));
         for (row, values) in [(2 * i, [c, -s, 1.0, 0.0]), (2 * i + 1, [s, c, 0.0, 1.0])] {
             for (k, value) in values.into_iter().enumerate() {
                 matrix[(row, k)] = value;
@@ -236,7 +257,11 @@ pub(crate) fn lump_mass(
     });
     let mut sizes = part_residuals(&whole, &merge_bodies(&masses));
     sizes.push(AssumptionSize::new("turns at up to", turns, "rad/s"));
-    sizes.push(AssumptionSize::new("accelerates otherwise by up to", strays, "m/s^2"));
+    sizes.push(AssumptionSize::new(
+        "accelerates otherwise by up to",
+        strays,
+        "m/s^2",
+    ));
     let says = if sizes[3].is_significant() || sizes[4].is_significant() {
         "becomes a point mass; it turns or moves otherwise than the point, so that the residuals are felt"
     } else {

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use modelmill_boundary::files::{DiskFiles, FileSource};
-use modelmill_rig::{LoadFailure, RigLog, Rig, parse, source_span};
+use modelmill_rig::{LoadFailure, Rig, RigLog, parse, source_span};
 use modelmill_spec::{SourceFile, SourceFiles, read_text};
 use serde::Deserialize;
 use toml::Spanned;

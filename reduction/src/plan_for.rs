@@ -8,7 +8,7 @@ use std::fmt::Write as _;
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{Message, OptionName, Remedy};
-use modelmill_rig::{BodyAnchor, RigPoint, Rig};
+use modelmill_rig::{BodyAnchor, Rig, RigPoint};
 use nalgebra::Vector3;
 
 use crate::plan::{ReductionPlan, plan};
@@ -57,8 +57,8 @@ pub fn default_plan(rig: &Rig) -> Result<ReductionPlan, Message> {
         let Some(body) = from.body else { continue };
         carried[body] = true;
         let end = far_end(&rig, &hinges, body, &from.at);
-        let points =
-            [at, from, BodyAnchor { at: end, ..from }].map(|anchor| add_point(&mut rig, &name, anchor));
+        let points = [at, from, BodyAnchor { at: end, ..from }]
+            .map(|anchor| add_point(&mut rig, &name, anchor));
         let part = &rig.bodies[body].name;
         let on = at
             .body

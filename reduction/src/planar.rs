@@ -6,7 +6,7 @@
 use modelmill_rig::Rig;
 use nalgebra::{Matrix3, Vector2, Vector3};
 
-use crate::report::{ReductionReport, AssumptionSize};
+use crate::report::{AssumptionSize, ReductionReport};
 use crate::samples::{MotionPlane, MotionSamples};
 
 /// A body with all masses that are fixed to it.
@@ -71,7 +71,12 @@ pub(crate) struct PlanarBody {
 }
 
 /// One body as the plane sees it.
-pub(crate) fn planar_body(rig: &Rig, body: usize, plane: &MotionPlane, samples: &MotionSamples) -> PlanarBody {
+pub(crate) fn planar_body(
+    rig: &Rig,
+    body: usize,
+    plane: &MotionPlane,
+    samples: &MotionSamples,
+) -> PlanarBody {
     let solid = spatial_body(rig, body);
     let moves = &samples.nominal.motion.bodies[body];
     let n = moves.R_WB.transpose() * plane.normal;

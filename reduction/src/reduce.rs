@@ -5,11 +5,11 @@ use crate::names::PlanNames;
 use crate::part::SubstitutionPart;
 use crate::plan::ReductionPlan;
 use crate::planar::{PlanarBody, check_group, out_of_plane_rate};
-use crate::report::{ReductionReport, AssumptionSize};
+use crate::report::{AssumptionSize, ReductionReport};
 use crate::samples::{MotionPlane, MotionSamples};
-use crate::write::{significant_digits, model_file};
+use crate::write::{model_file, significant_digits};
 use modelmill_boundary::files::MemoryFiles;
-use modelmill_rig::{LoadFailure, RigLog, Rig, plain_error};
+use modelmill_rig::{LoadFailure, Rig, RigLog, plain_error};
 
 /// What a reduction gives.
 #[derive(Clone, Debug, PartialEq)]
@@ -50,7 +50,11 @@ pub fn reduce(rig: &Rig, plan: &ReductionPlan) -> Result<PlanarReduction, LoadFa
     }
 }
 
-fn run(rig: &Rig, plan: &ReductionPlan, log: &mut RigLog) -> Option<(PlanarDraft, ReductionReport)> {
+fn run(
+    rig: &Rig,
+    plan: &ReductionPlan,
+    log: &mut RigLog,
+) -> Option<(PlanarDraft, ReductionReport)> {
     let entry = &plan.entry;
     let names = PlanNames::new(rig, entry, log);
     let plane = MotionPlane::new(entry.plane.at, entry.plane.normal, entry.plane.x);
@@ -65,8 +69,10 @@ fn run(rig: &Rig, plan: &ReductionPlan, log: &mut RigLog) -> Option<(PlanarDraft
             return None;
         }
         Err(error) => {
-            log.0
-                .push(plain_error(None, format!("the rig does not stand: {error}")));
+            log.0.push(plain_error(
+                None,
+                format!("the rig does not stand: {error}"),
+            ));
             return None;
         }
     };
@@ -151,7 +157,11 @@ impl ReductionState<'_> {
             1,
             "motion",
             format!("all bodies stay in the plane at {poses} sampled poses{reach}"),
-            vec![AssumptionSize::new("largest rate out of it", out, "m/s or rad/s")],
+            vec![AssumptionSize::new(
+                "largest rate out of it",
+                out,
+                "m/s or rad/s",
+            )],
         );
         let across = self.plane.normal.dot(&rig.gravity);
         let flat = self.plane.components(&rig.gravity);

@@ -5,7 +5,7 @@ use modelmill_rig::{RigLog, source_span};
 use crate::draft::DraftEffect;
 use crate::drive::check_linear;
 use crate::plan::PlanName;
-use crate::reduce::{TOLERANCE, ReductionState};
+use crate::reduce::{ReductionState, TOLERANCE};
 use crate::report::AssumptionSize;
 use crate::write::significant_digits;
 
@@ -26,8 +26,9 @@ impl ReductionState<'_> {
                 self.contact_place(&anchor, part)
             });
             let gap = self.samples.largest(|moment| {
-                let [p, r] = places
-                    .map(|place| place.plane_position(&self.parts, moment, &self.plane, &self.samples));
+                let [p, r] = places.map(|place| {
+                    place.plane_position(&self.parts, moment, &self.plane, &self.samples)
+                });
                 (p - r).norm()
             });
             if gap > TOLERANCE || gap.is_nan() {
@@ -189,7 +190,9 @@ impl ReductionState<'_> {
     /// Every group is in the model, or left out by name.
     pub(crate) fn check_completeness(&mut self, log: &mut RigLog) {
         let (rig, plan) = (self.names.rig, self.names.plan);
-        let left = self.names.bodies(&plan.leave_out, &mut self.used_groups, log);
+        let left = self
+            .names
+            .bodies(&plan.leave_out, &mut self.used_groups, log);
         for body in left {
             let solid = crate::planar::spatial_body(rig, body);
             self.report.add(

@@ -4,12 +4,12 @@
 use modelmill_rig::{BodyAnchor, RigLog, source_span};
 use nalgebra::Vector2;
 
-use crate::draft::{DraftCoordinate, DraftPart, DraftPoint, DraftFrame, round_to_12_digits};
+use crate::draft::{DraftCoordinate, DraftFrame, DraftPart, DraftPoint, round_to_12_digits};
 use crate::drive::ContactPlace;
 use crate::part::{SubstitutionPart, lump_mass, part_residuals, substitute};
 use crate::plan::{PlanName, PlanPartEntry};
 use crate::planar::PlanarBody;
-use crate::reduce::{TOLERANCE, ReductionState, ZERO};
+use crate::reduce::{ReductionState, TOLERANCE, ZERO};
 use crate::samples::MotionSample;
 use crate::write::significant_digits;
 
@@ -109,7 +109,9 @@ impl ReductionState<'_> {
         // What the model moves in the plane: the carrier's own shift, and the gap at the joint.
         let carried = parent.map_or_else(Vector2::zeros, |parent| self.parts[parent].shift);
         let gap = |moment: &MotionSample| {
-            self.plane.plane_position(&moment.place(&at)) - self.plane.plane_position(&moment.place(&from)) + carried
+            self.plane.plane_position(&moment.place(&at))
+                - self.plane.plane_position(&moment.place(&from))
+                + carried
         };
         part.shift = gap(&self.samples.nominal);
         let strays = self
@@ -399,7 +401,8 @@ impl ReductionState<'_> {
                 centre: Vector2::new(value(&part.centre[0]), value(&part.centre[1])),
                 inertia: draft.inertias.value(&part.inertia),
             };
-            self.report.add(2, &part.on, says, part_residuals(whole, &said));
+            self.report
+                .add(2, &part.on, says, part_residuals(whole, &said));
         }
     }
 
@@ -462,7 +465,11 @@ impl ReductionState<'_> {
     }
 
     /// A point of the model, declared when it is first used.
-    pub(crate) fn model_point(&mut self, name: &PlanName, log: &mut RigLog) -> Option<(String, BodyAnchor)> {
+    pub(crate) fn model_point(
+        &mut self,
+        name: &PlanName,
+        log: &mut RigLog,
+    ) -> Option<(String, BodyAnchor)> {
         let anchor = self.names.point(name, log)?;
         let part = self.names.owner(&self.parts, &anchor, name, log).ok()?;
         let contact = self.contact_place(&anchor, part);
@@ -472,7 +479,9 @@ impl ReductionState<'_> {
 
     pub(crate) fn contact_place(&self, anchor: &BodyAnchor, part: Option<usize>) -> ContactPlace {
         let at = match part {
-            None => self.plane.plane_position(&self.samples.nominal.place(anchor)),
+            None => self
+                .plane
+                .plane_position(&self.samples.nominal.place(anchor)),
             Some(part) => self.parts[part].local_position(anchor, &self.plane, &self.samples),
         };
         ContactPlace { part, at }

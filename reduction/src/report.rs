@@ -52,7 +52,13 @@ impl AssumptionSize {
 }
 
 impl ReductionReport {
-    pub(crate) fn add(&mut self, step: u8, about: &str, says: impl Into<String>, sizes: Vec<AssumptionSize>) {
+    pub(crate) fn add(
+        &mut self,
+        step: u8,
+        about: &str,
+        says: impl Into<String>,
+        sizes: Vec<AssumptionSize>,
+    ) {
         self.findings.push(ReductionFinding {
             step,
             about: about.to_owned(),

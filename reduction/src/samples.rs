@@ -3,7 +3,7 @@
 //! Coordinates, rates and accelerations come from a low-discrepancy sequence (M. Roberts 2018, after H. Weyl), so
 //! that few samples fill the space evenly and every run has the same ones.
 
-use modelmill_rig::{BodyAnchor, BodyMotion, RigMotion, RigPoseError, Rig, RigState, RigTracker};
+use modelmill_rig::{BodyAnchor, BodyMotion, Rig, RigMotion, RigPoseError, RigState, RigTracker};
 use nalgebra::{Vector2, Vector3};
 
 /// The plane of motion.

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use crate::draft::{PlanarDraft, DraftSymbol, DraftSymbols};
+use crate::draft::{DraftSymbol, DraftSymbols, PlanarDraft};
 
 /// The text of a model file.
 pub(crate) fn model_file(draft: &PlanarDraft) -> String {

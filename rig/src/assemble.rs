@@ -7,8 +7,8 @@ use crate::assemble_sensors::channels;
 use crate::effect::RigEffect;
 use crate::effect_by_name::EffectPart;
 use crate::file::{
-    BodyEntry, RigCoordinateEntry, RigDriveEntry, RigEffectEntry, RigJointEntry, LengthEntry, RigLumpedMassEntry,
-    RigName, RigEntry,
+    BodyEntry, LengthEntry, RigCoordinateEntry, RigDriveEntry, RigEffectEntry, RigEntry,
+    RigJointEntry, RigLumpedMassEntry, RigName,
 };
 use crate::joint;
 use crate::load::source_span;
@@ -16,7 +16,7 @@ use crate::log::{FileItem, RigLog, above_zero, not_negative, vector};
 use crate::merge::MergedRig;
 use crate::pair::{BodyAnchor, PairFunction, PairQuantity};
 use crate::pose::BodyPose;
-use crate::rig::{RigBody, RigCoordinate, RigDrive, RigJoint, RigLumpedMass, RigPoint, Rig};
+use crate::rig::{Rig, RigBody, RigCoordinate, RigDrive, RigJoint, RigLumpedMass, RigPoint};
 use crate::sensor::RigSensors;
 
 /// Makes the rig of a chain of files, the rig's own first, then what it extends.
@@ -256,7 +256,11 @@ fn find_joint(rig: &Rig, file: usize, name: &RigName, log: &mut RigLog) -> Optio
     }
 }
 
-fn lumped_mass(rig: &Rig, item: &FileItem<RigLumpedMassEntry>, log: &mut RigLog) -> Option<RigLumpedMass> {
+fn lumped_mass(
+    rig: &Rig,
+    item: &FileItem<RigLumpedMassEntry>,
+    log: &mut RigLog,
+) -> Option<RigLumpedMass> {
     let (file, entry) = (item.file, &item.entry);
     let mass = not_negative(file, Some(&entry.mass), "a mass", log);
     let at = find_point(rig, file, &entry.at, log)?;
@@ -295,7 +299,12 @@ fn joint(rig: &Rig, item: &FileItem<RigJointEntry>, log: &mut RigLog) -> RigJoin
         motion: None,
     };
     let Some(kind) = joint::RigJointKind::from_name(entry.kind.get_ref()) else {
-        log.unknown_name(file, &entry.kind, "kind of joint", &joint::RigJointKind::NAMES);
+        log.unknown_name(
+            file,
+            &entry.kind,
+            "kind of joint",
+            &joint::RigJointKind::NAMES,
+        );
         return joint;
     };
     let [one, two] = entry.between.get_ref();
@@ -333,7 +342,8 @@ fn joint(rig: &Rig, item: &FileItem<RigJointEntry>, log: &mut RigLog) -> RigJoin
     let Some([from, to]) = joint_anchors(rig, file, entry, [first, second], log) else {
         return joint;
     };
-    let nominal = |body: Option<usize>| body.map_or_else(BodyPose::identity, |b| rig.bodies[b].nominal);
+    let nominal =
+        |body: Option<usize>| body.map_or_else(BodyPose::identity, |b| rig.bodies[b].nominal);
     let parts = joint::equations(
         kind,
         from,
@@ -354,7 +364,8 @@ fn joint_anchors(
     bodies: [Option<usize>; 2],
     log: &mut RigLog,
 ) -> Option<[BodyAnchor; 2]> {
-    let nominal = |body: Option<usize>| body.map_or_else(BodyPose::identity, |b| rig.bodies[b].nominal);
+    let nominal =
+        |body: Option<usize>| body.map_or_else(BodyPose::identity, |b| rig.bodies[b].nominal);
     let on = |body: Option<usize>, p_W: Vector3<f64>| {
         let pose = nominal(body);
         BodyAnchor {
@@ -463,10 +474,11 @@ fn coordinate(rig: &mut Rig, item: &FileItem<RigCoordinateEntry>, log: &mut RigL
             None
         }
     };
-    rig.coordinates.extend(measures.map(|measures| RigCoordinate {
-        name: entry.name.get_ref().clone(),
-        measures,
-    }));
+    rig.coordinates
+        .extend(measures.map(|measures| RigCoordinate {
+            name: entry.name.get_ref().clone(),
+            measures,
+        }));
 }
 
 fn drive(rig: &mut Rig, item: &FileItem<RigDriveEntry>, log: &mut RigLog) {
@@ -523,7 +535,12 @@ fn effect(rig: &Rig, item: &FileItem<RigEffectEntry>, log: &mut RigLog) -> Optio
                 named.map_or(entry.kind.span(), toml::Spanned::span)
             }
         };
-        log.error(source_span(file, &range), found.message, &found.expected, &found.help);
+        log.error(
+            source_span(file, &range),
+            found.message,
+            &found.expected,
+            &found.help,
+        );
     }
     None
 }

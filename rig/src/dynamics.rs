@@ -134,7 +134,8 @@ fn body_forces(rig: &Rig, motion: &RigMotion) -> DVector<f64> {
     for lumped in &rig.lumped_masses {
         if let Some(b) = lumped.at.body {
             let moves = &motion.bodies[b];
-            let inertial = |at: &Vector3<f64>| lumped.mass * (moves.point_acceleration(at) - gravity);
+            let inertial =
+                |at: &Vector3<f64>| lumped.mass * (moves.point_acceleration(at) - gravity);
             let arm = moves.R_WB * lumped.moment_at;
             add(
                 b,

@@ -241,11 +241,43 @@ impl RigLaw {
             "drive_inertia" => const { &[any_value("Ia")] },
             "force_offset" => const { &[any_value("F0")] },
             "spring" => const { &[any_value("k"), zero_by_default("rest")] },
-            "force_ripple" => const { &[zero_by_default("As"), zero_by_default("Ac"), positive_value("pitch", None)] },
-            "coupled_drive" => const { &[zero_by_default("Ia"), zero_by_default("Fv"), zero_by_default("Fs")] },
-            "rod_inertia" => const { &[not_negative_value("m"), any_value("c"), not_negative_value("I")] },
+            "force_ripple" => {
+                const {
+                    &[
+                        zero_by_default("As"),
+                        zero_by_default("Ac"),
+                        positive_value("pitch", None),
+                    ]
+                }
+            }
+            "coupled_drive" => {
+                const {
+                    &[
+                        zero_by_default("Ia"),
+                        zero_by_default("Fv"),
+                        zero_by_default("Fs"),
+                    ]
+                }
+            }
+            "rod_inertia" => {
+                const {
+                    &[
+                        not_negative_value("m"),
+                        any_value("c"),
+                        not_negative_value("I"),
+                    ]
+                }
+            }
             "point_mass" | "lumped_mass_placement" => const { &[any_value("m")] },
-            "gravity_tilt" => const { &[zero_by_default("tx"), zero_by_default("ty"), zero_by_default("tz")] },
+            "gravity_tilt" => {
+                const {
+                    &[
+                        zero_by_default("tx"),
+                        zero_by_default("ty"),
+                        zero_by_default("tz"),
+                    ]
+                }
+            }
             "time_delay" => const { &[not_negative_value("T")] },
             _ => return None,
         })

@@ -250,7 +250,10 @@ impl Rig {
             }
             AllowedPlaces::Points | AllowedPlaces::TwoPointsOfABody => {
                 let point = self.points.iter().position(|point| point.name == name)?;
-                self.points[point].anchor.body.map(|_| RigPlace::Point(point))
+                self.points[point]
+                    .anchor
+                    .body
+                    .map(|_| RigPlace::Point(point))
             }
             AllowedPlaces::Base => (name == "base").then_some(RigPlace::Base),
             AllowedPlaces::Force => (name == "force").then_some(RigPlace::Force),

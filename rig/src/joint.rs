@@ -66,8 +66,10 @@ pub(crate) fn equations(
         || [Vector3::x(), Vector3::y(), Vector3::z()].map(|n| pair(PairQuantity::Component(n)));
     let on_line = || [&u, &v].map(|n| pair(PairQuantity::Along(on(0, n))));
     let parallel = || [&u, &v].map(|n| pair(PairQuantity::Cosine(on(0, n), on(1, axis))));
-    let locked =
-        || [(&u, &v), (&v, axis), (axis, &u)].map(|(a, b)| pair(PairQuantity::Cosine(on(0, a), on(1, b))));
+    let locked = || {
+        [(&u, &v), (&v, axis), (axis, &u)]
+            .map(|(a, b)| pair(PairQuantity::Cosine(on(0, a), on(1, b))))
+    };
     let mut held: Vec<PairFunction> = Vec::new();
     let mut motion = None;
     match kind {

@@ -134,7 +134,10 @@ impl<'r> RigTracker<'r> {
     pub fn new(rig: &'r Rig) -> Result<Self, RigPoseError> {
         let base = BodyMotion::at_standstill(BodyPose::identity());
         let poses: Vec<BodyPose> = rig.bodies.iter().map(|body| body.nominal).collect();
-        let at_rest: Vec<BodyMotion> = poses.iter().map(|p| BodyMotion::at_standstill(*p)).collect();
+        let at_rest: Vec<BodyMotion> = poses
+            .iter()
+            .map(|p| BodyMotion::at_standstill(*p))
+            .collect();
         let joints = rig.joints.iter();
         let mut equations: Vec<(PairFunction, f64)> =
             joints.clone().flat_map(|j| j.equations.clone()).collect();
@@ -170,7 +173,11 @@ impl<'r> RigTracker<'r> {
         let n = 6 * self.rig.bodies.len();
         let coordinates = self.last.len();
         let n_joint = self.equations.len() - coordinates;
-        let bodies: Vec<BodyMotion> = self.poses.iter().map(|p| BodyMotion::at_standstill(*p)).collect();
+        let bodies: Vec<BodyMotion> = self
+            .poses
+            .iter()
+            .map(|p| BodyMotion::at_standstill(*p))
+            .collect();
         let mut jacobian: DMatrix<f64> = DMatrix::zeros(n_joint.max(n), n);
         for (i, (pair, _)) in self.equations[..n_joint].iter().enumerate() {
             let derived = pair.derive(&bodies, &self.base);
@@ -203,7 +210,11 @@ impl<'r> RigTracker<'r> {
             .iter()
             .zip(&self.last)
             .enumerate()
-            .map(|(k, (to, from))| self.rig.coordinates[k].measures.wrapped_difference(*to, *from))
+            .map(|(k, (to, from))| {
+                self.rig.coordinates[k]
+                    .measures
+                    .wrapped_difference(*to, *from)
+            })
             .fold(0.0, |most: f64, step| most.max(step.abs()));
         // Small steps keep to the assembly in which the rig is drawn.
         let n_steps = (far / CONTINUATION_STEP).min(1e4).ceil();
@@ -215,7 +226,9 @@ impl<'r> RigTracker<'r> {
                 .zip(&state.q)
                 .enumerate()
                 .map(|(k, (from, to))| {
-                    let whole = self.rig.coordinates[k].measures.wrapped_difference(*to, *from);
+                    let whole = self.rig.coordinates[k]
+                        .measures
+                        .wrapped_difference(*to, *from);
                     from + whole * step / n_steps
                 })
                 .collect();
@@ -242,7 +255,10 @@ impl<'r> RigTracker<'r> {
         let mut last_length = f64::INFINITY;
         let mut is_fresh = false;
         for _ in 0..MOST_STEPS {
-            let bodies: Vec<BodyMotion> = poses.iter().map(|p| BodyMotion::at_standstill(*p)).collect();
+            let bodies: Vec<BodyMotion> = poses
+                .iter()
+                .map(|p| BodyMotion::at_standstill(*p))
+                .collect();
             let derived = self.derive(&bodies);
             let mut residual = DMatrix::zeros(self.equations.len(), 1);
             for (i, ((pair, target), derived)) in self.equations.iter().zip(&derived).enumerate() {

@@ -41,16 +41,17 @@ pub use dynamics::{ScalarMotion, energy};
 pub use effect::{RigEffect, RigLaw, RigPlace, ValueOfKind, ValueSign};
 pub use effect_by_name::{EffectFault, EffectPart};
 pub use kinematics::{RigMotion, RigPoseError, RigState, RigTracker};
-pub use load::{LoadedRig, plain_error, load, load_file, load_file_with, parse, source_span};
+pub use load::{LoadedRig, load, load_file, load_file_with, parse, plain_error, source_span};
 pub use log::RigLog;
 pub use modelmill_spec::LoadFailure;
 pub use noise::GaussianNoise;
 pub use pair::{BodyAnchor, PairFunction};
-pub use plant::{RigPlant, PlantError};
+pub use plant::{PlantError, RigPlant};
 pub use pose::{BodyMotion, BodyPose};
-pub use rig::{RigBody, RigCoordinate, RigDrive, RigJoint, RigLumpedMass, RigPoint, Rig};
-pub use sensor::{SensorChannel, RigSensors};
+pub use rig::{Rig, RigBody, RigCoordinate, RigDrive, RigJoint, RigLumpedMass, RigPoint};
+pub use sensor::{RigSensors, SensorChannel};
 pub use simulate::{
-    SimulatedInstant, RigRecording, SimulationError, forces, forces_along, place_motion, n_instants, simulate,
+    RigRecording, SimulatedInstant, SimulationError, forces, forces_along, n_instants,
+    place_motion, simulate,
 };
 pub use trajectory::{CoordinateSamples, Trajectory, TrajectoryError};

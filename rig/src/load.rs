@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 
 use modelmill_boundary::files::{DiskFiles, FileSource, normalise_path};
 use modelmill_spec::{
-    Diagnostic, LoadFailure, LARGEST_FILE, DiagnosticSeverity, SourceFile, SourceFiles, SourceSpan, read_referenced, read_text,
+    Diagnostic, DiagnosticSeverity, LARGEST_FILE, LoadFailure, SourceFile, SourceFiles, SourceSpan,
+    read_referenced, read_text,
 };
 
 use crate::assemble::assemble;
@@ -121,7 +122,10 @@ pub fn parse<T: serde::de::DeserializeOwned>(
     file: usize,
 ) -> Result<T, Box<Diagnostic>> {
     if text.len() > LARGEST_FILE {
-        return Err(Box::new(plain_error(None, "this file is too large to be meant")));
+        return Err(Box::new(plain_error(
+            None,
+            "this file is too large to be meant",
+        )));
     }
     toml::from_str(text).map_err(|error| {
         let place = error.span().map(|range| source_span(file, &range));

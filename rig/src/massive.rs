@@ -82,7 +82,8 @@ pub(crate) fn inertial_forces(
         RigLaw::RodInertia { m, c, I } => {
             for place in &effect.places {
                 if let Some(pair) = place.pair(rig) {
-                    let [pivot, slide] = rod_forces(motion, [&pair.from, &pair.to], m, c, I, gravity);
+                    let [pivot, slide] =
+                        rod_forces(motion, [&pair.from, &pair.to], m, c, I, gravity);
                     push(&pair.from, pivot);
                     push(&pair.to, slide);
                 }
@@ -129,7 +130,9 @@ fn rod_forces(
 }
 
 fn anchor_motion(motion: &RigMotion, anchor: &BodyAnchor) -> BodyMotion {
-    anchor.body.map_or_else(base_motion, |body| motion.bodies[body])
+    anchor
+        .body
+        .map_or_else(base_motion, |body| motion.bodies[body])
 }
 
 fn point_anchor(rig: &Rig, place: RigPlace) -> Option<BodyAnchor> {
@@ -157,7 +160,10 @@ pub(crate) fn energy(rig: &Rig, motion: &RigMotion, gravity: &Vector3<f64>) -> f
                     if let Some(pair) = place.pair(rig) {
                         let [one, two] = [&pair.from, &pair.to].map(|anchor| {
                             let moves = anchor_motion(motion, anchor);
-                            [moves.point_position(&anchor.at), moves.point_velocity(&anchor.at)]
+                            [
+                                moves.point_position(&anchor.at),
+                                moves.point_velocity(&anchor.at),
+                            ]
                         });
                         let d = two[0] - one[0];
                         let u = d / d.norm();

@@ -1,8 +1,8 @@
 //! A rig file and those that it extends, as one: entries of a variant replace those of the same name or join them.
 
 use crate::file::{
-    BodyEntry, RigCoordinateEntry, RigDriveEntry, RigEffectEntry, RigJointEntry, RigLumpedMassEntry, RigName,
-    RigPointEntry, RigEntry, SensorEntry, SpannedTriple,
+    BodyEntry, RigCoordinateEntry, RigDriveEntry, RigEffectEntry, RigEntry, RigJointEntry,
+    RigLumpedMassEntry, RigName, RigPointEntry, SensorEntry, SpannedTriple,
 };
 use crate::load::source_span;
 use crate::log::{FileItem, RigLog};
@@ -57,7 +57,13 @@ impl MergedRig {
                 log,
             ),
             joints: collect_items(file, entry.joint, "joint", |e| Some(&e.name), log),
-            coordinates: collect_items(file, entry.coordinate, "coordinate", |e| Some(&e.name), log),
+            coordinates: collect_items(
+                file,
+                entry.coordinate,
+                "coordinate",
+                |e| Some(&e.name),
+                log,
+            ),
             drives: collect_items(file, entry.drive, "drive", |e| Some(&e.name), log),
             effects: collect_items(file, entry.effect, "effect", |e| e.name.as_ref(), log),
             encoders: collect_items(file, entry.encoder, "encoder", |_| None, log),
@@ -132,7 +138,11 @@ fn collect_items<T>(
 }
 
 /// Entries of a variant replace those of the same name where they stand, or join them.
-fn merge_items<T>(base: &mut Vec<FileItem<T>>, variant: Vec<FileItem<T>>, name: impl Fn(&T) -> Option<&RigName>) {
+fn merge_items<T>(
+    base: &mut Vec<FileItem<T>>,
+    variant: Vec<FileItem<T>>,
+    name: impl Fn(&T) -> Option<&RigName>,
+) {
     for item in variant {
         let twin = base.iter().position(|other| {
             name(&item.entry).is_some_and(|mine| {

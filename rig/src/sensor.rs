@@ -45,7 +45,7 @@ impl SensorChannel {
 
 #[cfg(test)]
 mod tests {
-    use super::{SensorChannel, GaussianNoise};
+    use super::{GaussianNoise, SensorChannel};
 
     #[test]
     fn readings_are_whole_steps_near_the_value() {

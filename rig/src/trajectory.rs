@@ -78,7 +78,10 @@ impl Trajectory {
     /// From times, s, and one entry per coordinate.
     ///
     /// Fails when times do not grow, lengths differ, or derivatives cannot be found.
-    pub fn new(time: Vec<f64>, coordinates: Vec<CoordinateSamples>) -> Result<Self, TrajectoryError> {
+    pub fn new(
+        time: Vec<f64>,
+        coordinates: Vec<CoordinateSamples>,
+    ) -> Result<Self, TrajectoryError> {
         if time.is_empty() {
             return Err(TrajectoryError::Empty);
         }

@@ -7,7 +7,7 @@
 
 use core::fmt;
 
-use crate::{ScalarNumbers, OutputSink, PoseError, Real, Var, check_finite};
+use crate::{OutputSink, PoseError, Real, ScalarNumbers, Var, check_finite};
 
 /// A straight-line program of a model, for states given as `INPUTS` numbers each.
 pub trait StateProgram<T: Real, const INPUTS: usize, const OUTPUTS: usize> {
@@ -210,7 +210,9 @@ trait BlockVisitor<L, const OUTPUTS: usize> {
 /// A function that looks at them.
 struct FunctionVisitor<F>(F);
 
-impl<L, F: FnMut(StateBlock<'_, L, OUTPUTS>), const OUTPUTS: usize> BlockVisitor<L, OUTPUTS> for FunctionVisitor<F> {
+impl<L, F: FnMut(StateBlock<'_, L, OUTPUTS>), const OUTPUTS: usize> BlockVisitor<L, OUTPUTS>
+    for FunctionVisitor<F>
+{
     #[inline]
     fn visit(&mut self, block: StateBlock<'_, L, OUTPUTS>) {
         (self.0)(block);
@@ -220,7 +222,9 @@ impl<L, F: FnMut(StateBlock<'_, L, OUTPUTS>), const OUTPUTS: usize> BlockVisitor
 /// Columns that they are written to.
 struct ColumnVisitor<'a, 'b, T, const OUTPUTS: usize>(&'a mut [&'b mut [T]; OUTPUTS]);
 
-impl<T: Copy, L: CacheLine<T>, const OUTPUTS: usize> BlockVisitor<L, OUTPUTS> for ColumnVisitor<'_, '_, T, OUTPUTS> {
+impl<T: Copy, L: CacheLine<T>, const OUTPUTS: usize> BlockVisitor<L, OUTPUTS>
+    for ColumnVisitor<'_, '_, T, OUTPUTS>
+{
     #[allow(
         clippy::inline_always,
         reason = "a function of its own would copy with the narrowest vectors"
@@ -404,7 +408,8 @@ where
                         load_line(line, array, first, len);
                     }
                     if P::COMPLETED > 0
-                        && let Err((k, reason)) = complete_line(self.program, &mut lines, len, &mut last)
+                        && let Err((k, reason)) =
+                            complete_line(self.program, &mut lines, len, &mut last)
                     {
                         (len, fault) = (k, Some(reason));
                     }

@@ -25,15 +25,15 @@ mod wide;
 use core::cmp::Ordering;
 use core::fmt;
 
-pub use arithmetic::{DeferredProduct, Term, ProgramValue, Var};
+pub use arithmetic::{DeferredProduct, ProgramValue, Term, Var};
 pub use geometry::{SpecialGeometry, divisor};
 pub use lanes::{LARGEST_ANGLE, sin_cos_lanes};
 pub use loops::{Loops, Scales, correct, follow, solve_passive};
 pub use model::{
-    Assembly, Drives, ContinuationProgram, Linearisation, LoadedState, Passive, Run, ProgramRun, State,
-    accelerations, run_checked, check_base, run_unchecked, check_block_input,
+    Assembly, ContinuationProgram, Drives, Linearisation, LoadedState, Passive, ProgramRun, Run,
+    State, accelerations, check_base, check_block_input, run_checked, run_unchecked,
 };
-pub use numbers::{AngleBatch, Numbers, ScalarNumbers, OutputSink, ZeroedOutputs};
+pub use numbers::{AngleBatch, Numbers, OutputSink, ScalarNumbers, ZeroedOutputs};
 pub use reactions::{ClosedLoop, Joint, Wrench};
 pub use real::Real;
 pub use self_test::{Random, SelfTestError, ShowRows, self_test};
@@ -42,9 +42,9 @@ pub use solve::solve;
 /// What emitted modules bring into scope.
 pub mod emitted {
     pub use crate::{
-        Assembly, BaseParameter, Linearisation, Loops, Numbers, ScalarNumbers, PoseError, Quantity, Real, Run,
-        Scales, SpecialGeometry, Term, Var, accelerations, run_checked, check_base, check_finite, divisor,
-        run_unchecked, read, solve_passive, values, variables,
+        Assembly, BaseParameter, Linearisation, Loops, Numbers, PoseError, Quantity, Real, Run,
+        ScalarNumbers, Scales, SpecialGeometry, Term, Var, accelerations, check_base, check_finite,
+        divisor, read, run_checked, run_unchecked, solve_passive, values, variables,
     };
 }
 

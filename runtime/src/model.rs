@@ -2,8 +2,8 @@
 
 use crate::blocks::{BlockError, StateProgram};
 use crate::{
-    Loops, OutputSink, PoseError, Real, ZeroedOutputs, Scales, Term, Var, check_finite, correct, follow,
-    solve,
+    Loops, OutputSink, PoseError, Real, Scales, Term, Var, ZeroedOutputs, check_finite, correct,
+    follow, solve,
 };
 
 /// Motion of the independent coordinates, rad or m, and seconds.
@@ -77,7 +77,9 @@ impl<T, const ACTIVE: usize, const DRIVES: usize> OutputSink<T> for Drives<T, AC
     }
 }
 
-impl<T: Real, const ACTIVE: usize, const DRIVES: usize> ZeroedOutputs<T> for Drives<T, ACTIVE, DRIVES> {
+impl<T: Real, const ACTIVE: usize, const DRIVES: usize> ZeroedOutputs<T>
+    for Drives<T, ACTIVE, DRIVES>
+{
     fn zeros() -> Self {
         Self {
             coordinate: ZeroedOutputs::zeros(),
@@ -123,7 +125,9 @@ impl<T, const VALUES: usize, const ROWS: usize> OutputSink<T> for Linearisation<
     }
 }
 
-impl<T: Real, const VALUES: usize, const ROWS: usize> ZeroedOutputs<T> for Linearisation<T, VALUES, ROWS> {
+impl<T: Real, const VALUES: usize, const ROWS: usize> ZeroedOutputs<T>
+    for Linearisation<T, VALUES, ROWS>
+{
     fn zeros() -> Self {
         Self {
             values: ZeroedOutputs::zeros(),

@@ -5,7 +5,7 @@
 
 use core::marker::PhantomData;
 
-use crate::arithmetic::{Term, ProgramValue, Var};
+use crate::arithmetic::{ProgramValue, Term, Var};
 use crate::{PoseError, Real};
 
 /// Arithmetic of a program: whatever needs more than what its variables know themselves.

@@ -14,8 +14,10 @@ use std::sync::OnceLock;
 
 use pulp::{Arch, Simd, WithSimd};
 
-use crate::arithmetic::{Term, ProgramValue, Var};
-use crate::blocks::{BlockError, BlockScalar, VectorJob, CacheLine, Line32, Line64, StateProgram, VectorWidth};
+use crate::arithmetic::{ProgramValue, Term, Var};
+use crate::blocks::{
+    BlockError, BlockScalar, CacheLine, Line32, Line64, StateProgram, VectorJob, VectorWidth,
+};
 use crate::lanes::{self, LARGEST_ANGLE, reduced_sin_cos};
 use crate::numbers::AngleBatch;
 use crate::{Numbers, OutputSink, PoseError, Real};

@@ -13,7 +13,7 @@ use std::process::Command;
 use std::time::Instant;
 
 use modelmill_codegen::expr::{Atom, Unary};
-use modelmill_codegen::{Derivation, ModelEvaluator, ProgramOp, PoseFault, StraightLineProgram};
+use modelmill_codegen::{Derivation, ModelEvaluator, PoseFault, ProgramOp, StraightLineProgram};
 use modelmill_identify::{LeastSquares, LeastSquaresError};
 use modelmill_tests::base_parameters;
 use modelmill_tests::fixtures::{derived, fixtures};
@@ -213,7 +213,9 @@ fn source(derivation: &Derivation) -> String {
             ProgramOp::Cos(a) => format!("np.cos({})", v(a)),
             ProgramOp::Unary(Unary::Sqrt, a) => format!("np.sqrt({})", v(a)),
             ProgramOp::Unary(Unary::Abs, a) => format!("np.abs({})", v(a)),
-            ProgramOp::Unary(function, _) => unreachable!("no function of these models: {function:?}"),
+            ProgramOp::Unary(function, _) => {
+                unreachable!("no function of these models: {function:?}")
+            }
         };
         writeln!(text, "    v{i} = {value}").expect("a string");
     }

@@ -8,7 +8,7 @@
 use std::hint::black_box;
 use std::process::{Command, ExitCode};
 
-use modelmill_codegen::{ModelEvaluator, StraightLineProgram, ProgramStage};
+use modelmill_codegen::{ModelEvaluator, ProgramStage, StraightLineProgram};
 use modelmill_tests::base_parameters;
 use modelmill_tests::fixtures::{derive, derived, model};
 use modelmill_tests::sample::Sample;

@@ -6,7 +6,7 @@
 
 use std::process::ExitCode;
 
-use modelmill_codegen::{StraightLineProgram, ProgramStage};
+use modelmill_codegen::{ProgramStage, StraightLineProgram};
 use modelmill_tests::counts::{best_known, text};
 use modelmill_tests::fixtures::derived;
 
@@ -54,7 +54,10 @@ fn table(name: &str) -> Result<(), modelmill_codegen::DeriveError> {
     println!("  {a:>22}  {b:>22}  best known of other tools");
     let dynamics = derivation.dynamics()?;
     let of = |what: &str, program: &StraightLineProgram| {
-        println!("  {:>22}  {what}", text(&program.count_operations(ProgramStage::State)));
+        println!(
+            "  {:>22}  {what}",
+            text(&program.count_operations(ProgramStage::State))
+        );
     };
     of("mass matrix", &dynamics.mass_matrix);
     of("centrifugal and Coriolis forces", &dynamics.coriolis);

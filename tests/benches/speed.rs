@@ -99,7 +99,8 @@ mod generation {
 
 mod evaluator {
     use super::{
-        Bencher, ModelEvaluator, ItemsCount, MODELS, STATES, base_parameters, black_box, derived, states,
+        Bencher, ItemsCount, MODELS, ModelEvaluator, STATES, base_parameters, black_box, derived,
+        states,
     };
 
     #[divan::bench(args = MODELS, sample_count = 20)]

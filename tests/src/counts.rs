@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use modelmill_codegen::{Derivation, OperationCount, StraightLineProgram, ProgramStage};
+use modelmill_codegen::{Derivation, OperationCount, ProgramStage, StraightLineProgram};
 
 use crate::fixtures::model_file;
 

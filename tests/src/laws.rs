@@ -2,7 +2,8 @@
 
 use modelmill_codegen::{Derivation, ModelEvaluator};
 use modelmill_spec::{
-    ExactAngle, FrameAxis, ModelConstant, ConstantIdx, ExactExpression, FrameIdx, ExactFunction, Mechanism, FrameStep, ModelSymbol,
+    ConstantIdx, ExactAngle, ExactExpression, ExactFunction, FrameAxis, FrameIdx, FrameStep,
+    Mechanism, ModelConstant, ModelSymbol,
 };
 use nalgebra::{Cholesky, DMatrix, DVector};
 
@@ -393,7 +394,9 @@ pub(crate) fn coordinates(
 
 /// All coordinates with rates and accelerations at a single state, passive ones from the evaluator.
 pub fn motion(evaluator: &ModelEvaluator<'_>, mechanism: &Mechanism, one: &Sample) -> Vec<Jet> {
-    let passive = evaluator.passive_motion(&one.states()).expect("a reachable state");
+    let passive = evaluator
+        .passive_motion(&one.states())
+        .expect("a reachable state");
     let n_passive = passive.len() / 3;
     let (mut a, mut p) = (0, 0);
     mechanism
@@ -476,7 +479,11 @@ fn with_turned_base(mechanism: &Mechanism) -> Mechanism {
     )];
     let [x, y, z] = mechanism.gravity.clone();
     let (tilted, is_tree) = (
-        [x.clone(), ExactExpression::Negative(Box::new(z.clone())), y.clone()],
+        [
+            x.clone(),
+            ExactExpression::Negative(Box::new(z.clone())),
+            y.clone(),
+        ],
         mechanism.loops.is_empty(),
     );
     let [x, y, z] = if is_tree { tilted } else { [x, y, z] };
@@ -492,7 +499,9 @@ fn with_turned_base(mechanism: &Mechanism) -> Mechanism {
     let symbol = || Box::new(ExactExpression::Symbol(ModelSymbol::Constant(angle)));
     let cos = ExactExpression::Apply(ExactFunction::Cos, symbol());
     let sin = ExactExpression::Apply(ExactFunction::Sin, symbol());
-    let times = |a: &ExactExpression, b: &ExactExpression| ExactExpression::Product(vec![a.clone(), b.clone()]);
+    let times = |a: &ExactExpression, b: &ExactExpression| {
+        ExactExpression::Product(vec![a.clone(), b.clone()])
+    };
     turned.gravity = [
         ExactExpression::Sum(vec![
             times(&cos, &x),

@@ -7,8 +7,8 @@
 use std::ops::{Add, Mul, Neg, Sub};
 
 use modelmill_spec::{
-    FrameAxis, DriveKind, ExactExpression, FreeBody, ExactFunction, PartInertia, LumpedMass, Mechanics, Mechanism, EffectPlace,
-    PlaceQuantity, PointIdx, FrameStep, ModelSymbol, TwistAxes,
+    DriveKind, EffectPlace, ExactExpression, ExactFunction, FrameAxis, FrameStep, FreeBody,
+    LumpedMass, Mechanics, Mechanism, ModelSymbol, PartInertia, PlaceQuantity, PointIdx, TwistAxes,
 };
 use nalgebra::{DMatrix, Matrix3, Matrix4, Quaternion, UnitQuaternion, Vector3};
 
@@ -273,7 +273,9 @@ impl<'a> Numbers<'a> {
                             total = total
                                 + factor
                                     * match symbol {
-                                        ModelSymbol::Constant(i) => Jet::constant(self.constants[i.0]),
+                                        ModelSymbol::Constant(i) => {
+                                            Jet::constant(self.constants[i.0])
+                                        }
                                         ModelSymbol::Coordinate(i) => coordinates[i.0],
                                         _ => unreachable!("an angle is made of angles"),
                                     };
@@ -323,7 +325,9 @@ impl<'a> Numbers<'a> {
                 .terms
                 .iter()
                 .any(|(s, _)| matches!(s, ModelSymbol::Coordinate(c) if c.0 == coordinate)),
-            FrameStep::Translate(_, length) => length.coordinates.iter().any(|(c, _)| c.0 == coordinate),
+            FrameStep::Translate(_, length) => {
+                length.coordinates.iter().any(|(c, _)| c.0 == coordinate)
+            }
             FrameStep::Free(body) => {
                 let mut all = body.position.iter().chain(&body.quaternion);
                 all.any(|c| c.0 == coordinate)
@@ -361,7 +365,9 @@ impl<'a> Numbers<'a> {
                 continue;
             }
             for place in &effect.places {
-                let EffectPlace::Point(p) = place else { continue };
+                let EffectPlace::Point(p) = place else {
+                    continue;
+                };
                 let point = &self.mechanism.points[p.0];
                 for term in &effect.terms {
                     let mass = self.parameters[term.parameter.0] * self.value(&term.expression);
@@ -445,7 +451,9 @@ impl<'a> Numbers<'a> {
             let [a, b] = l.joins.map(|p| self.point(&poses, p));
             std::array::from_fn::<Jet, 3, _>(|i| a[i] - b[i])
         });
-        let value = |exact: &ExactExpression| exact.evaluate(&|symbol| self.mechanism.symbol_nominal(symbol));
+        let value = |exact: &ExactExpression| {
+            exact.evaluate(&|symbol| self.mechanism.symbol_nominal(symbol))
+        };
         let of_couplings = self.mechanism.couplings.iter().map(|coupling| {
             let own = coordinates[coupling.coordinate.0] - Jet::constant(value(&coupling.offset));
             coupling.terms.iter().fold(own, |off, (i, factor)| {

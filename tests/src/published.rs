@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use modelmill_codegen::expr::Rational;
 use modelmill_codegen::field::{FieldElement, RandomStream};
-use modelmill_codegen::{Derivation, RationalFunction, BaseReduction, FactorVariable};
+use modelmill_codegen::{BaseReduction, Derivation, FactorVariable, RationalFunction};
 use modelmill_spec::{Mechanism, ParameterIdx};
 
 /// A product of powers of names.
@@ -415,7 +415,8 @@ impl Map {
             .collect();
         let mut rank = 0;
         for column in 0..products.len() {
-            let Some(pivot) = (rank..rows.len()).find(|r| rows[*r][column] != FieldElement::ZERO) else {
+            let Some(pivot) = (rank..rows.len()).find(|r| rows[*r][column] != FieldElement::ZERO)
+            else {
                 continue;
             };
             rows.swap(rank, pivot);

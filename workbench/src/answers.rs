@@ -107,7 +107,11 @@ pub(crate) fn answer_request(
         }
         "save" => sitting.save()?,
         "choose" => sitting.resolve_conflict(parse_body::<ConflictRequest>(body)?.theirs),
-        "picture" => return Ok(PageResponse::Svg(sitting.picture(&parse_body::<PictureRequest>(body)?)?)),
+        "picture" => {
+            return Ok(PageResponse::Svg(
+                sitting.picture(&parse_body::<PictureRequest>(body)?)?,
+            ));
+        }
         "equations" => return Ok(PageResponse::Html(sitting.equations()?)),
         "compare" => {
             let CompareRequest { places, afresh } = parse_body(body)?;
@@ -130,7 +134,9 @@ pub(crate) fn answer_request(
         "excitation" => sitting.excitation(),
         "stop_excitation" => sitting.stop_excitation(),
         "trajectory" => sitting.trajectory()?,
-        "keep_trajectory" => sitting.keep_trajectory(&parse_body::<KeepTrajectoryRequest>(body)?)?,
+        "keep_trajectory" => {
+            sitting.keep_trajectory(&parse_body::<KeepTrajectoryRequest>(body)?)?
+        }
         other => {
             let says = format!("nothing called `{other}` can be asked");
             return Err(RequestRefusal(RequestFault::Unknown, says));
@@ -140,5 +146,6 @@ pub(crate) fn answer_request(
 
 /// A body of JSON.
 pub(crate) fn parse_body<T: DeserializeOwned>(body: &[u8]) -> Result<T, RequestRefusal> {
-    serde_json::from_slice(body).map_err(|error| RequestRefusal(RequestFault::Malformed, error.to_string()))
+    serde_json::from_slice(body)
+        .map_err(|error| RequestRefusal(RequestFault::Malformed, error.to_string()))
 }

@@ -11,7 +11,7 @@ use serde::Deserialize;
 use serde_json::json;
 
 use crate::answers::{PageResponse, RequestRefusal, answer_request, parse_body};
-use crate::options::{WorkbenchCommands, ExcitationSettings, Options, WorkbenchStep};
+use crate::options::{ExcitationSettings, Options, WorkbenchCommands, WorkbenchStep};
 use crate::shelf::MemoryStore;
 use crate::sitting::WorkbenchSession;
 
@@ -178,7 +178,10 @@ mod tests {
             assert_eq!(variant["along"], json!(null), "there is no recording");
         }
         // Made of a text that is no longer there, or of nothing.
-        assert_eq!(told(&desk.answer_request("edit", edit(41, "").as_bytes())).0, 409);
+        assert_eq!(
+            told(&desk.answer_request("edit", edit(41, "").as_bytes())).0,
+            409
+        );
         assert_eq!(told(&desk.answer_request("edit", b"{}")).0, 400);
         assert_eq!(told(&desk.answer_request("compile", b"{}")).0, 404);
         assert_eq!(

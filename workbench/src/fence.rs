@@ -5,7 +5,7 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, RwLock};
 
-use modelmill::files::{DiskFiles, FileError, FileFault, FileSource, PathKind, OpenFile};
+use modelmill::files::{DiskFiles, FileError, FileFault, FileSource, OpenFile, PathKind};
 use modelmill::{Error, Host};
 
 use crate::options::Options;
@@ -44,9 +44,15 @@ impl FileAccessPolicy {
             .flatten()
         {
             match host.load(model) {
-                Ok(loaded) => loaded.sources.paths().for_each(|path| fence.allow_file(path)),
+                Ok(loaded) => loaded
+                    .sources
+                    .paths()
+                    .for_each(|path| fence.allow_file(path)),
                 Err(Error::Model(fault)) => {
-                    fault.sources.paths().for_each(|path| fence.allow_file(path));
+                    fault
+                        .sources
+                        .paths()
+                        .for_each(|path| fence.allow_file(path));
                 }
                 Err(_) => {}
             }

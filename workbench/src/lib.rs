@@ -31,7 +31,7 @@ mod page;
 mod server;
 
 pub use desk::RequestHandler;
-pub use options::{WorkbenchCommands, ExcitationSettings, Options, WorkbenchStep};
+pub use options::{ExcitationSettings, Options, WorkbenchCommands, WorkbenchStep};
 #[cfg(not(target_family = "wasm"))]
 pub use page::{PageBundle, standalone_page};
 
@@ -48,7 +48,9 @@ pub fn serve(
     opened: impl FnOnce(&str),
 ) -> modelmill::Outcome {
     let port = options.port;
-    let machine = std::sync::Arc::new(machine::LocalMachine::new(fence::FileAccessPolicy::for_session(host, &options)));
+    let machine = std::sync::Arc::new(machine::LocalMachine::new(
+        fence::FileAccessPolicy::for_session(host, &options),
+    ));
     let sitting = sitting::WorkbenchSession::open(host, options, commands, machine.clone())?;
     server::serve(std::sync::Arc::new(sitting), machine, port, opened)
 }

@@ -223,7 +223,10 @@ struct SinceQuery {
 }
 
 /// What stands, as soon as it is news.
-async fn view(State(app): State<Arc<ServerState>>, Query(SinceQuery { since }): Query<SinceQuery>) -> HandlerResult {
+async fn view(
+    State(app): State<Arc<ServerState>>,
+    Query(SinceQuery { since }): Query<SinceQuery>,
+) -> HandlerResult {
     let mut changes = app.machine.changes();
     let news = changes.wait_for(|version| *version != since);
     // Without news it is told once more.
@@ -233,8 +236,15 @@ async fn view(State(app): State<Arc<ServerState>>, Query(SinceQuery { since }): 
 }
 
 /// Anything else.
-async fn handle_request(State(app): State<Arc<ServerState>>, Path(question): Path<String>, body: Bytes) -> HandlerResult {
-    let found = run_blocking(&app, move |sitting| answer_request(sitting, &question, &body)).await?;
+async fn handle_request(
+    State(app): State<Arc<ServerState>>,
+    Path(question): Path<String>,
+    body: Bytes,
+) -> HandlerResult {
+    let found = run_blocking(&app, move |sitting| {
+        answer_request(sitting, &question, &body)
+    })
+    .await?;
     Ok(match found? {
         PageResponse::Json(told) => Json(told).into_response(),
         PageResponse::Svg(svg) => ([(CONTENT_TYPE, "image/svg+xml")], svg).into_response(),
@@ -250,6 +260,11 @@ mod tests {
     fn tokens_are_long_and_differ() {
         let [a, b] = [(); 2].map(|()| random_token().unwrap());
         assert!(a.len() == 32 && a != b);
-        assert!(is_same_token(&a, &a) && !is_same_token(&a, &b) && !is_same_token("", &a) && !is_same_token(&a[1..], &a));
+        assert!(
+            is_same_token(&a, &a)
+                && !is_same_token(&a, &b)
+                && !is_same_token("", &a)
+                && !is_same_token(&a[1..], &a)
+        );
     }
 }

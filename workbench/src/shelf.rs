@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use modelmill::files::{FileError, FileSource, PathKind, MemoryFiles, OpenFile};
+use modelmill::files::{FileError, FileSource, MemoryFiles, OpenFile, PathKind};
 use serde_json::Value;
 
 use crate::surroundings::SessionEnvironment;

@@ -5,12 +5,12 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use modelmill::diagnose::{FixedParameters, DiagnosisOptions, ModelVersion};
+use modelmill::diagnose::{DiagnosisOptions, FixedParameters, ModelVersion};
 use modelmill::edit::NewEffect;
 use modelmill::files::FileError;
 use modelmill::identify::EstimatorOptions;
 use modelmill::model::PageFormat;
-use modelmill::picture::{PictureOptions, DriveArrow, DrawingStyle};
+use modelmill::picture::{DrawingStyle, DriveArrow, PictureOptions};
 use modelmill::recording::PreparedRecording;
 use modelmill::stretch::RecordingSegment;
 use modelmill::{Error, Host, Model, Outcome, report};
@@ -20,13 +20,13 @@ use serde_json::{Value, json};
 mod excitation;
 mod ladder;
 
-pub(crate) use excitation::KeepTrajectoryRequest;
 use excitation::ExcitationJob;
+pub(crate) use excitation::KeepTrajectoryRequest;
 use ladder::ErrorLadder;
 
 use crate::draft::EditedDocument;
-use crate::options::{WorkbenchCommands, ExcitationSettings, Options, WorkbenchStep};
-use crate::readings::{SessionRecordings, RecordingCache};
+use crate::options::{ExcitationSettings, Options, WorkbenchCommands, WorkbenchStep};
+use crate::readings::{RecordingCache, SessionRecordings};
 use crate::surroundings::SessionEnvironment;
 use crate::told;
 use crate::variant::{self, VariantCache};
@@ -306,7 +306,9 @@ impl WorkbenchSession {
         let unreadable = disk.as_ref().err().map(ToString::to_string);
         let is_news = state.unreadable != unreadable;
         state.unreadable = unreadable;
-        let seen = disk.map_or(DiskChange::Unchanged, |disk| state.draft.update_from_disk(&disk));
+        let seen = disk.map_or(DiskChange::Unchanged, |disk| {
+            state.draft.update_from_disk(&disk)
+        });
         if seen == DiskChange::Reloaded {
             state.record_step("changed outside");
         }
@@ -369,7 +371,9 @@ impl WorkbenchSession {
     /// The page of equations.
     pub(crate) fn equations(&self) -> Result<String, String> {
         let (model, _) = self.model()?;
-        let written = model.equations(PageFormat::Html).map_err(|e| self.error_text(&e))?;
+        let written = model
+            .equations(PageFormat::Html)
+            .map_err(|e| self.error_text(&e))?;
         Ok(written.text)
     }
 
@@ -422,7 +426,8 @@ impl WorkbenchSession {
         let saved = self.state().saved.clone();
         let version = |model: Model| -> Outcome<ModelVersion> {
             let [fit, check] = self.recordings(&model)?;
-            let stretches = |all: Vec<PreparedRecording>| all.into_iter().flat_map(|one| one.segments);
+            let stretches =
+                |all: Vec<PreparedRecording>| all.into_iter().flat_map(|one| one.segments);
             let held = if is_identified {
                 FixedParameters::Known
             } else {
@@ -501,7 +506,8 @@ impl WorkbenchSession {
         let mut told = told.map_err(|error| self.error_text(&error))?;
         told["revision"] = json!(revision);
         told["same"] = json!(other.text() == model.text());
-        told["command"] = json!(beside.and_then(|name| self.commands.variant_command(&self.path_of(name))));
+        told["command"] =
+            json!(beside.and_then(|name| self.commands.variant_command(&self.path_of(name))));
         Ok(told)
     }
 

@@ -92,7 +92,10 @@ pub(crate) fn errors(
     recordings: &[Vec<PreparedRecording>; 2],
     spelling: &dyn RemedySpelling,
 ) -> Value {
-    let remarks = recordings.iter().flatten().flat_map(PreparedRecording::notes);
+    let remarks = recordings
+        .iter()
+        .flatten()
+        .flat_map(PreparedRecording::notes);
     let mut notes: Vec<&RecordingNote> = Vec::new();
     for note in remarks.chain(&found.notes) {
         if !notes.contains(&note) {

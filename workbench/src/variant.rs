@@ -11,7 +11,7 @@ use modelmill::variants::VariantComparison;
 use modelmill::{Error, Host, Model, Outcome};
 use serde_json::{Value, json};
 
-use crate::readings::{SessionRecordings, RecordingCache};
+use crate::readings::{RecordingCache, SessionRecordings};
 
 /// Longest model file that is held beside the text, bytes.
 const LONGEST: u64 = 4 << 20;
@@ -70,12 +70,15 @@ impl VariantCache {
             VariantComparison::check([before, after])?;
             let first = self.readings.recordings_for(before, false, read)?.0;
             let second = after_read()?;
-            let runs =
-                [&first, &second].map(|read| read.iter().flatten().collect::<Vec<&PreparedRecording>>());
+            let runs = [&first, &second]
+                .map(|read| read.iter().flatten().collect::<Vec<&PreparedRecording>>());
             if runs[0].is_empty() {
                 return Ok(Value::Null);
             }
-            Ok(VariantComparison::along_recordings([before, after], [&runs[0], &runs[1]])?.json(spelling))
+            Ok(
+                VariantComparison::along_recordings([before, after], [&runs[0], &runs[1]])?
+                    .json(spelling),
+            )
         })();
         match along {
             Ok(along) => told["along"] = along,

@@ -7,7 +7,7 @@
 
 use std::ops::{Add, Mul, Neg, Sub};
 
-use super::{FieldElement, MODULUS, FieldNumber, RandomStream};
+use super::{FieldElement, FieldNumber, MODULUS, RandomStream};
 use crate::Rational;
 
 /// `re + im i`
@@ -64,7 +64,10 @@ impl<const P: u64> Mul for ExtensionElement<P> {
     type Output = Self;
     fn mul(self, other: Self) -> Self {
         // Most values stay in the prime field.
-        match (self.im == FieldElement::ZERO, other.im == FieldElement::ZERO) {
+        match (
+            self.im == FieldElement::ZERO,
+            other.im == FieldElement::ZERO,
+        ) {
             (true, true) => (self.re * other.re).into(),
             (true, false) => Self {
                 re: self.re * other.re,
@@ -168,7 +171,10 @@ mod tests {
             assert_eq!((a * b) * c, a * (b * c));
             assert_eq!(a * a.inverse().unwrap(), ExtensionElement::ONE);
             assert_eq!((a - b) + b, a);
-            assert_eq!(a.integer_power(-3).unwrap() * a * a * a, ExtensionElement::ONE);
+            assert_eq!(
+                a.integer_power(-3).unwrap() * a * a * a,
+                ExtensionElement::ONE
+            );
         }
         assert_eq!(ExtensionElement::<MODULUS>::ZERO.inverse(), None);
     }
@@ -195,8 +201,14 @@ mod tests {
         let mut stream = RandomStream::new(13);
         for seed in 0..50 {
             let a: FieldElement = stream.next_element();
-            assert_eq!(ExtensionElement::from(a).hash_with_seed(seed), a.hash_with_seed(seed).into());
-            assert_eq!(ExtensionElement::from(a).hash_bits(seed), FieldNumber::hash_bits(a, seed));
+            assert_eq!(
+                ExtensionElement::from(a).hash_with_seed(seed),
+                a.hash_with_seed(seed).into()
+            );
+            assert_eq!(
+                ExtensionElement::from(a).hash_bits(seed),
+                FieldNumber::hash_bits(a, seed)
+            );
             let b = ExtensionElement {
                 re: a,
                 im: stream.next_element(),

@@ -14,7 +14,7 @@ use std::sync::mpsc::{RecvTimeoutError, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-use super::{FileError, FileFault, FileSource, PathKind, OpenFile, write};
+use super::{FileError, FileFault, FileSource, OpenFile, PathKind, write};
 
 /// The files of this machine; clones remember together what was read.
 #[derive(Clone, Debug)]
@@ -122,9 +122,13 @@ impl FileSource for DiskFiles {
                 let file = File::open(path).map_err(fail)?;
                 OpenFile::Memory(read_capped(file, path, most)?.into())
             }
-            PathKind::Stream => OpenFile::Memory(read_pipe_with_timeout(path, most, self.pipe_timeout)?.into()),
+            PathKind::Stream => {
+                OpenFile::Memory(read_pipe_with_timeout(path, most, self.pipe_timeout)?.into())
+            }
             PathKind::Folder => return Err(FileError::new(path, FileFault::Folder)),
-            PathKind::Device | PathKind::Missing => return Err(FileError::new(path, FileFault::Device)),
+            PathKind::Device | PathKind::Missing => {
+                return Err(FileError::new(path, FileFault::Device));
+            }
         };
         self.record_read(path);
         Ok(opened)
@@ -180,7 +184,11 @@ fn read_capped(stream: impl Read, path: &Path, most: u64) -> Result<Vec<u8>, Fil
 }
 
 /// All bytes of a named pipe. A thread waits for them; if none come, it is left waiting.
-fn read_pipe_with_timeout(path: &Path, most: u64, patience: Duration) -> Result<Vec<u8>, FileError> {
+fn read_pipe_with_timeout(
+    path: &Path,
+    most: u64,
+    patience: Duration,
+) -> Result<Vec<u8>, FileError> {
     let (sender, receiver) = sync_channel(4);
     let pipe = path.to_owned();
     std::thread::Builder::new()
@@ -376,7 +384,10 @@ mod tests {
     #[test]
     fn devices_are_written_to_as_they_are() {
         write(Path::new("/dev/null"), b"gone").unwrap();
-        assert_eq!(DiskFiles::default().kind(Path::new("/dev/null")), PathKind::Device);
+        assert_eq!(
+            DiskFiles::default().kind(Path::new("/dev/null")),
+            PathKind::Device
+        );
         #[cfg(target_os = "linux")]
         {
             let full = write(Path::new("/dev/full"), b"none").unwrap_err();

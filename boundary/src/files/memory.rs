@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::{FileError, FileFault, FileSource, PathKind, OpenFile, normalise_path};
+use super::{FileError, FileFault, FileSource, OpenFile, PathKind, normalise_path};
 
 /// Files in memory by their paths; folders are there as far as files are in them.
 ///

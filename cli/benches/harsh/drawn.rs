@@ -107,7 +107,12 @@ impl Hidden {
     }
 }
 
-fn effect(plant: &Plant, kind: &str, at: &str, values: &[(&str, f64)]) -> Result<RigEffect, String> {
+fn effect(
+    plant: &Plant,
+    kind: &str,
+    at: &str,
+    values: &[(&str, f64)],
+) -> Result<RigEffect, String> {
     let made = plant.rig.effect(kind, &[at], values);
     made.map_err(|faults| faults.iter().map(ToString::to_string).collect())
 }

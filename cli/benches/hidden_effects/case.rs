@@ -1,6 +1,6 @@
 //! Cases: seed and number go in; motion, noise and what is hidden come out, with sizes that show.
 
-use modelmill_rig::{RigEffect, Rig};
+use modelmill_rig::{Rig, RigEffect};
 use serde_json::{Value, json};
 
 use super::columns::{columns, delay_column, library};

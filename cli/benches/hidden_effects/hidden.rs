@@ -1,6 +1,6 @@
 //! Effects of the library that can be hidden: kinds at their places, with values of a sensible size.
 
-use modelmill_rig::{RigEffect, Rig};
+use modelmill_rig::{Rig, RigEffect};
 
 use super::placed::Placed;
 use super::random::{Random, three_digits};
@@ -82,7 +82,11 @@ impl std::fmt::Display for Hidden {
 }
 
 /// An effect of the rig by names.
-pub(crate) fn effect(rig: &Rig, placed: &Placed, values: &[(&str, f64)]) -> Result<RigEffect, String> {
+pub(crate) fn effect(
+    rig: &Rig,
+    placed: &Placed,
+    values: &[(&str, f64)],
+) -> Result<RigEffect, String> {
     let at: Vec<&str> = placed.at.iter().map(String::as_str).collect();
     rig.effect(&placed.kind, &at, values).map_err(|faults| {
         let says: Vec<String> = faults.iter().map(ToString::to_string).collect();

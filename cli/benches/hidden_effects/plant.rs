@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use modelmill_boundary::files::DiskFiles;
 use modelmill_codegen::{Derivation, ModelEvaluator, MotionStates};
-use modelmill_rig::{RigEffect, ScalarMotion, RigMotion, RigPlace, Rig, RigState, RigTracker};
+use modelmill_rig::{Rig, RigEffect, RigMotion, RigPlace, RigState, RigTracker, ScalarMotion};
 use modelmill_spec::MotionLimits;
 
 use super::course::Course;

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use modelmill::Model;
 use modelmill_codegen::{ModelEvaluator, MotionStates};
-use modelmill_spec::{CoordinateIdx, CoordinateBounds, MotionLimits};
+use modelmill_spec::{CoordinateBounds, CoordinateIdx, MotionLimits};
 
 use crate::parts::columns::{columns, library};
 use crate::parts::course::Course;

@@ -43,7 +43,11 @@ pub(crate) struct GenerateArgs {
     /// Model file (TOML)
     pub(crate) model: PathBuf,
     /// Write the source to this file instead of standard output; with --language c99, c or python, files to this folder
-    #[arg(long, value_name = "FILE.rs|DIR", required_if_eq_any(languages_in_folders()))]
+    #[arg(
+        long,
+        value_name = "FILE.rs|DIR",
+        required_if_eq_any(languages_in_folders())
+    )]
     pub(crate) out: Option<PathBuf>,
     /// With the equation of motion: mass matrix, velocity terms, gravity, forward dynamics
     #[arg(long)]

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use modelmill::Model;
-use modelmill::picture::{PictureOptions, DrawingStyle};
+use modelmill::picture::{DrawingStyle, PictureOptions};
 
 use crate::failure::CommandOutcome;
 use crate::output::OutputFile;
@@ -41,7 +41,12 @@ impl DrawingArgs {
     }
 
     /// Draws a model, over another one if there is one.
-    pub(crate) fn draw(&self, target: &OutputFile, model: &Model, before: Option<&Model>) -> CommandOutcome {
+    pub(crate) fn draw(
+        &self,
+        target: &OutputFile,
+        model: &Model,
+        before: Option<&Model>,
+    ) -> CommandOutcome {
         let drawing = PictureOptions {
             at: self.at.clone(),
             from: self

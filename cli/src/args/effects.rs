@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use modelmill::add::{SettingValue, EffectSetting};
+use modelmill::add::{EffectSetting, SettingValue};
 
 /// `effects`.
 #[derive(Debug, Args)]

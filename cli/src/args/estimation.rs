@@ -1,7 +1,7 @@
 //! Options that say how parameters are estimated.
 
 use clap::{Args, ValueEnum};
-use modelmill::identify::{EstimatorOptions, HUBER_BOUND, EstimateRefinement, EquationWeights};
+use modelmill::identify::{EquationWeights, EstimateRefinement, EstimatorOptions, HUBER_BOUND};
 
 use super::preparation::parse_map;
 

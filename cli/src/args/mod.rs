@@ -24,7 +24,7 @@ use work::WorkArgs;
 
 pub(crate) use code::{AtlasArgs, EquationsArgs, EquationsFormat, GenerateArgs};
 pub(crate) use data::{
-    AdoptArgs, DiagnosisArgs, CompareArgs, DiagnoseArgs, EvaluateArgs, IdentifyArgs, InterpretArgs,
+    AdoptArgs, CompareArgs, DiagnoseArgs, DiagnosisArgs, EvaluateArgs, IdentifyArgs, InterpretArgs,
     ParameterSource, RecordingsArgs, ReportArgs,
 };
 pub(crate) use motion::{CriterionArg, ExciteArgs, ExperimentArgs, SimulateArgs};

@@ -3,7 +3,9 @@
 use std::fmt::Write as _;
 
 use clap::{Args, ValueEnum};
-use modelmill::recording::{DerivativeSource, MAX_FILTER_ORDER, StatePreparation, RecordingOptions, SmoothingMethod};
+use modelmill::recording::{
+    DerivativeSource, MAX_FILTER_ORDER, RecordingOptions, SmoothingMethod, StatePreparation,
+};
 
 use crate::flags::quote_word;
 

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use modelmill::runs::{RunsOptions, KnownLoad, PerRunSelection};
+use modelmill::runs::{KnownLoad, PerRunSelection, RunsOptions};
 
 use crate::args::preparation::PreparationArgs;
 

@@ -69,7 +69,11 @@ pub(crate) fn run(host: &Host, args: &AddArgs) -> CommandOutcome {
 }
 
 /// The model as it would be read from where it is written: paths in it start from its folder.
-fn reload_at_target(host: &Host, edited: EditedModel, target: Option<&OutputFile>) -> CommandOutcome<EditedModel> {
+fn reload_at_target(
+    host: &Host,
+    edited: EditedModel,
+    target: Option<&OutputFile>,
+) -> CommandOutcome<EditedModel> {
     let Some(target) = target else {
         return Ok(edited);
     };

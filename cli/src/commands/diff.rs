@@ -16,7 +16,9 @@ use crate::{commands, terminal};
 /// Prints what changed between two models.
 pub(crate) fn run(host: &Host, args: &DiffArgs) -> CommandOutcome {
     let before = commands::model(host, &args.before)?;
-    let quiet = host.clone().with_progress(Arc::new(ProgressWithoutRemarks::new()));
+    let quiet = host
+        .clone()
+        .with_progress(Arc::new(ProgressWithoutRemarks::new()));
     let after = commands::model(&quiet, &args.after)?;
     let inputs = before.files().chain(after.files());
     if let Some(target) = args.drawing.target(inputs)? {
@@ -40,7 +42,11 @@ pub(crate) fn run(host: &Host, args: &DiffArgs) -> CommandOutcome {
 }
 
 /// Both models along the recordings, if there are any.
-fn variants(args: &DiffArgs, before: &Model, after: &Model) -> CommandOutcome<Option<VariantComparison>> {
+fn variants(
+    args: &DiffArgs,
+    before: &Model,
+    after: &Model,
+) -> CommandOutcome<Option<VariantComparison>> {
     if args.data.is_empty() {
         return Ok(None);
     }

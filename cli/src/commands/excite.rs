@@ -4,7 +4,7 @@
 use std::path::PathBuf;
 
 use modelmill::Host;
-use modelmill::excite::{ExcitationCriterion, Options, ExcitationRequest};
+use modelmill::excite::{ExcitationCriterion, ExcitationRequest, Options};
 use modelmill::text::table::count;
 
 use crate::args::{CriterionArg, ExciteArgs};

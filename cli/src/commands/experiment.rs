@@ -1,7 +1,7 @@
 //! `experiment`: the paper's experiment on the bundled rig, as one page.
 
 use modelmill::Host;
-use modelmill_paper_experiment::{PaperExperiment, ExperimentRequest};
+use modelmill_paper_experiment::{ExperimentRequest, PaperExperiment};
 
 use crate::args::ExperimentArgs;
 use crate::failure::CommandOutcome;

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use modelmill::Host;
 use modelmill::files::{DiskFiles, FileSource};
-use modelmill::generate::{CodeOptions, EmittedFile, CodeLanguage, LanguageForm};
+use modelmill::generate::{CodeLanguage, CodeOptions, EmittedFile, LanguageForm};
 use modelmill::text::table::count;
 
 use crate::args::GenerateArgs;

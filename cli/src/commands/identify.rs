@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use modelmill::Host;
 use modelmill::identify::Instruments;
-use modelmill::recording::{RecordingOptions, PreparedRecording};
+use modelmill::recording::{PreparedRecording, RecordingOptions};
 
 use crate::args::IdentifyArgs;
 use crate::failure::{CommandFailure, CommandOutcome};

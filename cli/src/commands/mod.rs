@@ -28,10 +28,10 @@ pub(crate) mod work;
 
 use std::path::{Path, PathBuf};
 
-use modelmill::diagnose::{DiagnosisFindings, FixedParameters, DiagnosisOptions};
+use modelmill::diagnose::{DiagnosisFindings, DiagnosisOptions, FixedParameters};
 use modelmill::files::{DiskFiles, FileSource, PathKind};
 use modelmill::model::LoadedModel;
-use modelmill::recording::{RecordingOptions, PreparedRecording};
+use modelmill::recording::{PreparedRecording, RecordingOptions};
 use modelmill::{Host, Model};
 
 use crate::args::{DiagnosisArgs, ParameterSource};
@@ -107,14 +107,22 @@ pub(crate) fn recordings(
     each.map(|path| recording(model, path, reading)).collect()
 }
 
-fn recording(model: &Model, path: &Path, reading: &RecordingOptions) -> CommandOutcome<PreparedRecording> {
+fn recording(
+    model: &Model,
+    path: &Path,
+    reading: &RecordingOptions,
+) -> CommandOutcome<PreparedRecording> {
     let files = files_of(path);
     let files: Vec<&Path> = files.iter().map(PathBuf::as_path).collect();
     Ok(model.recording_of(&files, reading)?)
 }
 
 /// Diagnoses what the command line names.
-pub(crate) fn diagnose(host: &Host, args: &DiagnosisArgs, question: DiagnosisOptions) -> CommandOutcome<DiagnosisFindings> {
+pub(crate) fn diagnose(
+    host: &Host,
+    args: &DiagnosisArgs,
+    question: DiagnosisOptions,
+) -> CommandOutcome<DiagnosisFindings> {
     let model = args
         .parameters
         .apply_to(host, self::model(host, &args.model)?)?;

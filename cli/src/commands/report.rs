@@ -32,7 +32,11 @@ pub(crate) fn run(host: &Host, args: &ReportArgs) -> CommandOutcome {
         &findings,
         &CommandLineSpelling::from_args(&args.diagnosis),
     )?)?;
-    let says = words::verdict(&findings.diagnosis, findings.channels(), findings.validation);
+    let says = words::verdict(
+        &findings.diagnosis,
+        findings.channels(),
+        findings.validation,
+    );
     terminal::print(&format!(
         "{}\n\nThe page is {}.",
         words::lines(&says, 100).join("\n"),

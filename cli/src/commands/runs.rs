@@ -36,7 +36,10 @@ pub(crate) fn run(host: &Host, args: &RunsArgs) -> CommandOutcome {
         }
         Some(out) => {
             output::make_folder(out)?;
-            Some((OutputFile::new(&out.join(PAGE), inputs())?, RunsFileFormat::Page))
+            Some((
+                OutputFile::new(&out.join(PAGE), inputs())?,
+                RunsFileFormat::Page,
+            ))
         }
         None => None,
     };

@@ -9,7 +9,7 @@ use modelmill::edit::NewEffect;
 use modelmill::files::PathKind;
 use modelmill::print::{CommandName, OptionSetting, RemedySpelling, StepSpelling};
 use modelmill::{Host, Model};
-use modelmill_workbench::{WorkbenchCommands, ExcitationSettings, Options, WorkbenchStep, serve};
+use modelmill_workbench::{ExcitationSettings, Options, WorkbenchCommands, WorkbenchStep, serve};
 use serde_json::json;
 
 use crate::args::work::WorkArgs;
@@ -112,11 +112,15 @@ impl WorkbenchCommands for WorkbenchAdvice {
             ..
         } = self;
         Some(match step {
-            WorkbenchStep::Picture => format!("modelmill check {model} --picture picture.svg{libraries}"),
+            WorkbenchStep::Picture => {
+                format!("modelmill check {model} --picture picture.svg{libraries}")
+            }
             WorkbenchStep::Equations => {
                 format!("modelmill equations {model} --format html --out equations.html{libraries}")
             }
-            WorkbenchStep::Compare => format!("modelmill compare {model}{data}{reading}{libraries}"),
+            WorkbenchStep::Compare => {
+                format!("modelmill compare {model}{data}{reading}{libraries}")
+            }
             WorkbenchStep::Identify => {
                 format!("modelmill identify {model}{data}{check}{reading}{libraries}")
             }
@@ -262,12 +266,16 @@ mod tests {
             let (data, preparation) = match &cli.command {
                 ProgramCommand::Compare(other) => (&other.data, &other.preparation),
                 ProgramCommand::Identify(other) => (&other.data, &other.preparation),
-                ProgramCommand::Diagnose(other) => (&other.diagnosis.data, &other.diagnosis.preparation),
+                ProgramCommand::Diagnose(other) => {
+                    (&other.diagnosis.data, &other.diagnosis.preparation)
+                }
                 _ => continue,
             };
             assert_eq!((data, preparation), (&args.data, &args.preparation));
         }
-        let command = spelled.variant_command(Path::new("before this.toml")).unwrap();
+        let command = spelled
+            .variant_command(Path::new("before this.toml"))
+            .unwrap();
         let cli = CommandLine::try_parse_from(words(&command));
         let cli = cli.unwrap_or_else(|error| panic!("{command}: {error}"));
         let ProgramCommand::Diff(other) = &cli.command else {

@@ -7,7 +7,7 @@ pub(crate) mod progress;
 use std::io::{self, ErrorKind, IsTerminal, Write};
 
 use modelmill::text::TerminalStyle;
-use modelmill::{RecordingNote, NoteSeverity};
+use modelmill::{NoteSeverity, RecordingNote};
 use modelmill_boundary::text;
 
 use crate::failure::{CommandFailure, CommandOutcome};

@@ -73,12 +73,19 @@ impl ProgressListener for TerminalProgress {
                 bar.finish_and_clear();
             }
         });
-        watchers.push(Some(JobWatcher { keep_alive: going_on, thread }));
+        watchers.push(Some(JobWatcher {
+            keep_alive: going_on,
+            thread,
+        }));
     }
 
     fn on_job_end(&self) {
         let mut watchers = self.watchers.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(Some(JobWatcher { keep_alive: going_on, thread })) = watchers.pop() {
+        if let Some(Some(JobWatcher {
+            keep_alive: going_on,
+            thread,
+        })) = watchers.pop()
+        {
             drop(going_on);
             // A watcher that panicked has shown nothing that is missed.
             let _ = thread.join();

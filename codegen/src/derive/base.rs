@@ -70,7 +70,11 @@ impl Derivation {
                 let column = PrintedFormula::name(column(product));
                 PrintedFormula::product(Rational::ONE, [factor.formula(&self.mechanism), column])
             });
-            format!("{} = {}", column(line.product), PrintedFormula::sum(terms).text())
+            format!(
+                "{} = {}",
+                column(line.product),
+                PrintedFormula::sum(terms).text()
+            )
         });
         lines.collect()
     }
@@ -95,7 +99,10 @@ impl Derivation {
     /// Eq. (7) for given values of the constants, in the order of the model file: each base parameter as a sum of
     /// products of dynamic parameters with exact factors. Sines, cosines and roots of constants are those of floating
     /// point.
-    pub fn base_polynomials(&self, constants: &[BigRational]) -> Vec<Vec<(ParameterMonomial, BigRational)>> {
+    pub fn base_polynomials(
+        &self,
+        constants: &[BigRational],
+    ) -> Vec<Vec<(ParameterMonomial, BigRational)>> {
         let reduction = &self.reduction;
         let product = |k: usize| reduction.products[k].clone();
         let retained = reduction.retained.iter();

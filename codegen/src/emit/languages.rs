@@ -1,6 +1,8 @@
 //! The list of languages, those of crates around the Rust module included.
 
-use super::language::{C99Sources, EmittedFile, OutputForm, OutputLanguage, RustModule, EmissionRequest};
+use super::language::{
+    C99Sources, EmissionRequest, EmittedFile, OutputForm, OutputLanguage, RustModule,
+};
 use super::wrap::{emit_c, emit_python};
 
 /// All languages; the first is taken where none is named.

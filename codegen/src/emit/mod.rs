@@ -11,6 +11,6 @@ mod vectors;
 mod wrap;
 
 pub use language::rust::{EmittedModule, emit, emit_with_dynamics, module_name};
-pub use language::{EmittedFile, OutputForm, OutputLanguage, EmissionRequest};
+pub use language::{EmissionRequest, EmittedFile, OutputForm, OutputLanguage};
 pub use languages::LANGUAGES;
 pub use vectors::vectors_c;

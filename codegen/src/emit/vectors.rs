@@ -11,7 +11,7 @@ use modelmill_spec::Mechanism;
 
 use super::tree::in_order;
 use crate::expr::{Atom, Unary};
-use crate::lower::{PoseGuard, ProgramOp, StraightLineProgram, SINGULAR, ProgramStage};
+use crate::lower::{PoseGuard, ProgramOp, ProgramStage, SINGULAR, StraightLineProgram};
 use crate::{Derivation, ValueId};
 
 /// What does not depend on the program: vectors, sines and cosines.
@@ -56,9 +56,14 @@ pub fn vectors_c(derivation: &Derivation, program: &StraightLineProgram, width: 
     for i in in_order(program, &vec![false; n], &vec![false; n], &vec![0; n]) {
         let op = &program.ops[i];
         let _ = match program.stages[i] {
-            ProgramStage::Fixed => writeln!(fixed, "    const double x{i} = {};", scalar_operation(op, mechanism)),
+            ProgramStage::Fixed => writeln!(
+                fixed,
+                "    const double x{i} = {};",
+                scalar_operation(op, mechanism)
+            ),
             ProgramStage::State => {
-                let statement = vector_statement(i, op, &|atom| input(atom).map(|(_, k)| k), &is_fixed);
+                let statement =
+                    vector_statement(i, op, &|atom| input(atom).map(|(_, k)| k), &is_fixed);
                 writeln!(of_state, "            {statement}")
             }
         };
@@ -208,7 +213,11 @@ fn vector_statement(
         ProgramOp::Atan2(y, x) => format!("const V x{i} = angle({}, {});", wide(y), wide(x)),
         ProgramOp::Unary(Unary::Abs, a) => format!("const V x{i} = absolute({});", wide(a)),
         ProgramOp::Unary(unary, a) => {
-            format!("V x{i} = {}; EACH(x{i}, {});", wide(a), function_name(*unary))
+            format!(
+                "V x{i} = {}; EACH(x{i}, {});",
+                wide(a),
+                function_name(*unary)
+            )
         }
         other => unreachable!("{other:?} is the same for all states"),
     }

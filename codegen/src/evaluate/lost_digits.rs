@@ -215,7 +215,8 @@ impl NearbyState {
             c.nominal + reach * one * uniform_symmetric(stream)
         });
         let q = q.collect();
-        let mut moving = |n: usize, most: f64| (0..n).map(|_| most * uniform_symmetric(stream)).collect();
+        let mut moving =
+            |n: usize, most: f64| (0..n).map(|_| most * uniform_symmetric(stream)).collect();
         Self {
             q,
             qd: moving(active.len(), 2.0),
@@ -376,7 +377,9 @@ mod tests {
                     qdd: vec![qdd],
                     load: vec![0.0],
                 };
-                let found = evaluator.inverse_dynamics(&state.as_motion_states(), &base).unwrap()[0][0];
+                let found = evaluator
+                    .inverse_dynamics(&state.as_motion_states(), &base)
+                    .unwrap()[0][0];
                 let inertia = a * a + 2.0 * b * b + 0.35;
                 let moment = a + 2.0 * b + 1.05;
                 let expected = inertia * qdd + 9.81 * (moment * q.cos() - 0.2 * q.sin());
@@ -493,7 +496,9 @@ mod tests {
                 load: vec![0.0],
             };
             let evaluator = ModelEvaluator::new(&derivation);
-            let found = evaluator.inverse_dynamics(&state.as_motion_states(), &base).unwrap()[0][0];
+            let found = evaluator
+                .inverse_dynamics(&state.as_motion_states(), &base)
+                .unwrap()[0][0];
             let terms = places.iter().zip([1.0, 2.0, 3.0, 4.0]);
             let expected: f64 = terms
                 .map(|(x, m)| m * x * (2.0 * x + 9.81 * 0.5_f64.cos()))

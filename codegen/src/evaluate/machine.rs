@@ -9,7 +9,7 @@ use pulp::{Arch, Simd, WithSimd};
 use super::{PoseFault, PoseReason};
 use crate::ValueId;
 use crate::expr::{Atom, Unary};
-use crate::lower::{PoseGuard, ProgramOp, StraightLineProgram, ProgramStage};
+use crate::lower::{PoseGuard, ProgramOp, ProgramStage, StraightLineProgram};
 
 /// States per block: small enough for the cache, large enough to hide the interpretation.
 const BLOCK: usize = 64;
@@ -227,7 +227,9 @@ impl<'a> RegisterMachine<'a> {
             let size = guard
                 .reference_size()
                 .map_or(1.0, |size| self.block_values(size, memory)[0]);
-            let k = values[..len].iter().position(|v| !guard.is_satisfied(*v, size))?;
+            let k = values[..len]
+                .iter()
+                .position(|v| !guard.is_satisfied(*v, size))?;
             Some((k, *guard))
         });
         // Fixed values come before those of a state there.
@@ -241,7 +243,12 @@ impl<'a> RegisterMachine<'a> {
 }
 
 /// The state stage on slots.
-fn slot_instructions(program: &StraightLineProgram, computed: &[bool], slots: &[usize], spare: usize) -> Vec<SlotInstruction> {
+fn slot_instructions(
+    program: &StraightLineProgram,
+    computed: &[bool],
+    slots: &[usize],
+    spare: usize,
+) -> Vec<SlotInstruction> {
     let slot = |v: &ValueId| slots[v.index()];
     let mut steps = Vec::with_capacity(program.ops.len());
     for (i, op) in program.ops.iter().enumerate() {
@@ -257,9 +264,13 @@ fn slot_instructions(program: &StraightLineProgram, computed: &[bool], slots: &[
             ProgramOp::Div(a, b) => SlotInstruction::Div(to, slot(a), slot(b)),
             ProgramOp::Atan2(a, b) => SlotInstruction::Atan2(to, slot(a), slot(b)),
             ProgramOp::Neg(a) => SlotInstruction::Neg(to, slot(a)),
-            ProgramOp::Cos(a) | ProgramOp::Unary(Unary::Cos, a) => SlotInstruction::SinCos(spare, to, slot(a)),
+            ProgramOp::Cos(a) | ProgramOp::Unary(Unary::Cos, a) => {
+                SlotInstruction::SinCos(spare, to, slot(a))
+            }
             // The cosine of the same angle stands right before the sine if both are needed; the angle is still there.
-            ProgramOp::Sin(a) if i > 0 && computed[i - 1] && program.ops[i - 1] == ProgramOp::Cos(*a) => {
+            ProgramOp::Sin(a)
+                if i > 0 && computed[i - 1] && program.ops[i - 1] == ProgramOp::Cos(*a) =>
+            {
                 steps.pop();
                 let cos = if slots[i - 1] == to {
                     spare
@@ -268,7 +279,9 @@ fn slot_instructions(program: &StraightLineProgram, computed: &[bool], slots: &[
                 };
                 SlotInstruction::SinCos(to, cos, slot(a))
             }
-            ProgramOp::Sin(a) | ProgramOp::Unary(Unary::Sin, a) => SlotInstruction::SinCos(to, spare, slot(a)),
+            ProgramOp::Sin(a) | ProgramOp::Unary(Unary::Sin, a) => {
+                SlotInstruction::SinCos(to, spare, slot(a))
+            }
             ProgramOp::Unary(function, a) => SlotInstruction::Unary(to, *function, slot(a)),
             ProgramOp::Number(_) => unreachable!("numbers are fixed"),
         };
@@ -307,7 +320,9 @@ impl WithSimd for BlockExecution<'_, '_> {
                 SlotInstruction::Unary(to, Unary::Sqrt, a) => apply_unary(memory, to, a, f64::sqrt),
                 SlotInstruction::Unary(to, Unary::Abs, a) => apply_unary(memory, to, a, f64::abs),
                 SlotInstruction::Unary(to, Unary::Sign, a) => apply_unary(memory, to, a, sign),
-                SlotInstruction::Unary(to, function, a) => apply_unary(memory, to, a, |x| evaluate_unary(function, x)),
+                SlotInstruction::Unary(to, function, a) => {
+                    apply_unary(memory, to, a, |x| evaluate_unary(function, x))
+                }
                 SlotInstruction::SinCos(sin, cos, a) => {
                     let [sin, cos, a] = distinct_slots(memory, [sin, cos, a]);
                     sin_cos_lanes(a, sin, cos);

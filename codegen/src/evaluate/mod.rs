@@ -315,7 +315,11 @@ impl<'a> ModelEvaluator<'a> {
         Ok(accelerations)
     }
 
-    fn evaluate_matrix(&self, program: &StraightLineProgram, states: &MotionStates<'_>) -> Result<DMatrix<f64>, PoseFault> {
+    fn evaluate_matrix(
+        &self,
+        program: &StraightLineProgram,
+        states: &MotionStates<'_>,
+    ) -> Result<DMatrix<f64>, PoseFault> {
         let n_drives = self.mechanism.drives.len();
         let columns = self.evaluate_program(program, states, &[])?;
         let n_columns = columns.len() / n_drives.max(1);
@@ -356,7 +360,10 @@ impl<'a> ModelEvaluator<'a> {
         base: &[f64],
         visit: impl FnMut(&OutputBlock<'_>) -> Result<(), E>,
     ) -> Result<(), E> {
-        let (mut n, mut fault) = (states.len(), self.find_not_finite_input(program, states, base));
+        let (mut n, mut fault) = (
+            states.len(),
+            self.find_not_finite_input(program, states, base),
+        );
         if let Some(fault) = &fault {
             n = fault.sample;
         }
@@ -369,7 +376,8 @@ impl<'a> ModelEvaluator<'a> {
                 fault = Some(earlier);
             }
         }
-        let machine = RegisterMachine::for_outputs(program, wanted, |atom| self.fixed_value(atom, base));
+        let machine =
+            RegisterMachine::for_outputs(program, wanted, |atom| self.fixed_value(atom, base));
         let input = |atom| match atom {
             Atom::Coordinate(i) => match self.coordinate_source(i) {
                 CoordinateSource::Active(k) => states.q[k],
@@ -460,7 +468,12 @@ impl<'a> ModelEvaluator<'a> {
 
     /// Passive coordinates of the first `n` states by Newton's method, each started from the state before; where that
     /// fails, from the nominal pose.
-    fn solve_passive(&self, programs: &LoopPrograms, states: &MotionStates<'_>, n: usize) -> PassiveTrajectory {
+    fn solve_passive(
+        &self,
+        programs: &LoopPrograms,
+        states: &MotionStates<'_>,
+        n: usize,
+    ) -> PassiveTrajectory {
         let machine = |program| RegisterMachine::new(program, |atom| self.fixed_value(atom, &[]));
         let loops = LoopEvaluator {
             evaluator: self,

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use modelmill_algebra::field::{FieldElement, FieldNumber, RandomStream};
 
-use super::{AtomAngleSum, Atom, ExprId, Graph, Node, Rational, Unary};
+use super::{Atom, AtomAngleSum, ExprId, Graph, Node, Rational, Unary};
 
 /// A number system in which expressions can be evaluated. `None` means that the value does not exist there:
 /// a division by zero, a root that is not in the field, a function that the domain does not know.

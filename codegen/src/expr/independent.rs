@@ -3,7 +3,7 @@
 use modelmill_algebra::eliminate::RowEchelonForm;
 use modelmill_algebra::field::{FieldElement, RandomStream};
 
-use super::{Atom, ExprId, FieldPoint, Graph, EvaluationTape};
+use super::{Atom, EvaluationTape, ExprId, FieldPoint, Graph};
 use crate::DeriveError;
 
 /// Seed of the draws: the same model gives the same text on any machine.

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use modelmill_algebra::digits::BigFloat;
 
-use super::{AtomAngleSum, Atom, EvaluationDomain, Rational, Unary};
+use super::{Atom, AtomAngleSum, EvaluationDomain, Rational, Unary};
 
 /// Values of atoms, with cosines and sines of those that were asked for as angles.
 #[derive(Clone, Debug, Default)]

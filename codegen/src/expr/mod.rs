@@ -26,7 +26,7 @@ use rustc_hash::FxHashMap;
 
 pub use angle::AtomAngleSum;
 pub(crate) use coordinates::coordinates_of;
-pub use evaluate::{EvaluationDomain, FloatDomain, FieldPoint, RationalPoint, EvaluationTape};
+pub use evaluate::{EvaluationDomain, EvaluationTape, FieldPoint, FloatDomain, RationalPoint};
 pub(crate) use many_digits::BigFloatPoint;
 pub use modelmill_algebra::Rational;
 pub(crate) use nominal::{nominal_of, nominal_value};

@@ -2,7 +2,7 @@
 
 use modelmill_spec::Mechanism;
 
-use super::{Atom, ExprId, FloatDomain, Graph, EvaluationTape};
+use super::{Atom, EvaluationTape, ExprId, FloatDomain, Graph};
 
 /// Value of an expression at the nominal pose, with the file's constants; rates are zero.
 pub(crate) fn nominal_value(graph: &Graph, mechanism: &Mechanism, id: ExprId) -> Option<f64> {

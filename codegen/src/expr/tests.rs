@@ -5,7 +5,8 @@ use modelmill_algebra::field::{FieldElement, MODULUS};
 use proptest::prelude::*;
 
 use super::{
-    AtomAngleSum, Atom, EvaluationDomain, ExprId, FloatDomain, FieldPoint, Graph, Rational, RationalPoint, EvaluationTape, Unary,
+    Atom, AtomAngleSum, EvaluationDomain, EvaluationTape, ExprId, FieldPoint, FloatDomain, Graph,
+    Rational, RationalPoint, Unary,
 };
 
 /// A random expression as a program for the constructors: each step uses values made before.

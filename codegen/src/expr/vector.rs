@@ -81,7 +81,12 @@ impl Graph {
         self.rotate_by(turn, v, true)
     }
 
-    fn rotate_by(&mut self, turn: &AxisRotation, v: &SymbolicVector, inverse: bool) -> SymbolicVector {
+    fn rotate_by(
+        &mut self,
+        turn: &AxisRotation,
+        v: &SymbolicVector,
+        inverse: bool,
+    ) -> SymbolicVector {
         let (c, s) = self.cos_sin(&turn.sum, turn.pi12);
         let s = if inverse { self.neg(s) } else { s };
         let axis = turn.axis as usize;

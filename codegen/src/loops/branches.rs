@@ -6,7 +6,9 @@
 //! crank. Then the sign of the root follows from other coordinates and may even change along one branch.
 //! Which is the case shows in the field: a radicand that is no square function takes square and other values alike.
 
-use modelmill_algebra::field::{FieldElement, ExtensionElement, MODULUS, FieldNumber, RandomStream};
+use modelmill_algebra::field::{
+    ExtensionElement, FieldElement, FieldNumber, MODULUS, RandomStream,
+};
 use modelmill_spec::Mechanism;
 
 use super::all::KinematicLoops;
@@ -36,7 +38,11 @@ const SUFFICIENT_DRAWS: usize = 40;
 
 /// The order in which the loops give the passive coordinates in closed form, if every root keeps its sign wherever the
 /// mechanism can move; otherwise the loops must be followed.
-pub(crate) fn closed_form_plan(graph: &mut Graph, mechanism: &Mechanism, loops: &KinematicLoops) -> Option<LoopPlan> {
+pub(crate) fn closed_form_plan(
+    graph: &mut Graph,
+    mechanism: &Mechanism,
+    loops: &KinematicLoops,
+) -> Option<LoopPlan> {
     let found = plan(graph, mechanism, loops, SolvableCoordinates::Passive)?;
     if found.steps.iter().all(|step| step.solved.root.is_none()) {
         return Some(found);
@@ -56,7 +62,9 @@ pub(crate) fn root_branches(
 ) -> Result<Vec<RootBranch>, DeriveError> {
     let further = radicands(graph, outputs);
     let of_steps: usize = poses.steps.iter().map(|s| s.radicands.len()).sum();
-    let mut seen: Vec<RadicandStatistics> = (0..of_steps + further.len()).map(RadicandStatistics::new).collect();
+    let mut seen: Vec<RadicandStatistics> = (0..of_steps + further.len())
+        .map(RadicandStatistics::new)
+        .collect();
     let mut stream = RandomStream::new(SEED);
     let constants = poses.draw_constants::<MODULUS>(&mut stream)?;
     let mut kept = QuadraticCharacters::default();
@@ -64,7 +72,8 @@ pub(crate) fn root_branches(
         if (0..seen.len()).all(|k| seen[k].is_decided() || kept.is_decided(k)) {
             break;
         }
-        let mut point: FieldPoint<ExtensionElement> = poses.draw_open_point(&constants, &mut stream);
+        let mut point: FieldPoint<ExtensionElement> =
+            poses.draw_open_point(&constants, &mut stream);
         let mut values: Vec<ExtensionElement> = Vec::new();
         // Says whether the root exists, so that what comes after it can be looked at.
         let mut note = |value: Option<Vec<ExtensionElement>>| -> Option<()> {
@@ -150,7 +159,10 @@ impl QuadraticCharacters {
 
     /// Whether radicand `k` is a function of free coordinates that has been seen often enough.
     fn is_decided(&self, k: usize) -> bool {
-        self.draws.get(k).is_some_and(|n| *n >= k + SUFFICIENT_DRAWS) && !self.leaves[k]
+        self.draws
+            .get(k)
+            .is_some_and(|n| *n >= k + SUFFICIENT_DRAWS)
+            && !self.leaves[k]
     }
 
     /// Whether radicand `k` is independent of those before it: elimination over the field with two elements.

@@ -7,7 +7,9 @@ use crate::expr::{AtomAngleSum, ExprId, Graph, coordinates_of};
 use crate::loops::coupling::CoupledCoordinate;
 use crate::loops::relation::AngleRelation;
 use crate::loops::spatial;
-use crate::loops::stretch::{PointPairPath, PathSegment, fixed_rotations, inverse_rotations, local_position, sum_segments};
+use crate::loops::stretch::{
+    PathSegment, PointPairPath, fixed_rotations, inverse_rotations, local_position, sum_segments,
+};
 use crate::tree::KinematicTree;
 
 /// A loop cut open at two points that must coincide.

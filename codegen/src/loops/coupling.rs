@@ -13,7 +13,7 @@ use super::closure::LoopClosure;
 use super::relation::AngleRelation;
 use super::solved::{multiply_angle, rotate_vector};
 use crate::DeriveError;
-use crate::expr::{AtomAngleSum, Atom, ExprId, Graph, Node, Rational, Unary, coordinates_of};
+use crate::expr::{Atom, AtomAngleSum, ExprId, Graph, Node, Rational, Unary, coordinates_of};
 use crate::tree::expressions::expression;
 
 /// Angles are divided into at most so many parts, and turn by at most so many of them.

@@ -4,9 +4,11 @@
 use modelmill_algebra::field::{FieldElement, FieldNumber, RandomStream};
 use modelmill_spec::Mechanism;
 
-use super::solve_step::{LoopPlan, FieldSolveStep};
+use super::solve_step::{FieldSolveStep, LoopPlan};
 use crate::DeriveError;
-use crate::expr::{Atom, EvaluationDomain, ExprId, FieldPoint, Graph, Node, Rational, EvaluationTape, Unary};
+use crate::expr::{
+    Atom, EvaluationDomain, EvaluationTape, ExprId, FieldPoint, Graph, Node, Rational, Unary,
+};
 
 /// How often a draw is repeated until all square roots exist.
 pub(crate) const MOST_DRAWS: usize = 4000;
@@ -93,7 +95,10 @@ impl FieldPoseSampler {
     }
 
     /// The loops of a point closed; `None` if they do not close for its free coordinates.
-    pub(crate) fn close_loops<N: FieldNumber>(&self, mut point: FieldPoint<N>) -> Option<FieldPoint<N>> {
+    pub(crate) fn close_loops<N: FieldNumber>(
+        &self,
+        mut point: FieldPoint<N>,
+    ) -> Option<FieldPoint<N>> {
         for step in &self.steps {
             step.solve(&mut point)?;
         }
@@ -102,7 +107,11 @@ impl FieldPoseSampler {
 }
 
 /// Cosine and sine of a coordinate as `n` times the opaque angle that is its `n`-th part.
-fn divided_angle<N: FieldNumber>(point: &FieldPoint<N>, coordinate: usize, n: i64) -> Option<(N, N)> {
+fn divided_angle<N: FieldNumber>(
+    point: &FieldPoint<N>,
+    coordinate: usize,
+    n: i64,
+) -> Option<(N, N)> {
     let value = point.atom(Atom::Coordinate(coordinate))?;
     let part = value * point.rational(&Rational::new(1, n))?;
     let mut power = (

@@ -11,7 +11,10 @@ use crate::expr::independent::independent_functions;
 use crate::expr::{ExprId, Graph};
 
 /// The residuals without those that are constant combinations of others (a planar loop seen in a tilted frame).
-pub(super) fn independent_residuals(graph: &Graph, residual: &[ExprId]) -> Result<Vec<ExprId>, DeriveError> {
+pub(super) fn independent_residuals(
+    graph: &Graph,
+    residual: &[ExprId],
+) -> Result<Vec<ExprId>, DeriveError> {
     let columns = independent_functions(graph, residual)?;
     Ok(columns.into_iter().map(|i| residual[i]).collect())
 }

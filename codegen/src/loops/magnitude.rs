@@ -7,7 +7,9 @@ use modelmill_spec::Mechanism;
 use num_rational::BigRational;
 use num_traits::One;
 
-use crate::expr::{Atom, ExprId, FloatDomain, Graph, Node, EvaluationTape, Unary, nominal_of, nominal_value};
+use crate::expr::{
+    Atom, EvaluationTape, ExprId, FloatDomain, Graph, Node, Unary, nominal_of, nominal_value,
+};
 
 /// The sum of the magnitudes of all terms of some expressions at the nominal pose: the size of a mechanism's loops in m.
 /// It is 1 where there is none; what couples angles has no length.
@@ -31,9 +33,14 @@ pub(crate) fn nominal_magnitude(graph: &mut Graph, mechanism: &Mechanism, roots:
 /// For a sum that is its share of the magnitudes of its terms. A product has lost as many digits as its factors together
 /// have relative to their own sizes: it is as good as its worst factor, however many there are, while the magnitudes of all
 /// its terms, multiplied out, would count the digits of every factor.
-pub(crate) fn significant_digits(graph: &Graph, mechanism: &Mechanism, root: ExprId) -> Option<f64> {
+pub(crate) fn significant_digits(
+    graph: &Graph,
+    mechanism: &Mechanism,
+    root: ExprId,
+) -> Option<f64> {
     let order = operands_first(graph, root);
-    let values = EvaluationTape::new(graph, &order).evaluate(&FloatDomain(|atom| nominal_of(mechanism, atom)))?;
+    let values = EvaluationTape::new(graph, &order)
+        .evaluate(&FloatDomain(|atom| nominal_of(mechanism, atom)))?;
     let mut known: HashMap<ExprId, (f64, f64)> = HashMap::new();
     for (id, value) in order.iter().zip(values) {
         let of = |id: &ExprId| known[id];
@@ -154,7 +161,12 @@ impl LoopSize {
     /// The sum of the magnitudes of all terms of an expression that depends on the pose: for any lengths, with sines and
     /// cosines of 1 and slides as far out as at the nominal pose. Fractions have the values of the nominal pose, and grow
     /// with the loops.
-    pub(crate) fn term_magnitude(&self, graph: &mut Graph, mechanism: &Mechanism, id: ExprId) -> ExprId {
+    pub(crate) fn term_magnitude(
+        &self,
+        graph: &mut Graph,
+        mechanism: &Mechanism,
+        id: ExprId,
+    ) -> ExprId {
         let found = expression_magnitude(graph, mechanism, &mut HashMap::new(), id);
         let out = nominal_lengths(graph, mechanism, |graph, nominal| {
             self.scale_length(graph, nominal)
@@ -214,7 +226,11 @@ impl LoopSize {
     }
 
     /// The size that some constants make up, if they do.
-    fn from_constants(graph: &mut Graph, mechanism: &Mechanism, constants: &[Atom]) -> Option<Self> {
+    fn from_constants(
+        graph: &mut Graph,
+        mechanism: &Mechanism,
+        constants: &[Atom],
+    ) -> Option<Self> {
         let terms: Vec<ExprId> = constants
             .iter()
             .map(|constant| {
@@ -230,7 +246,12 @@ impl LoopSize {
 
 /// The power of the unit of length with which an expression grows, if it does so with one: `lengths` are those of its
 /// constants that are in it, besides the coordinates that slide.
-fn length_degree(graph: &Graph, mechanism: &Mechanism, id: ExprId, lengths: &[Atom]) -> Option<i32> {
+fn length_degree(
+    graph: &Graph,
+    mechanism: &Mechanism,
+    id: ExprId,
+    lengths: &[Atom],
+) -> Option<i32> {
     let value = |unit: f64| {
         let atom = |atom: Atom| {
             let moves = matches!(atom, Atom::Coordinate(i)
@@ -297,7 +318,12 @@ pub(crate) fn expression_magnitude(
         Node::Sum(terms) => {
             let terms: Vec<_> = terms
                 .into_iter()
-                .map(|(term, factor)| (expression_magnitude(graph, mechanism, known, term), factor.abs()))
+                .map(|(term, factor)| {
+                    (
+                        expression_magnitude(graph, mechanism, known, term),
+                        factor.abs(),
+                    )
+                })
                 .collect();
             graph.sum(&terms)
         }

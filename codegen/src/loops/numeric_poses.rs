@@ -4,7 +4,7 @@ use modelmill_algebra::field::RandomStream;
 use modelmill_spec::Mechanism;
 use nalgebra::{DMatrix, DVector};
 
-use crate::expr::{Atom, ExprId, FloatDomain, Graph, EvaluationTape};
+use crate::expr::{Atom, EvaluationTape, ExprId, FloatDomain, Graph};
 use crate::loops::magnitude;
 
 /// Residuals of loops with their derivatives by the coordinates that close them.
@@ -93,7 +93,12 @@ impl<'a> NumericLoops<'a> {
         let moves: Vec<(usize, f64)> = self
             .moved
             .iter()
-            .map(|(i, one)| (*i, one * reach * uniform_symmetric(stream) / f64::from(STEPS)))
+            .map(|(i, one)| {
+                (
+                    *i,
+                    one * reach * uniform_symmetric(stream) / f64::from(STEPS),
+                )
+            })
             .collect();
         for _ in 0..STEPS {
             for (i, dx) in &moves {

@@ -11,7 +11,8 @@ use modelmill_spec::Mechanism;
 use nalgebra::{DMatrix, DVector};
 
 use crate::expr::{
-    AtomAngleSum, Atom, ExprId, FloatDomain, FieldPoint, Graph, Node, EvaluationTape, coordinates_of, nominal_of,
+    Atom, AtomAngleSum, EvaluationTape, ExprId, FieldPoint, FloatDomain, Graph, Node,
+    coordinates_of, nominal_of,
 };
 use crate::loops::all::KinematicLoops;
 use crate::loops::closure::LoopClosure;
@@ -112,7 +113,12 @@ impl PriorLoops {
     }
 
     /// Whether expressions vanish wherever these loops close: shown at random points of the field.
-    fn is_zero_where_closed(&self, graph: &mut Graph, mechanism: &Mechanism, closed: &[ExprId]) -> bool {
+    fn is_zero_where_closed(
+        &self,
+        graph: &mut Graph,
+        mechanism: &Mechanism,
+        closed: &[ExprId],
+    ) -> bool {
         /// Points, and how many draws may fail to be one.
         const POINTS: usize = 8;
         const DRAWS: usize = 400;
@@ -130,7 +136,11 @@ impl PriorLoops {
             tape.evaluate(&poses.close_loops(open)?)
         });
         let seen: Vec<_> = points.take(POINTS).collect();
-        seen.len() == POINTS && seen.iter().flatten().all(|left| *left == FieldElement::ZERO)
+        seen.len() == POINTS
+            && seen
+                .iter()
+                .flatten()
+                .all(|left| *left == FieldElement::ZERO)
     }
 }
 
@@ -160,7 +170,9 @@ fn relations_along(
     combinations(&candidates).find(|relations| {
         let closed = substitute_relations(graph, relations, residual);
         let tape = EvaluationTape::new(graph, &closed);
-        poses.iter().all(|q| is_loop_closed_at(mechanism, &tape, q, size))
+        poses
+            .iter()
+            .all(|q| is_loop_closed_at(mechanism, &tape, q, size))
             && (mechanism.is_at_values || motion.is_zero_where_closed(graph, mechanism, &closed))
     })
 }
@@ -182,7 +194,8 @@ fn relations_of(
         .iter()
         .map(|p| angle_relations(mechanism, &poses, &given, &fixed, *p))
         .collect();
-    combinations(&candidates).find(|relations| is_loop_closed(graph, mechanism, residual, relations))
+    combinations(&candidates)
+        .find(|relations| is_loop_closed(graph, mechanism, residual, relations))
 }
 
 /// Coordinates at the nominal pose and at some poses around it; `None` if the loop cannot be followed there.
@@ -197,7 +210,9 @@ fn nearby_poses(
     const HALVINGS: u32 = 6;
     let loops = NumericLoops::for_unknowns(graph, mechanism, residual, unknown.to_vec(), given);
     // A loop that leaves some of them free keeps to relations of many kinds.
-    let nominal = loops.closed_nominal_pose().filter(|q| loops.is_regular(q))?;
+    let nominal = loops
+        .closed_nominal_pose()
+        .filter(|q| loops.is_regular(q))?;
     (0..=HALVINGS).find_map(|k| {
         let reach = PERTURBATION / f64::from(1_u32 << k);
         let mut stream = RandomStream::new(1);
@@ -364,7 +379,8 @@ fn is_loop_closed(
         tape.evaluate(&point)
             .is_some_and(|values| values.iter().all(|v| *v == FieldElement::ZERO))
     });
-    closes_exactly || mechanism.is_at_values && is_loop_closed_numerically(graph, mechanism, residual, &tape)
+    closes_exactly
+        || mechanism.is_at_values && is_loop_closed_numerically(graph, mechanism, residual, &tape)
 }
 
 /// Whether nothing but the last digits of the file's lengths is left of a loop, at any angles.
@@ -388,7 +404,12 @@ fn is_loop_closed_numerically(
 }
 
 /// Whether nothing but the last digits of the file's lengths is left of a loop at a pose.
-fn is_loop_closed_at(mechanism: &Mechanism, closed: &EvaluationTape, pose: &[f64], size: f64) -> bool {
+fn is_loop_closed_at(
+    mechanism: &Mechanism,
+    closed: &EvaluationTape,
+    pose: &[f64],
+    size: f64,
+) -> bool {
     /// Relative to the size of the loop: what the arithmetic of other programs leaves in lengths that they write.
     const LAST_DIGITS: f64 = 1e-11;
     let value = |atom: Atom| match atom {
@@ -400,7 +421,11 @@ fn is_loop_closed_at(mechanism: &Mechanism, closed: &EvaluationTape, pose: &[f64
 }
 
 /// Replaces the related angles in sines and cosines.
-fn substitute_relations(graph: &mut Graph, relations: &[AngleRelation], roots: &[ExprId]) -> Vec<ExprId> {
+fn substitute_relations(
+    graph: &mut Graph,
+    relations: &[AngleRelation],
+    roots: &[ExprId],
+) -> Vec<ExprId> {
     let nodes: Vec<Node> = graph
         .nodes_of(roots)
         .filter(|n| matches!(n, Node::Sin(_) | Node::Cos(_)))

@@ -7,7 +7,7 @@ use modelmill_spec::Mechanism;
 use super::all::KinematicLoops;
 use super::solve_step::{LoopPlan, PlanStep};
 use super::solved::ClosureSolution;
-use crate::expr::{AtomAngleSum, Atom, ExprId, Graph, nominal_value};
+use crate::expr::{Atom, AtomAngleSum, ExprId, Graph, nominal_value};
 use crate::loops::choose;
 use crate::loops::closure::LoopClosure;
 use crate::loops::planar;
@@ -219,7 +219,9 @@ fn solve_loop(
         && closure.relations.is_empty()
     {
         let angle = AtomAngleSum::new([(Atom::Coordinate(follower.coordinate), 1)]);
-        let in_parts = follower.in_parts.filter(|_| unknowns == SolvableCoordinates::Any);
+        let in_parts = follower
+            .in_parts
+            .filter(|_| unknowns == SolvableCoordinates::Any);
         let solved = ClosureSolution {
             angles: in_parts
                 .map(|cos_sin| (angle, cos_sin))

@@ -5,9 +5,9 @@
 
 use std::collections::BTreeSet;
 
-use crate::expr::{AtomAngleSum, Atom, ExprId, Graph, Rational, coordinates_of};
+use crate::expr::{Atom, AtomAngleSum, ExprId, Graph, Rational, coordinates_of};
 use crate::loops::closure::{LoopClosure, PlanarLeg};
-use crate::loops::solved::{SignedRoot, ClosureSolution, rotate_vector};
+use crate::loops::solved::{ClosureSolution, SignedRoot, rotate_vector};
 use crate::loops::whole_root;
 
 /// The vectors that turn with one set of unknown angles, as one vector in a frame turned by `angle`.
@@ -41,7 +41,10 @@ pub(crate) fn solve(
     let slides: Vec<usize> = unknown
         .iter()
         .copied()
-        .filter(|c| legs.iter().any(|leg| has_coordinate(graph, &leg.vector, *c)))
+        .filter(|c| {
+            legs.iter()
+                .any(|leg| has_coordinate(graph, &leg.vector, *c))
+        })
         .collect();
     for leg in legs {
         let inside: BTreeSet<(usize, i32)> = leg
@@ -206,7 +209,10 @@ fn intersect_circles(
     let witness = graph.mul(across, inverse);
     Some(ClosureSolution {
         angles: vec![
-            (first.angle.clone(), rotation_between(graph, v1, first.vector, aa)),
+            (
+                first.angle.clone(),
+                rotation_between(graph, v1, first.vector, aa),
+            ),
             (
                 second.angle.clone(),
                 rotation_between(graph, v2, second.vector, bb),
@@ -284,7 +290,10 @@ fn intersect_circle_and_line(
     let v = put(graph, k0, k1).map(|x| graph.neg(x));
     let arm = put(graph, a0, a1);
     let arm_squared = dot(graph, arm, arm);
-    let angles = vec![(group.angle.clone(), rotation_between(graph, v, arm, arm_squared))];
+    let angles = vec![(
+        group.angle.clone(),
+        rotation_between(graph, v, arm, arm_squared),
+    )];
     Some(ClosureSolution {
         angles,
         relations: Vec::new(),
@@ -294,7 +303,12 @@ fn intersect_circle_and_line(
 }
 
 /// `k0 + s a + t b = 0`
-fn intersect_lines(graph: &mut Graph, known: [ExprId; 2], first: usize, second: usize) -> Option<ClosureSolution> {
+fn intersect_lines(
+    graph: &mut Graph,
+    known: [ExprId; 2],
+    first: usize,
+    second: usize,
+) -> Option<ClosureSolution> {
     let (rest, a) = split_linear(graph, known, first)?;
     let (k0, b) = split_linear(graph, rest, second)?;
     let determinant = cross(graph, a, b);

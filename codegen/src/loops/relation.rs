@@ -1,6 +1,6 @@
 //! Passive angles that are integer combinations of other angles.
 
-use crate::expr::{AtomAngleSum, Atom, ExprId, Graph};
+use crate::expr::{Atom, AtomAngleSum, ExprId, Graph};
 
 /// A passive angle that equals `sum + pi12 * pi/12`.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -3,7 +3,9 @@
 use modelmill_algebra::field::FieldNumber;
 
 use super::solved::ClosureSolution;
-use crate::expr::{AtomAngleSum, Atom, EvaluationDomain, ExprId, FieldPoint, Graph, Node, EvaluationTape, Unary};
+use crate::expr::{
+    Atom, AtomAngleSum, EvaluationDomain, EvaluationTape, ExprId, FieldPoint, Graph, Node, Unary,
+};
 
 /// A way to solve all loops one after the other, each for at most two coordinates.
 #[derive(Clone, Debug)]

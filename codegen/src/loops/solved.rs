@@ -47,7 +47,11 @@ pub(crate) fn multiply_angle(graph: &mut Graph, mut power: [ExprId; 2], n: i64) 
 }
 
 /// The vector turned by the angle of the given cosine and sine.
-pub(crate) fn rotate_vector(graph: &mut Graph, [c, s]: [ExprId; 2], [x, y]: [ExprId; 2]) -> [ExprId; 2] {
+pub(crate) fn rotate_vector(
+    graph: &mut Graph,
+    [c, s]: [ExprId; 2],
+    [x, y]: [ExprId; 2],
+) -> [ExprId; 2] {
     let products = [(c, x), (s, y), (s, x), (c, y)].map(|(a, b)| graph.mul(a, b));
     [
         graph.sub(products[0], products[1]),

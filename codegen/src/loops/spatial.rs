@@ -12,11 +12,14 @@ use modelmill_spec::Mechanism;
 
 use crate::expr::vector::{AxisRotation, push_rotation};
 use crate::expr::{
-    AtomAngleSum, Atom, ExprId, FieldPoint, Graph, Node, Rational, EvaluationTape, Unary, nominal_value,
+    Atom, AtomAngleSum, EvaluationTape, ExprId, FieldPoint, Graph, Node, Rational, Unary,
+    nominal_value,
 };
 use crate::loops::magnitude;
-use crate::loops::solved::{SignedRoot, ClosureSolution};
-use crate::loops::stretch::{PointPairPath, PathSegment, inverse_rotations, path_segments, sum_segments};
+use crate::loops::solved::{ClosureSolution, SignedRoot};
+use crate::loops::stretch::{
+    PathSegment, PointPairPath, inverse_rotations, path_segments, sum_segments,
+};
 use crate::loops::whole_root;
 use crate::tree::KinematicTree;
 
@@ -25,7 +28,11 @@ const SINGULAR: f64 = 1e-9;
 
 /// Equations that hold where the loop closes: its vector in every frame along it, and the squares of distances about
 /// every origin along it.
-pub(crate) fn equations(graph: &mut Graph, tree: &KinematicTree, between: &PointPairPath) -> Vec<ExprId> {
+pub(crate) fn equations(
+    graph: &mut Graph,
+    tree: &KinematicTree,
+    between: &PointPairPath,
+) -> Vec<ExprId> {
     let mut found = BTreeSet::new();
     let mut in_frame = |graph: &mut Graph, turns: &[AxisRotation]| {
         let path = between.segments(graph, tree, &inverse_rotations(turns));
@@ -47,7 +54,8 @@ pub(crate) fn equations(graph: &mut Graph, tree: &KinematicTree, between: &Point
         let other = path_segments(tree, between.paths[1 - side], &[], &between.at[1 - side]);
         for k in 0..path.len() {
             let child = path_segments(tree, &path[k + 1..], &[], at);
-            let mut rest: Vec<PathSegment> = path_segments(tree, &path[..=k], &[], &[Graph::ZERO; 3]);
+            let mut rest: Vec<PathSegment> =
+                path_segments(tree, &path[..=k], &[], &[Graph::ZERO; 3]);
             for stretch in &mut rest {
                 stretch.vector = stretch.vector.map(|x| graph.neg(x));
             }
@@ -159,7 +167,9 @@ fn find_eliminable_slide(
             .collect();
         slides.into_iter().find_map(|slide| {
             let slope = graph.differentiate(&[*equation], Atom::Coordinate(slide))[0];
-            if !equation_unknowns(graph, slope, left).is_empty() || !is_regular(graph, mechanism, slope) {
+            if !equation_unknowns(graph, slope, left).is_empty()
+                || !is_regular(graph, mechanism, slope)
+            {
                 return None;
             }
             let rest = set_to_zero(graph, &[*equation], slide)[0];
@@ -194,7 +204,9 @@ fn candidate_solutions(
             .collect();
         for (i, first) in linear.iter().enumerate() {
             for second in &linear[i + 1..] {
-                solved.extend(solve_equation_pair(graph, mechanism, first, second, coordinate));
+                solved.extend(solve_equation_pair(
+                    graph, mechanism, first, second, coordinate,
+                ));
             }
         }
         solved
@@ -231,7 +243,8 @@ impl TrigonometricEquation {
         let atom = Atom::Coordinate(coordinate);
         let slope = graph.differentiate(&[equation], atom);
         let bend = graph.differentiate(&slope, atom);
-        let [at_zero, slope, bend] = set_to_zero(graph, &[equation, slope[0], bend[0]], coordinate)[..]
+        let [at_zero, slope, bend] =
+            set_to_zero(graph, &[equation, slope[0], bend[0]], coordinate)[..]
         else {
             return None;
         };
@@ -251,7 +264,12 @@ impl TrigonometricEquation {
     }
 
     /// One equation: with `r = cosine sin q - sine cos q`, `r^2 = cosine^2 + sine^2 - rest^2`.
-    fn solve(&self, graph: &mut Graph, mechanism: &Mechanism, coordinate: usize) -> Option<ClosureSolution> {
+    fn solve(
+        &self,
+        graph: &mut Graph,
+        mechanism: &Mechanism,
+        coordinate: usize,
+    ) -> Option<ClosureSolution> {
         let Self { cosine, sine, rest } = *self;
         let (c, s) = graph.cos_sin(&AtomAngleSum::new([(Atom::Coordinate(coordinate), 1)]), 0);
         let (x, y) = (graph.mul(cosine, s), graph.mul(sine, c));
@@ -288,7 +306,10 @@ impl TrigonometricEquation {
 
 fn angle_solution(coordinate: usize, cos_sin: [ExprId; 2]) -> ClosureSolution {
     ClosureSolution {
-        angles: vec![(AtomAngleSum::new([(Atom::Coordinate(coordinate), 1)]), cos_sin)],
+        angles: vec![(
+            AtomAngleSum::new([(Atom::Coordinate(coordinate), 1)]),
+            cos_sin,
+        )],
         relations: Vec::new(),
         values: Vec::new(),
         root: None,
@@ -419,7 +440,8 @@ fn is_zero(graph: &Graph, id: ExprId) -> bool {
             point.angles.insert(*atom, stream.next_circle_point());
         }
         // What has a root or a quotient that does not exist there is not zero as it stands.
-        tape.evaluate(&point).is_some_and(|v| v[0] == FieldElement::ZERO)
+        tape.evaluate(&point)
+            .is_some_and(|v| v[0] == FieldElement::ZERO)
     })
 }
 

@@ -1,6 +1,6 @@
 //! Paths along the tree as sums of vectors, each given in a frame that a chain of turns leads to.
 
-use modelmill_spec::{Mechanism, FramePoint};
+use modelmill_spec::{FramePoint, Mechanism};
 
 use crate::DeriveError;
 use crate::expr::vector::{self, AxisRotation, SymbolicVector, push_rotation};
@@ -16,7 +16,12 @@ pub(crate) struct PathSegment {
 }
 
 /// Position of a point in a frame up its tree, as stretches: `start` turns stand in front of all.
-pub(crate) fn path_segments(tree: &KinematicTree, links: &[usize], start: &[AxisRotation], at: &SymbolicVector) -> Vec<PathSegment> {
+pub(crate) fn path_segments(
+    tree: &KinematicTree,
+    links: &[usize],
+    start: &[AxisRotation],
+    at: &SymbolicVector,
+) -> Vec<PathSegment> {
     let mut turns = start.to_vec();
     let mut path = Vec::new();
     for &i in links {
@@ -64,7 +69,10 @@ pub(crate) fn sum_segments(graph: &mut Graph, path: &[PathSegment]) -> SymbolicV
     graph.add_vectors(&vectors)
 }
 
-pub(crate) fn local_position(graph: &mut Graph, point: &FramePoint) -> Result<SymbolicVector, DeriveError> {
+pub(crate) fn local_position(
+    graph: &mut Graph,
+    point: &FramePoint,
+) -> Result<SymbolicVector, DeriveError> {
     Ok([
         expressions::expression(graph, &point.at[0])?,
         expressions::expression(graph, &point.at[1])?,
@@ -93,8 +101,14 @@ pub(crate) struct PointPairPath<'a> {
 
 impl PointPairPath<'_> {
     /// The vector from the second point to the first as stretches, in the common frame turned by `start`.
-    pub(crate) fn segments(&self, graph: &mut Graph, tree: &KinematicTree, start: &[AxisRotation]) -> Vec<PathSegment> {
-        let [first, second] = [0, 1].map(|i| path_segments(tree, self.paths[i], start, &self.at[i]));
+    pub(crate) fn segments(
+        &self,
+        graph: &mut Graph,
+        tree: &KinematicTree,
+        start: &[AxisRotation],
+    ) -> Vec<PathSegment> {
+        let [first, second] =
+            [0, 1].map(|i| path_segments(tree, self.paths[i], start, &self.at[i]));
         let mut path = first;
         for mut stretch in second {
             stretch.vector = stretch.vector.map(|x| graph.neg(x));
@@ -126,7 +140,10 @@ pub(crate) fn distance_squared(
     points: [usize; 2],
 ) -> Result<ExprId, DeriveError> {
     let points = points.map(|i| &mechanism.points[i]);
-    let at = [local_position(graph, points[0])?, local_position(graph, points[1])?];
+    let at = [
+        local_position(graph, points[0])?,
+        local_position(graph, points[1])?,
+    ];
     let paths = points.map(|p| tree.path_to(tree.link_of(p.frame)));
     let common = (paths[0].iter().zip(&paths[1]))
         .take_while(|(x, y)| x == y)

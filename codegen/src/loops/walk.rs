@@ -71,14 +71,22 @@ struct LoopTangent {
 
 impl<'a> PoseWalk<'a> {
     /// Begins at the nominal pose; `None` if that closes no loop.
-    pub(crate) fn new(graph: &mut Graph, mechanism: &'a Mechanism, loops: &KinematicLoops) -> Option<Self> {
+    pub(crate) fn new(
+        graph: &mut Graph,
+        mechanism: &'a Mechanism,
+        loops: &KinematicLoops,
+    ) -> Option<Self> {
         let residual = all_residuals(loops);
         let all: Vec<usize> = (0..mechanism.coordinates.len()).collect();
         let numeric = NumericLoops::for_unknowns(graph, mechanism, &residual, all.clone(), &[]);
         let nominal = numeric.declared_nominal_pose();
         let sizes = residual_loop_sizes(graph, mechanism, loops);
-        let of_lengths = loops.closures.iter().filter(|c| c.explicit_coordinates().is_empty());
-        let of_lengths = of_lengths.map(|c| magnitude::nominal_magnitude(graph, mechanism, &c.residual));
+        let of_lengths = loops
+            .closures
+            .iter()
+            .filter(|c| c.explicit_coordinates().is_empty());
+        let of_lengths =
+            of_lengths.map(|c| magnitude::nominal_magnitude(graph, mechanism, &c.residual));
         let length = of_lengths.reduce(f64::max).unwrap_or(1.0);
         let mut walk = Self {
             length,
@@ -286,7 +294,8 @@ impl<'a> PoseWalk<'a> {
 
     /// Whether the passive coordinates follow from the others, and not only just.
     fn is_determined(&self) -> bool {
-        self.relative_singular_value().is_some_and(|x| x > self.dead)
+        self.relative_singular_value()
+            .is_some_and(|x| x > self.dead)
     }
 
     /// The least singular value by the passive coordinates relative to the largest.
@@ -303,7 +312,11 @@ impl<'a> PoseWalk<'a> {
 }
 
 /// The size of the loop that each of [`all_residuals`] belongs to; 1 for what couples coordinates.
-fn residual_loop_sizes(graph: &mut Graph, mechanism: &Mechanism, loops: &KinematicLoops) -> Vec<f64> {
+fn residual_loop_sizes(
+    graph: &mut Graph,
+    mechanism: &Mechanism,
+    loops: &KinematicLoops,
+) -> Vec<f64> {
     let of_one = |closure: &LoopClosure| {
         let size = match closure.follower {
             Some(_) => 1.0,

@@ -10,7 +10,7 @@ use modelmill_algebra::field::{FieldElement, MODULUS, RandomStream};
 use modelmill_algebra::lift::reconstruct_rational;
 use modelmill_algebra::univariate::interpolate;
 
-use crate::expr::{Atom, ExprId, FieldPoint, Graph, Node, Rational, EvaluationTape, Unary};
+use crate::expr::{Atom, EvaluationTape, ExprId, FieldPoint, Graph, Node, Rational, Unary};
 
 /// Draws at which a radicand must be a square everywhere, or nowhere, before any work is done.
 const SQUARE_TESTS: usize = 24;
@@ -84,7 +84,11 @@ fn radicand_variables(graph: &Graph, radicand: ExprId) -> Option<Vec<RadicandVar
 /// Where each variable goes along a line: its value, or the tangent of half its angle.
 type VariableLine = Vec<(FieldElement, FieldElement)>;
 
-fn random_line(variables: &[RadicandVariable], start: Option<&[FieldElement]>, stream: &mut RandomStream) -> VariableLine {
+fn random_line(
+    variables: &[RadicandVariable],
+    start: Option<&[FieldElement]>,
+    stream: &mut RandomStream,
+) -> VariableLine {
     let mut draw = |k: usize| {
         let from = start.map_or_else(|| stream.next_element(), |start| start[k]);
         (from, stream.next_element())
@@ -93,7 +97,11 @@ fn random_line(variables: &[RadicandVariable], start: Option<&[FieldElement]>, s
 }
 
 /// The point at `t` of a line; `None` where an angle has no tangent.
-fn point_on_line(variables: &[RadicandVariable], line: &VariableLine, t: FieldElement) -> Option<FieldPoint> {
+fn point_on_line(
+    variables: &[RadicandVariable],
+    line: &VariableLine,
+    t: FieldElement,
+) -> Option<FieldPoint> {
     let mut point = FieldPoint::default();
     for (variable, (from, by)) in variables.iter().zip(line) {
         let x = *from + t * *by;
@@ -109,11 +117,16 @@ fn point_on_line(variables: &[RadicandVariable], line: &VariableLine, t: FieldEl
     Some(point)
 }
 
-fn may_be_square(tape: &EvaluationTape, variables: &[RadicandVariable], stream: &mut RandomStream) -> bool {
+fn may_be_square(
+    tape: &EvaluationTape,
+    variables: &[RadicandVariable],
+    stream: &mut RandomStream,
+) -> bool {
     let mut seen = [0, 0];
     for _ in 0..SQUARE_TESTS {
         let line = random_line(variables, None, stream);
-        let value = point_on_line(variables, &line, FieldElement::ZERO).and_then(|point| tape.evaluate(&point));
+        let value = point_on_line(variables, &line, FieldElement::ZERO)
+            .and_then(|point| tape.evaluate(&point));
         let Some(value) = value else {
             return false;
         };
@@ -125,7 +138,12 @@ fn may_be_square(tape: &EvaluationTape, variables: &[RadicandVariable], stream: 
 }
 
 /// The degree of the radicand in one variable, if it is a polynomial of even degree in it.
-fn radicand_degree(tape: &EvaluationTape, variables: &[RadicandVariable], k: usize, stream: &mut RandomStream) -> Option<usize> {
+fn radicand_degree(
+    tape: &EvaluationTape,
+    variables: &[RadicandVariable],
+    k: usize,
+    stream: &mut RandomStream,
+) -> Option<usize> {
     let mut line = random_line(variables, None, stream);
     for (other, (_, by)) in line.iter_mut().enumerate() {
         if other != k {
@@ -207,7 +225,10 @@ fn root_coefficients(
         return None;
     };
     let factors = &solution[..monomials.len()];
-    let first = factors.iter().find(|x| **x != FieldElement::ZERO)?.inverse()?;
+    let first = factors
+        .iter()
+        .find(|x| **x != FieldElement::ZERO)?
+        .inverse()?;
     factors
         .iter()
         .map(|x| reconstruct_rational(&[(MODULUS, (*x * first).representative())]))
@@ -271,7 +292,11 @@ fn series_root(square: &[FieldElement], n: usize) -> Option<Vec<FieldElement>> {
     Some(root)
 }
 
-fn monomial_value(variables: &[RadicandVariable], powers: &RadicandMonomial, point: &FieldPoint) -> FieldElement {
+fn monomial_value(
+    variables: &[RadicandVariable],
+    powers: &RadicandMonomial,
+    point: &FieldPoint,
+) -> FieldElement {
     let factor = |(variable, (n, m)): (&RadicandVariable, &(usize, usize))| {
         if variable.is_angle {
             let (c, s) = point.angles[&variable.atom];
@@ -393,7 +418,8 @@ mod tests {
             let three = graph.integer(3);
             let root = graph.unary(Unary::Sqrt, three);
             let (x, y) = (graph.mul(length, c), graph.mul(length, s));
-            let sum = graph.linear_combination([(x, Rational::new(2, 3)), (y, Rational::integer(-5))]);
+            let sum =
+                graph.linear_combination([(x, Rational::new(2, 3)), (y, Rational::integer(-5))]);
             let sum = graph.add(sum, length);
             graph.mul(root, sum)
         });

@@ -12,8 +12,10 @@ mod share;
 mod tests;
 
 pub(crate) use program::SINGULAR;
-pub use program::{PoseGuard, ProgramOp, OperationCount, StraightLineProgram, ProgramStage, ValueId};
-pub(crate) use schedule::{AtomRule, AtomDefinition};
+pub use program::{
+    OperationCount, PoseGuard, ProgramOp, ProgramStage, StraightLineProgram, ValueId,
+};
+pub(crate) use schedule::{AtomDefinition, AtomRule};
 
 use crate::expr::{ExprId, Graph};
 
@@ -69,7 +71,11 @@ pub(crate) fn lower(graph: &Graph, request: &LoweringRequest<'_>) -> StraightLin
 }
 
 /// Lowers them with some passes only.
-pub(crate) fn lower_with_passes(graph: &Graph, passes: &[LoweringPass], request: &LoweringRequest<'_>) -> StraightLineProgram {
+pub(crate) fn lower_with_passes(
+    graph: &Graph,
+    passes: &[LoweringPass],
+    request: &LoweringRequest<'_>,
+) -> StraightLineProgram {
     let mut roots: Vec<ExprId> = request.outputs.to_vec();
     roots.extend(request.reachable);
     roots.extend(request.regular.iter().flat_map(|(id, size)| [*id, *size]));

@@ -6,8 +6,8 @@ use std::collections::BTreeSet;
 use rustc_hash::FxHashMap;
 
 use super::LoweringRequest;
-use super::program::{PoseGuard, ProgramOp, StraightLineProgram, ProgramStage, ValueId};
-use crate::expr::{AtomAngleSum, Atom, ExprId, Graph, Node, Rational};
+use super::program::{PoseGuard, ProgramOp, ProgramStage, StraightLineProgram, ValueId};
+use crate::expr::{Atom, AtomAngleSum, ExprId, Graph, Node, Rational};
 
 /// An atom that is computed.
 #[derive(Clone, Copy, Debug)]
@@ -55,7 +55,11 @@ impl AtomRule {
 
 /// Writes the program for `roots`: outputs, then what must be reachable, regular (each with its size), and defined, as in
 /// `request`.
-pub(crate) fn schedule(graph: &Graph, roots: &[ExprId], request: &LoweringRequest<'_>) -> StraightLineProgram {
+pub(crate) fn schedule(
+    graph: &Graph,
+    roots: &[ExprId],
+    request: &LoweringRequest<'_>,
+) -> StraightLineProgram {
     let (outputs, rest) = roots.split_at(request.outputs.len());
     let (reachable, rest) = rest.split_at(request.reachable.len());
     let (regular, defined) = rest.split_at(2 * request.regular.len());
@@ -79,7 +83,10 @@ pub(crate) fn schedule(graph: &Graph, roots: &[ExprId], request: &LoweringReques
     }
     for pair in regular.chunks(2) {
         let [value, size] = [pair[0], pair[1]].map(|id| scheduler.value(id));
-        scheduler.program.guards.push(PoseGuard::Regular(value, size));
+        scheduler
+            .program
+            .guards
+            .push(PoseGuard::Regular(value, size));
     }
     let outputs: Vec<ValueId> = outputs.iter().map(|id| scheduler.value(*id)).collect();
     if request.may_be_undefined {
@@ -162,7 +169,12 @@ impl ProgramScheduler<'_> {
         self.push_op(ProgramOp::Number(value))
     }
 
-    fn commutative(&mut self, op: fn(ValueId, ValueId) -> ProgramOp, a: ValueId, b: ValueId) -> ValueId {
+    fn commutative(
+        &mut self,
+        op: fn(ValueId, ValueId) -> ProgramOp,
+        a: ValueId,
+        b: ValueId,
+    ) -> ValueId {
         self.push_op(op(a.min(b), a.max(b)))
     }
 

@@ -116,7 +116,11 @@ fn common_pairs(graph: &Graph, roots: &[ExprId]) -> BTreeSet<OperandPair> {
         .collect()
 }
 
-fn replace_pairs(graph: &mut Graph, roots: &[ExprId], pairs: &BTreeSet<OperandPair>) -> Vec<ExprId> {
+fn replace_pairs(
+    graph: &mut Graph,
+    roots: &[ExprId],
+    pairs: &BTreeSet<OperandPair>,
+) -> Vec<ExprId> {
     // No operand stands in two pairs of a kind, so that the first one tells which pair it is.
     let (mut terms_with, mut factors_with) = (FxHashMap::default(), FxHashMap::default());
     for pair in pairs {

@@ -6,8 +6,8 @@ use modelmill_algebra::field::{FieldElement, RandomStream};
 use proc_macro2::{Delimiter, TokenStream, TokenTree};
 use quote::ToTokens as _;
 
-use super::{ProgramOp, PASSES, ProgramStage, cost};
-use crate::expr::{Atom, ExprId, FieldPoint, Graph, EvaluationTape};
+use super::{PASSES, ProgramOp, ProgramStage, cost};
+use crate::expr::{Atom, EvaluationTape, ExprId, FieldPoint, Graph};
 use crate::{Derivation, derive};
 
 fn derivation(model: &str) -> Derivation {

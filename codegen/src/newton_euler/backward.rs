@@ -1,11 +1,11 @@
 //! The backward recursion: wrenches go down to the base, and leave their moment or force at each joint.
 
 use super::project::project_on_joints;
-use super::rows::{ForceRows, moment_before_axis_offset, add_wrench};
+use super::rows::{ForceRows, add_wrench, moment_before_axis_offset};
 use super::{JointSide, RecursionStyle, SymbolicWrench, rotate_into_outer};
 use crate::expr::vector::SymbolicVector;
 use crate::expr::{ExprId, Graph, Rational};
-use crate::tree::{TreeLink, KinematicTree};
+use crate::tree::{KinematicTree, TreeLink};
 
 /// A wrench on a link, taken to its parent.
 pub(super) fn to_parent(
@@ -56,7 +56,11 @@ pub(crate) fn backward_recursion(
             rows.add_joint_force(link, wrench.moment[2], wrench.force[2]);
             if let Some(parent) = link.parent {
                 let wrench = to_parent(graph, style, link, side, &wrench);
-                add_wrench(graph, &mut total[JointSide::Moving as usize][parent], wrench);
+                add_wrench(
+                    graph,
+                    &mut total[JointSide::Moving as usize][parent],
+                    wrench,
+                );
             }
         }
     }
@@ -109,7 +113,9 @@ pub(crate) fn carry_wrench(
                 rows.add_joint_force(link, wrench.moment[2], wrench.force[2]);
                 (i, to_parent(graph, style, link, side, &wrench))
             };
-            at = tree.links[first].parent.map(|p| (p, JointSide::Moving, wrench));
+            at = tree.links[first]
+                .parent
+                .map(|p| (p, JointSide::Moving, wrench));
         }
     }
     rows.sum_rows(graph)

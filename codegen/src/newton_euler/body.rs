@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::motion::LinkMotion;
-use super::{InertiaElement, InertiaFactors, TreeMotion, JointSide, SymbolicWrench};
+use super::{InertiaElement, InertiaFactors, JointSide, SymbolicWrench, TreeMotion};
 use crate::expr::vector::{self, AxisRotation, SymbolicVector};
 use crate::expr::{ExprId, Graph, Rational};
 use crate::tree::KinematicTree;
@@ -172,7 +172,12 @@ pub(crate) fn wrenches(
 
 impl TreeMotion {
     /// The wrench that moves a body along with `link`.
-    pub(crate) fn wrench(&self, graph: &mut Graph, link: usize, body: &BodyInertia) -> SymbolicWrench {
+    pub(crate) fn wrench(
+        &self,
+        graph: &mut Graph,
+        link: usize,
+        body: &BodyInertia,
+    ) -> SymbolicWrench {
         wrench(graph, &self.links[link], body)
     }
 }

@@ -5,10 +5,13 @@
 
 use modelmill_spec::{CoordinateIdx, FreeBody, TwistAxes};
 
-use super::{BodyInertia, CarryDepths, JointSide, InertiaDiagonal, RecursionStyle, SymbolicWrench, carry_wrench};
+use super::{
+    BodyInertia, CarryDepths, InertiaDiagonal, JointSide, RecursionStyle, SymbolicWrench,
+    carry_wrench,
+};
 use crate::expr::vector::{self, AxisRotation, SymbolicVector};
 use crate::expr::{ExprId, Graph, Rational};
-use crate::tree::{TreeLink, KinematicTree, free};
+use crate::tree::{KinematicTree, TreeLink, free};
 
 /// Mass, first moment and second moments of mass (xx, yy, zz; yz, xz, xy) about the origin of a frame.
 #[derive(Clone, Copy)]
@@ -283,7 +286,11 @@ fn free_body_forces(
 }
 
 /// Entries of the mass matrix by a free body's own motion: those on and above the diagonal.
-fn free_body_block(graph: &mut Graph, body: &FreeBody, carried: &CompositeInertia) -> Vec<(usize, usize, ExprId)> {
+fn free_body_block(
+    graph: &mut Graph,
+    body: &FreeBody,
+    carried: &CompositeInertia,
+) -> Vec<(usize, usize, ExprId)> {
     let twist = twist_coordinates(body);
     let mut entries = Vec::new();
     for (k, d) in twist.into_iter().enumerate() {

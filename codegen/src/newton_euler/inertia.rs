@@ -2,7 +2,9 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use modelmill_spec::{EffectTerm, ExactExpression, PartInertia, LumpedMass, Mechanism, EffectPlace, FramePoint};
+use modelmill_spec::{
+    EffectPlace, EffectTerm, ExactExpression, FramePoint, LumpedMass, Mechanism, PartInertia,
+};
 
 use crate::DeriveError;
 use crate::expr::{ExprId, Graph, Rational};
@@ -42,7 +44,9 @@ impl InertiaByProduct {
                 continue;
             }
             for place in &effect.places {
-                let EffectPlace::Point(point) = place else { continue };
+                let EffectPlace::Point(point) = place else {
+                    continue;
+                };
                 let point = &mechanism.points[point.0];
                 for term in &effect.terms {
                     let lump = added_point_mass(point, term);
@@ -60,7 +64,10 @@ impl InertiaByProduct {
     }
 
     /// The inertia of each link that belongs to one product.
-    pub(crate) fn link_inertias(&self, product: &ParameterMonomial) -> impl Iterator<Item = (usize, &InertiaFactors)> {
+    pub(crate) fn link_inertias(
+        &self,
+        product: &ParameterMonomial,
+    ) -> impl Iterator<Item = (usize, &InertiaFactors)> {
         self.0
             .get(product)
             .into_iter()

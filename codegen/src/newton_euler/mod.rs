@@ -16,7 +16,7 @@ mod rows;
 
 use crate::expr::vector::{self, AxisRotation, SymbolicVector};
 use crate::expr::{ExprId, Graph};
-use crate::tree::{TreeLink, KinematicTree};
+use crate::tree::{KinematicTree, TreeLink};
 
 pub(crate) use backward::{CarryDepths, backward_recursion, carry_wrench};
 pub(crate) use body::{BodyInertia, InertiaDiagonal, flatten_along_axes, wrenches};
@@ -121,12 +121,20 @@ impl RecursionStyle {
 }
 
 /// Components behind several turns of a vector given before them.
-pub(crate) fn rotate_into_inner(graph: &mut Graph, turns: &[AxisRotation], v: &SymbolicVector) -> SymbolicVector {
+pub(crate) fn rotate_into_inner(
+    graph: &mut Graph,
+    turns: &[AxisRotation],
+    v: &SymbolicVector,
+) -> SymbolicVector {
     turns.iter().fold(*v, |v, turn| graph.rotate_in(turn, &v))
 }
 
 /// Components before several turns of a vector given behind them.
-fn rotate_into_outer(graph: &mut Graph, turns: &[AxisRotation], v: &SymbolicVector) -> SymbolicVector {
+fn rotate_into_outer(
+    graph: &mut Graph,
+    turns: &[AxisRotation],
+    v: &SymbolicVector,
+) -> SymbolicVector {
     turns
         .iter()
         .rev()

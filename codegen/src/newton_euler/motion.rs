@@ -4,7 +4,7 @@ use super::{JointSide, RecursionStyle, rotate_into_inner};
 use crate::expr::vector::{self, SymbolicVector};
 use crate::expr::{Atom, ExprId, Graph, Rational};
 use crate::tree::free::FreeMotion;
-use crate::tree::{TreeLink, KinematicTree};
+use crate::tree::{KinematicTree, TreeLink};
 
 /// Motion of every link in its own frame.
 pub(crate) struct TreeMotion {
@@ -31,7 +31,11 @@ pub(super) struct LinkMotion {
 
 impl LinkMotion {
     /// From angular velocity and acceleration, entry by entry.
-    fn from_angular_motion(graph: &mut Graph, omega: SymbolicVector, alpha: SymbolicVector) -> Self {
+    fn from_angular_motion(
+        graph: &mut Graph,
+        omega: SymbolicVector,
+        alpha: SymbolicVector,
+    ) -> Self {
         let square = omega.map(|w| graph.mul(w, w));
         let mut field = [vector::ZERO; 3];
         let mut differences = vector::ZERO;
@@ -119,7 +123,12 @@ fn rotating_coordinates(style: RecursionStyle, link: &TreeLink) -> Vec<(usize, R
 }
 
 /// The motion of every link.
-pub(crate) fn forward_recursion(graph: &mut Graph, tree: &KinematicTree, gravity: &SymbolicVector, style: RecursionStyle) -> TreeMotion {
+pub(crate) fn forward_recursion(
+    graph: &mut Graph,
+    tree: &KinematicTree,
+    gravity: &SymbolicVector,
+    style: RecursionStyle,
+) -> TreeMotion {
     let mut base = LinkMotion::from_angular_motion(graph, vector::ZERO, vector::ZERO);
     base.acceleration = gravity.map(|g| graph.neg(g));
     let mut motion = TreeMotion {
@@ -197,13 +206,19 @@ impl TreeMotion {
         let acceleration = &mut moved.acceleration;
         acceleration[0] = graph.add(acceleration[0], coriolis[0]);
         acceleration[1] = graph.sub(acceleration[1], coriolis[1]);
-        let slide_acceleration = weighted_sum(graph, Atom::Acceleration, link.slides.iter().cloned());
+        let slide_acceleration =
+            weighted_sum(graph, Atom::Acceleration, link.slides.iter().cloned());
         acceleration[2] = graph.add(acceleration[2], slide_acceleration);
         moved
     }
 
     /// Acceleration of the point that a link's position leads to across its axis, on the fixed side of its joint.
-    fn acceleration_before(&self, graph: &mut Graph, tree: &KinematicTree, i: usize) -> SymbolicVector {
+    fn acceleration_before(
+        &self,
+        graph: &mut Graph,
+        tree: &KinematicTree,
+        i: usize,
+    ) -> SymbolicVector {
         let link = &tree.links[i];
         let parent = self.motion_of_link(link.parent);
         let (across, _) = self.style.split_position(link);
@@ -216,7 +231,13 @@ impl TreeMotion {
     }
 
     /// The same along the axis on to the origin, with the column of the field that belongs to the axis.
-    fn acceleration_along_axis(&self, graph: &mut Graph, link: &TreeLink, there: &SymbolicVector, column: &SymbolicVector) -> SymbolicVector {
+    fn acceleration_along_axis(
+        &self,
+        graph: &mut Graph,
+        link: &TreeLink,
+        there: &SymbolicVector,
+        column: &SymbolicVector,
+    ) -> SymbolicVector {
         let (_, along) = self.style.split_position(link);
         let moved = graph.scale_vector(along, column);
         graph.add_vectors(&[*there, moved])

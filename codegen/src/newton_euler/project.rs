@@ -118,7 +118,13 @@ fn axis_points(graph: &mut Graph, tree: &KinematicTree, path: &[usize]) -> Vec<A
 }
 
 /// Direction of a joint's axis in the frame of a link below it.
-fn axis_direction(graph: &mut Graph, tree: &KinematicTree, style: RecursionStyle, joint: usize, at: usize) -> SymbolicVector {
+fn axis_direction(
+    graph: &mut Graph,
+    tree: &KinematicTree,
+    style: RecursionStyle,
+    joint: usize,
+    at: usize,
+) -> SymbolicVector {
     let z = [Graph::ZERO, Graph::ZERO, Graph::ONE];
     if joint == at {
         return z;

@@ -26,7 +26,12 @@ impl ForceRows {
     }
 
     /// Leaves the wrench on a free body, in its axes and about its origin.
-    pub(super) fn add_free_body_wrench(&mut self, graph: &mut Graph, body: &FreeBody, wrench: &SymbolicWrench) {
+    pub(super) fn add_free_body_wrench(
+        &mut self,
+        graph: &mut Graph,
+        body: &FreeBody,
+        wrench: &SymbolicWrench,
+    ) {
         let force = free::from_body(graph, body, body.linear, &wrench.force);
         let moment = free::from_body(graph, body, body.angular, &wrench.moment);
         let [_, qx, qy, qz] = body.quaternion;
@@ -41,7 +46,11 @@ impl ForceRows {
     }
 }
 
-pub(super) fn add_wrench(graph: &mut Graph, total: &mut Option<SymbolicWrench>, wrench: SymbolicWrench) {
+pub(super) fn add_wrench(
+    graph: &mut Graph,
+    total: &mut Option<SymbolicWrench>,
+    wrench: SymbolicWrench,
+) {
     *total = Some(match *total {
         None => wrench,
         Some(there) => SymbolicWrench {

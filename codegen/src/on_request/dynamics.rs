@@ -224,7 +224,8 @@ fn mass_matrix(
     let inertia = equations.inertia.total_inertias(graph, value);
     let is_symmetric = inertia.values().all(|inertia| {
         (0..3).all(|i| {
-            inertia[InertiaElement::ForceMoment(i).index()] == inertia[InertiaElement::MomentMoment(i).index()]
+            inertia[InertiaElement::ForceMoment(i).index()]
+                == inertia[InertiaElement::MomentMoment(i).index()]
         })
     });
     let mut matrix = vec![vec![Graph::ZERO; n_active]; n_active];
@@ -268,7 +269,8 @@ fn mass_matrix(
     if !is_symmetric {
         let form = TotalForm::PLAIN;
         let tree = &equations.tree;
-        let frames = RecursionFrames::new(graph, tree, &crate::expr::vector::ZERO, form.style, false);
+        let frames =
+            RecursionFrames::new(graph, tree, &crate::expr::vector::ZERO, form.style, false);
         let wrenches = form.wrenches(graph, &equations.inertia, &equations.tree, &frames, value);
         let on_tree = newton_euler::backward_recursion(graph, tree, form.style, n, wrenches);
         let bodies = equations.project_on_active(graph, &on_tree, &[]);

@@ -198,7 +198,8 @@ pub(crate) fn best_total(
             let key = (form.style, form.fixed_axes);
             let frames = written.frames_for(graph, equations, &gravity, key);
             let wrenches = form.wrenches(graph, &equations.inertia, &equations.tree, frames, value);
-            let on_tree = newton_euler::backward_recursion(graph, &frames.tree, form.style, n, wrenches);
+            let on_tree =
+                newton_euler::backward_recursion(graph, &frames.tree, form.style, n, wrenches);
             Ok(finish(graph, &on_tree))
         },
     )

@@ -6,14 +6,17 @@ use std::collections::BTreeMap;
 use modelmill_spec::Mechanism;
 
 use crate::DeriveError;
-use crate::expr::{AtomAngleSum, Atom, ExprId, Graph, Node, nominal_value};
+use crate::expr::{Atom, AtomAngleSum, ExprId, Graph, Node, nominal_value};
 use crate::loops::branches::closed_form_plan;
 use crate::loops::magnitude::{self, LoopSize};
 use crate::loops::solve_step::LoopPlan;
 use crate::loops::solved::{multiply_angle, rotate_vector};
 use crate::lower::SINGULAR;
 use crate::lower::cost::cost;
-use crate::lower::{AtomRule, AtomDefinition, PASSES, LoweringPass, StraightLineProgram, LoweringRequest, lower_with_passes};
+use crate::lower::{
+    AtomDefinition, AtomRule, LoweringPass, LoweringRequest, PASSES, StraightLineProgram,
+    lower_with_passes,
+};
 use crate::regressor::UnreducedEquations;
 use crate::tree::checks;
 
@@ -78,11 +81,14 @@ impl PassiveClosure {
             let limit = SINGULAR * magnitude::nominal_magnitude(graph, mechanism, &[*id]);
             let is_small = |value: f64| value.abs() <= limit;
             if nominal_value(graph, mechanism, *id).is_some_and(is_small)
-                && magnitude::significant_digits(graph, mechanism, *id).is_none_or(|left| left <= SINGULAR)
+                && magnitude::significant_digits(graph, mechanism, *id)
+                    .is_none_or(|left| left <= SINGULAR)
             {
                 return Err(DeriveError::SingularNominal);
             }
-            let size = closing.size.determinant_magnitude(graph, mechanism, *id, SINGULAR);
+            let size = closing
+                .size
+                .determinant_magnitude(graph, mechanism, *id, SINGULAR);
             closing.regular.push((*id, size));
         }
         let Some(plan) = closing.plan.clone() else {
@@ -159,7 +165,9 @@ impl PassiveClosure {
     pub(crate) fn add_guards(&mut self, graph: &mut Graph, mechanism: &Mechanism, more: &[ExprId]) {
         for id in more {
             if self.regular.iter().all(|(known, _)| known != id) {
-                let size = self.size.determinant_magnitude(graph, mechanism, *id, SINGULAR);
+                let size = self
+                    .size
+                    .determinant_magnitude(graph, mechanism, *id, SINGULAR);
                 self.regular.push((*id, size));
             }
         }
@@ -190,7 +198,8 @@ impl PassiveClosure {
                     continue;
                 };
                 // q = sign * (solved - rest)
-                let rest = self.resolve_sum(&angle.plus(&AtomAngleSum::new([(*atom, *sign)]), -1), 0);
+                let rest =
+                    self.resolve_sum(&angle.plus(&AtomAngleSum::new([(*atom, *sign)]), -1), 0);
                 let mut parts = ResolvedAngle {
                     known: AtomAngleSum::NONE.plus(&rest.known, -sign),
                     pi12: -sign * rest.pi12,
@@ -276,7 +285,8 @@ impl PassiveClosure {
     fn definitions(&self, graph: &Graph, roots: &[ExprId]) -> Vec<AtomDefinition> {
         let mut used = graph.atoms(roots);
         used.extend(graph.atoms(&self.reachable));
-        let (mut found, mut left): (Vec<AtomDefinition>, _) = (Vec::new(), self.definitions.clone());
+        let (mut found, mut left): (Vec<AtomDefinition>, _) =
+            (Vec::new(), self.definitions.clone());
         loop {
             let (next, rest): (Vec<AtomDefinition>, Vec<AtomDefinition>) =
                 left.into_iter().partition(|d| used.contains(&d.atom));

@@ -14,7 +14,7 @@ use modelmill_spec::Mechanism;
 use crate::DeriveError;
 use crate::expr::{Atom, ExprId, Graph};
 use crate::loops::magnitude::LoopSize;
-use crate::lower::{StraightLineProgram, LoweringRequest, lower};
+use crate::lower::{LoweringRequest, StraightLineProgram, lower};
 use crate::programs::closing::PassiveClosure;
 use crate::reduce::{BaseReduction, base};
 use crate::regressor::UnreducedEquations;
@@ -119,15 +119,18 @@ pub(crate) fn programs(
     let base_expressions = base::base_expressions(graph, reduction);
     let base_parameters = plain_program(graph, &base_expressions);
     let nothing = BTreeMap::new();
-    let weigh =
-        |graph: &mut Graph, outputs: &[ExprId]| closing.program_cost(graph, equations, outputs, &nothing);
-    let regressor = cheapest::cheapest_columns(graph, mechanism, equations, &retained, passes, &weigh)?;
+    let weigh = |graph: &mut Graph, outputs: &[ExprId]| {
+        closing.program_cost(graph, equations, outputs, &nothing)
+    };
+    let regressor =
+        cheapest::cheapest_columns(graph, mechanism, equations, &retained, passes, &weigh)?;
     let regressor = row_by_row(&regressor);
     let inverse_dynamics =
         cheapest::cheapest_total(graph, mechanism, equations, &base_value, passes, &weigh)?;
     let slides = mechanism.coordinates.iter().any(|c| c.motion.is_length());
     let scale = (slides && !projection.loops.residual.is_empty()).then(|| {
-        let scale = LoopSize::from_residual(graph, mechanism, &projection.loops.residual).relative_scale(graph);
+        let scale = LoopSize::from_residual(graph, mechanism, &projection.loops.residual)
+            .relative_scale(graph);
         plain_program(graph, &[scale])
     });
     let n_motion = drives.len();
@@ -156,7 +159,10 @@ pub(crate) fn programs(
 }
 
 /// The base parameters by the products that they stand for; all other products are zero.
-pub(crate) fn base_parameter_atoms(graph: &mut Graph, reduction: &BaseReduction) -> BTreeMap<ParameterMonomial, ExprId> {
+pub(crate) fn base_parameter_atoms(
+    graph: &mut Graph,
+    reduction: &BaseReduction,
+) -> BTreeMap<ParameterMonomial, ExprId> {
     let retained = reduction.retained.iter().enumerate();
     retained
         .map(|(k, product)| {

@@ -12,7 +12,11 @@ use crate::loops::magnitude::expression_magnitude;
 ///
 /// A residual's scale is the sum of the magnitudes of its terms, a sine counting as 1. A coordinate's is 1 for an angle,
 /// the sum of its residuals' scales for a length, and 0 if no loop depends on it.
-pub(crate) fn residual_scales(graph: &mut Graph, mechanism: &Mechanism, loops: &KinematicLoops) -> Vec<ExprId> {
+pub(crate) fn residual_scales(
+    graph: &mut Graph,
+    mechanism: &Mechanism,
+    loops: &KinematicLoops,
+) -> Vec<ExprId> {
     let mut known = HashMap::new();
     let residuals: Vec<ExprId> = loops
         .residual

@@ -4,9 +4,9 @@ use std::collections::BTreeSet;
 
 use modelmill_spec::Mechanism;
 
-use super::rational_function::{TrigonometricPolynomial, RationalFunction, FactorVariable};
+use super::rational_function::{FactorVariable, RationalFunction, TrigonometricPolynomial};
 use super::reduction::BaseReduction;
-use crate::expr::print::{PrintedFormula, FormulaFunction};
+use crate::expr::print::{FormulaFunction, PrintedFormula};
 use crate::expr::{Atom, ExprId, Graph, Rational};
 use crate::tree::expressions::ParameterMonomial;
 
@@ -16,7 +16,11 @@ pub(crate) fn base_parameter_name(k: usize) -> String {
 }
 
 /// Base parameter `k` written out term by term: what a script reads. It refers to [`sums`].
-pub(crate) fn expanded_formula(mechanism: &Mechanism, reduction: &BaseReduction, k: usize) -> PrintedFormula {
+pub(crate) fn expanded_formula(
+    mechanism: &Mechanism,
+    reduction: &BaseReduction,
+    k: usize,
+) -> PrintedFormula {
     let mut terms = vec![product_formula(
         mechanism,
         &reduction.products[reduction.retained[k]],
@@ -32,7 +36,10 @@ pub(crate) fn expanded_formula(mechanism: &Mechanism, reduction: &BaseReduction,
 
 /// What dependent products stand for that others go by: the product itself and theirs, as Gautier and Khalil (1990) group
 /// link by link. Each with its name, after those that it needs.
-pub(crate) fn dependent_sums(mechanism: &Mechanism, reduction: &BaseReduction) -> Vec<(String, PrintedFormula)> {
+pub(crate) fn dependent_sums(
+    mechanism: &Mechanism,
+    reduction: &BaseReduction,
+) -> Vec<(String, PrintedFormula)> {
     let outer_first = reduction.lines_in_dependency_order().into_iter().rev();
     let sum = |line: usize| {
         let name = sum_name(mechanism, reduction, line)?;
@@ -67,7 +74,11 @@ fn sum_name(mechanism: &Mechanism, reduction: &BaseReduction, line: usize) -> Op
 }
 
 /// What a dependent product brings into others: its sum, or the product itself.
-pub(crate) fn lumped_formulas(mechanism: &Mechanism, reduction: &BaseReduction, line: usize) -> Vec<PrintedFormula> {
+pub(crate) fn lumped_formulas(
+    mechanism: &Mechanism,
+    reduction: &BaseReduction,
+    line: usize,
+) -> Vec<PrintedFormula> {
     match sum_name(mechanism, reduction, line) {
         Some(name) => vec![PrintedFormula::name(name)],
         None => parameter_factors(
@@ -87,7 +98,10 @@ pub(crate) struct BaseDenominator {
 }
 
 /// Every denominator of eq. (16), powers of a constant by the constant itself.
-pub(crate) fn denominators(mechanism: &Mechanism, reduction: &BaseReduction) -> Vec<BaseDenominator> {
+pub(crate) fn denominators(
+    mechanism: &Mechanism,
+    reduction: &BaseReduction,
+) -> Vec<BaseDenominator> {
     let mut found: BTreeSet<TrigonometricPolynomial> = BTreeSet::new();
     let lines = reduction.dependencies.iter();
     for (_, factor) in lines.flat_map(|line| line.equals.iter().chain(&line.via)) {
@@ -97,7 +111,9 @@ pub(crate) fn denominators(mechanism: &Mechanism, reduction: &BaseReduction) -> 
         }
         let variables = factor.denominator.keys().flatten().map(|(v, _)| *v);
         let variables = variables.filter(|v| !matches!(v, FactorVariable::Root(_)));
-        found.extend(variables.map(|v| TrigonometricPolynomial::from([(vec![(v, 1)], Rational::ONE)])));
+        found.extend(
+            variables.map(|v| TrigonometricPolynomial::from([(vec![(v, 1)], Rational::ONE)])),
+        );
     }
     let one = || TrigonometricPolynomial::from([(Vec::new(), Rational::ONE)]);
     let denominator = |p: TrigonometricPolynomial| BaseDenominator {
@@ -136,7 +152,10 @@ fn parameter_factors(mechanism: &Mechanism, product: &ParameterMonomial) -> Vec<
 }
 
 /// A product of parameters as a formula.
-pub(crate) fn product_formula(mechanism: &Mechanism, product: &ParameterMonomial) -> PrintedFormula {
+pub(crate) fn product_formula(
+    mechanism: &Mechanism,
+    product: &ParameterMonomial,
+) -> PrintedFormula {
     PrintedFormula::product(Rational::ONE, parameter_factors(mechanism, product))
 }
 

@@ -67,7 +67,8 @@ pub(super) fn exchange_columns(
     let moved = perturb_constants(mechanism);
     let n_rows = columns.values.len() + columns.values.len() / 2;
     let mut sampled = |mechanism: &Mechanism| {
-        let w = sample_observations(graph, mechanism, projection, columns.values, n_rows, REACH).ok()?;
+        let w = sample_observations(graph, mechanism, projection, columns.values, n_rows, REACH)
+            .ok()?;
         DependenceFactors::new(&w, columns.units, retained, dependent)
     };
     let mut factors = sampled(&moved).or_else(|| sampled(mechanism))?;
@@ -93,7 +94,8 @@ pub(super) fn is_moderate(
     shown: &[usize],
 ) -> bool {
     let n_rows = columns.values.len() + columns.values.len() / 2;
-    let Ok(w) = sample_observations(graph, mechanism, projection, columns.values, n_rows, REACH) else {
+    let Ok(w) = sample_observations(graph, mechanism, projection, columns.values, n_rows, REACH)
+    else {
         return false;
     };
     let shares = relative_column_sizes(&w, columns.units);

@@ -3,7 +3,7 @@
 use modelmill_algebra::field::{FieldElement, MODULUS, PRIMES, RandomStream};
 use modelmill_spec::Mechanism;
 
-use super::reduction::{ColumnDependency, ReductionMethod, BaseReduction};
+use super::reduction::{BaseReduction, ColumnDependency, ReductionMethod};
 use super::relations::{self, ColumnRelation, DependentColumn};
 use super::sample::SampledRegressor;
 use crate::DeriveError;
@@ -49,7 +49,11 @@ impl DependenceStructure {
         let wanted = dependent
             .iter()
             .flat_map(|j| pivots.iter().map(move |p| (*j, *p)))
-            .filter(|(j, p)| echelon.entry(*p, *j).is_some_and(|x| x != FieldElement::ZERO))
+            .filter(|(j, p)| {
+                echelon
+                    .entry(*p, *j)
+                    .is_some_and(|x| x != FieldElement::ZERO)
+            })
             .collect();
         let order: Vec<usize> = (order.iter().copied())
             .filter(|k| shown.contains(k))
@@ -132,8 +136,11 @@ impl BaseReduction {
         const FRESH: u64 = PRIMES[PRIMES.len() - 1];
         for _ in 0..CONFIRMED_WITH {
             let constants = regressor.sampler.constants::<FRESH>(stream)?;
-            let parameters: Vec<FieldElement<FRESH>> =
-                self.products.iter().map(|_| stream.next_element()).collect();
+            let parameters: Vec<FieldElement<FRESH>> = self
+                .products
+                .iter()
+                .map(|_| stream.next_element())
+                .collect();
             let mut base: Vec<FieldElement<FRESH>> =
                 self.retained.iter().map(|k| parameters[*k]).collect();
             let factors = self

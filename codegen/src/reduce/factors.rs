@@ -4,9 +4,9 @@
 use modelmill_algebra::field::{FieldElement, RandomStream};
 
 use super::dependences::DependenceStructure;
-use super::oracle::{OperationBudget, ConstantOccurrence, PrimeFieldOracle};
+use super::oracle::{ConstantOccurrence, OperationBudget, PrimeFieldOracle};
 use super::reconstruct::{self, DependenceSurvey};
-use super::relations::{self, ColumnRelation, SolvedRelations, DependentColumn};
+use super::relations::{self, ColumnRelation, DependentColumn, SolvedRelations};
 use super::sample::SampledRegressor;
 use crate::DeriveError;
 use crate::expr::FieldPoint;
@@ -62,7 +62,10 @@ pub(super) fn n_quotients(
     variables: &[ConstantOccurrence],
     stream: &mut RandomStream,
 ) -> Result<usize, DeriveError> {
-    let direct = dependences.relations.iter().filter(|r| r.has_retained_only());
+    let direct = dependences
+        .relations
+        .iter()
+        .filter(|r| r.has_retained_only());
     let direct: Vec<ColumnRelation> = direct.cloned().collect();
     let mut oracle = MotionFactorOracle {
         regressor,
@@ -101,7 +104,8 @@ fn factors_by_relations(
         Ok::<_, DeriveError>(SolvedRelations::new(chosen.iter(), factors))
     };
     // Near relations come right behind those to retained columns.
-    let nearest = (0..all.len()).filter(|i| all.get(i + 1).is_none_or(ColumnRelation::has_retained_only));
+    let nearest =
+        (0..all.len()).filter(|i| all.get(i + 1).is_none_or(ColumnRelation::has_retained_only));
     let mut related = found(nearest.map(|i| all[i].clone()).collect(), stream)?;
     // What is near need not be simple: where the first joints of an arm do not feel all of a link, relations between links
     // divide by sines of twists, and those to retained columns do not.
@@ -262,7 +266,10 @@ mod tests {
     }
 
     /// Factors by near relations where they pay, and by relations to retained columns alone.
-    fn both(mechanism: &Mechanism, operations: u64) -> Result<[Vec<DependentColumn>; 2], DeriveError> {
+    fn both(
+        mechanism: &Mechanism,
+        operations: u64,
+    ) -> Result<[Vec<DependentColumn>; 2], DeriveError> {
         let mut graph = Graph::new();
         let equations = crate::regressor::unreduced_equations(&mut graph, mechanism)?;
         let columns: Vec<&Vec<ExprId>> = (equations.columns.iter())
@@ -272,10 +279,12 @@ mod tests {
         let outputs: Vec<ExprId> = (0..projection.drives.len())
             .flat_map(|d| columns.iter().map(move |column| column[d]))
             .collect();
-        let regressor = sample_regressor(&mut graph, mechanism, projection, &outputs, columns.len())?;
+        let regressor =
+            sample_regressor(&mut graph, mechanism, projection, &outputs, columns.len())?;
         let mut stream = RandomStream::new(SEED);
         let order: Vec<usize> = (0..columns.len()).collect();
-        let mut dependences = DependenceStructure::find_dependences(&regressor, &order, &mut stream)?;
+        let mut dependences =
+            DependenceStructure::find_dependences(&regressor, &order, &mut stream)?;
         let variables = constant_occurrences(&graph, &outputs, &projection.loops.residual);
         let roots = root_radicands(&graph, &outputs, &projection.loops.residual);
         let mut factors = |dependences: &DependenceStructure| {
@@ -293,7 +302,9 @@ mod tests {
             dependences.relations.iter().any(|r| !r.has_retained_only()),
             "nothing is near"
         );
-        dependences.relations.retain(ColumnRelation::has_retained_only);
+        dependences
+            .relations
+            .retain(ColumnRelation::has_retained_only);
         Ok([near, factors(&dependences)?])
     }
 

@@ -7,7 +7,9 @@ use modelmill_algebra::field::{FieldElement, MODULUS, PRIMES, RandomStream};
 use modelmill_algebra::lift::reconstruct_rational;
 
 use super::oracle::{ConstantOccurrence, PrimeFieldOracle};
-use super::rational_function::{TrigonometricPolynomial, PowerProduct, RationalFunction, FactorVariable, monomial_value};
+use super::rational_function::{
+    FactorVariable, PowerProduct, RationalFunction, TrigonometricPolynomial, monomial_value,
+};
 use super::support::nonzero_monomials;
 use crate::DeriveError;
 use crate::expr::{FieldPoint, Rational};
@@ -85,7 +87,10 @@ impl<O: PrimeFieldOracle, const P: u64> AnsatzSolver<O> for FieldSamples<P> {
             solutions
                 .into_iter()
                 .filter_map(|x| {
-                    let last = x[n_top..].iter().rev().find(|x| **x != FieldElement::ZERO)?;
+                    let last = x[n_top..]
+                        .iter()
+                        .rev()
+                        .find(|x| **x != FieldElement::ZERO)?;
                     let scale = last.inverse()?;
                     Some(x.iter().map(|x| (*x * scale).representative()).collect())
                 })
@@ -134,7 +139,8 @@ impl<O: PrimeFieldOracle> PrimeFields<O> {
             for (all, residue) in residues.iter_mut().zip(solution) {
                 all.push((modulus, residue));
             }
-            let lifted: Option<Vec<Rational>> = residues.iter().map(|r| reconstruct_rational(r)).collect();
+            let lifted: Option<Vec<Rational>> =
+                residues.iter().map(|r| reconstruct_rational(r)).collect();
             if lifted.is_some() {
                 return Ok(lifted);
             }
@@ -226,14 +232,15 @@ impl FunctionShape {
             };
             if let Some(coefficients) = fields.solve_ansatz(&ansatz, oracle, stream)? {
                 let (top, bottom) = coefficients.split_at(ansatz.numerator.len());
-                let polynomial = |monomials: &[PowerProduct], values: &[Rational]| -> TrigonometricPolynomial {
-                    monomials
-                        .iter()
-                        .zip(values)
-                        .filter(|(_, k)| !k.is_zero())
-                        .map(|(powers, k)| (powers.clone(), k.clone()))
-                        .collect()
-                };
+                let polynomial =
+                    |monomials: &[PowerProduct], values: &[Rational]| -> TrigonometricPolynomial {
+                        monomials
+                            .iter()
+                            .zip(values)
+                            .filter(|(_, k)| !k.is_zero())
+                            .map(|(powers, k)| (powers.clone(), k.clone()))
+                            .collect()
+                    };
                 return Ok(Some(RationalFunction::new(
                     polynomial(&ansatz.numerator, top),
                     polynomial(&ansatz.denominator, bottom),
@@ -291,13 +298,15 @@ fn push_power(powers: &mut PowerProduct, variable: FactorVariable, exponent: usi
 
 /// 1 and every product of different roots.
 fn root_products(roots: &[i64]) -> Vec<PowerProduct> {
-    roots.iter().fold(vec![PowerProduct::new()], |products, root| {
-        let with = products.iter().map(|p| {
-            p.iter()
-                .copied()
-                .chain([(FactorVariable::Root(*root), 1)])
-                .collect::<PowerProduct>()
-        });
-        products.iter().cloned().chain(with).collect()
-    })
+    roots
+        .iter()
+        .fold(vec![PowerProduct::new()], |products, root| {
+            let with = products.iter().map(|p| {
+                p.iter()
+                    .copied()
+                    .chain([(FactorVariable::Root(*root), 1)])
+                    .collect::<PowerProduct>()
+            });
+            products.iter().cloned().chain(with).collect()
+        })
 }

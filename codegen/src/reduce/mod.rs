@@ -26,8 +26,10 @@ mod support;
 use modelmill_algebra::field::RandomStream;
 use modelmill_spec::Mechanism;
 
-pub use rational_function::{TrigonometricPolynomial, PowerProduct, RationalFunction, FactorVariable};
-pub use reduction::{ColumnDependency, ReductionMethod, BaseReduction};
+pub use rational_function::{
+    FactorVariable, PowerProduct, RationalFunction, TrigonometricPolynomial,
+};
+pub use reduction::{BaseReduction, ColumnDependency, ReductionMethod};
 
 use crate::DeriveError;
 use crate::expr::independent::SEED;
@@ -115,7 +117,8 @@ fn reduce_exactly(
     let mut order = &preference.declared;
     let mut dependences = DependenceStructure::find_dependences(&regressor, order, &mut stream)?;
     if preference.own_first != preference.declared {
-        let other = DependenceStructure::find_dependences(&regressor, &preference.own_first, &mut stream)?;
+        let other =
+            DependenceStructure::find_dependences(&regressor, &preference.own_first, &mut stream)?;
         let mut n_quotients = |dependences: &DependenceStructure| {
             factors::n_quotients(dependences, &regressor, &variables, &mut stream)
         };
@@ -167,13 +170,20 @@ fn reduce_exactly(
         }
         let (first, rest): (Vec<usize>, Vec<usize>) =
             order.iter().partition(|k| exchange.retained.contains(k));
-        dependences = DependenceStructure::find_dependences(&regressor, &[first, rest].concat(), &mut stream)?;
+        dependences = DependenceStructure::find_dependences(
+            &regressor,
+            &[first, rest].concat(),
+            &mut stream,
+        )?;
     }
     reduced(&dependences, &mut stream)
 }
 
 /// The products that are wanted and have an effect, all retained.
-pub(crate) fn without_reduction(equations: &UnreducedEquations, wanted: &dyn Fn(&ParameterMonomial) -> bool) -> BaseReduction {
+pub(crate) fn without_reduction(
+    equations: &UnreducedEquations,
+    wanted: &dyn Fn(&ParameterMonomial) -> bool,
+) -> BaseReduction {
     let is_zero = |column: &Vec<ExprId>| column.iter().all(|x| *x == Graph::ZERO);
     let pick = |zero: bool| -> Vec<ParameterMonomial> {
         let pairs = equations.products.iter().zip(&equations.columns);

@@ -12,11 +12,11 @@ use nalgebra::DMatrix;
 
 use super::base;
 use super::recognise::{FileConstants, length_exponent};
-use super::reduction::{ColumnDependency, ReductionMethod, BaseReduction};
+use super::reduction::{BaseReduction, ColumnDependency, ReductionMethod};
 use super::states::WalkSampler;
 use crate::DeriveError;
 use crate::expr::independent::SEED;
-use crate::expr::{Atom, ExprId, FloatDomain, Graph, EvaluationTape};
+use crate::expr::{Atom, EvaluationTape, ExprId, FloatDomain, Graph};
 use crate::loops::numeric_poses::{NumericLoops, uniform_symmetric};
 use crate::regressor::projection::LoopProjection;
 use crate::tree::expressions::ParameterMonomial;
@@ -57,7 +57,8 @@ pub(super) fn reduce(
         let limit = DEPENDENT.max(PER_OFF * states.closure_error());
         // Masses and their moments are compared at the length of the largest loop.
         let sized = |k: usize| {
-            let metres = length_exponent(&base::product_unit(mechanism, &candidates[k])).unwrap_or(2);
+            let metres =
+                length_exponent(&base::product_unit(mechanism, &candidates[k])).unwrap_or(2);
             w.norms[k] / states.loop_size().powi(2 - metres)
         };
         let sizes: Vec<f64> = (0..columns.len()).map(sized).collect();
@@ -67,12 +68,18 @@ pub(super) fn reduce(
         let base = NumericBase::new(&w, &tried, limit);
         // What contributes less than is dropped is rounding.
         let rounding = (1e3 * base.most_dropped).clamp(1e-60, 1e-9);
-        let (mut found, effective) = numeric_reduction(mechanism, candidates, &w, &tried, &base, rounding);
+        let (mut found, effective) =
+            numeric_reduction(mechanism, candidates, &w, &tried, &base, rounding);
         let further = states.next_rows(n_rows)?;
-        let residual = ObservationColumns::new(&further, columns.len()).largest_residual(&found, &effective, &values);
+        let residual = ObservationColumns::new(&further, columns.len())
+            .largest_residual(&found, &effective, &values);
         // Terms that count as rounding are left out, each by itself.
         let left_out = rounding * base.kept.len() as f64;
-        if residual <= SHOWN.max(SHOWN_PER_OFF * states.closure_error()).max(left_out) {
+        if residual
+            <= SHOWN
+                .max(SHOWN_PER_OFF * states.closure_error())
+                .max(left_out)
+        {
             found.method = ReductionMethod::Numeric {
                 least_kept: base.least_kept,
                 most_dropped: base.most_dropped,
@@ -134,7 +141,8 @@ fn numeric_reduction(
         });
     }
     dependencies.sort_by_key(|line| line.product);
-    let products: Vec<ParameterMonomial> = effective.iter().map(|k| candidates[*k].clone()).collect();
+    let products: Vec<ParameterMonomial> =
+        effective.iter().map(|k| candidates[*k].clone()).collect();
     let found = BaseReduction {
         without_effect: candidates
             .iter()
@@ -167,7 +175,12 @@ impl ObservationColumns {
     }
 
     /// The most that dependences leave of a column, relative to their terms.
-    fn largest_residual(&self, found: &BaseReduction, effective: &[usize], constants: &[f64]) -> f64 {
+    fn largest_residual(
+        &self,
+        found: &BaseReduction,
+        effective: &[usize],
+        constants: &[f64],
+    ) -> f64 {
         let lines = found.dependencies.iter().zip(found.factors(constants));
         let shares = lines.map(|(line, factors)| {
             let product = effective[line.product];
@@ -413,7 +426,10 @@ mod tests {
             let mut graph = Graph::new();
             let found = unreduced_equations(&mut graph, &mechanism).expect("equations");
             let exact = crate::reduce::reduce(&mut graph, &mechanism, &found).expect("a base");
-            assert!(matches!(exact.method, ReductionMethod::Exact { .. }), "{name}");
+            assert!(
+                matches!(exact.method, ReductionMethod::Exact { .. }),
+                "{name}"
+            );
             let order: Vec<usize> = (0..found.columns.len())
                 .filter(|k| found.columns[*k].iter().any(|x| *x != Graph::ZERO))
                 .collect();

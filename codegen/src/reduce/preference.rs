@@ -36,9 +36,11 @@ pub(super) fn retention_preference(
         .retain
         .iter()
         .filter_map(|powers| {
-            let wanted = powers.iter().fold(ParameterMonomial::default(), |m, (p, n)| {
-                m.times(&ParameterMonomial(vec![(p.0, *n)]))
-            });
+            let wanted = powers
+                .iter()
+                .fold(ParameterMonomial::default(), |m, (p, n)| {
+                    m.times(&ParameterMonomial(vec![(p.0, *n)]))
+                });
             (0..effective.len()).find(|k| *product(*k) == wanted)
         })
         .collect();

@@ -7,7 +7,7 @@ use modelmill_algebra::field::FieldElement;
 use num_rational::BigRational;
 use num_traits::{ToPrimitive, Zero};
 
-use crate::expr::{AtomAngleSum, Atom, ExprId, FieldPoint, Graph, Rational};
+use crate::expr::{Atom, AtomAngleSum, ExprId, FieldPoint, Graph, Rational};
 
 /// What is left of a sum's terms, relative to their sizes, below which it is added up exactly.
 const CANCELLED: f64 = 1e-3;
@@ -27,14 +27,19 @@ pub enum FactorVariable {
 
 impl FactorVariable {
     /// Its value at a point of the field.
-    pub(crate) fn value<const P: u64>(self, point: &FieldPoint<FieldElement<P>>) -> Option<FieldElement<P>> {
+    pub(crate) fn value<const P: u64>(
+        self,
+        point: &FieldPoint<FieldElement<P>>,
+    ) -> Option<FieldElement<P>> {
         match self {
             Self::Constant(i) => point.values.get(&Atom::Constant(i)).copied(),
             Self::Cos(i) => point.angles.get(&Atom::Constant(i)).map(|cs| cs.0),
             Self::Sin(i) => point.angles.get(&Atom::Constant(i)).map(|cs| cs.1),
-            Self::Root(n) => {
-                crate::expr::EvaluationDomain::unary(point, crate::expr::Unary::Sqrt, &FieldElement::from_i64(n))
-            }
+            Self::Root(n) => crate::expr::EvaluationDomain::unary(
+                point,
+                crate::expr::Unary::Sqrt,
+                &FieldElement::from_i64(n),
+            ),
         }
     }
 
@@ -52,8 +57,16 @@ impl FactorVariable {
     pub fn expression(self, graph: &mut Graph) -> ExprId {
         match self {
             Self::Constant(i) => graph.atom(Atom::Constant(i)),
-            Self::Cos(i) => graph.cos_sin(&AtomAngleSum::new([(Atom::Constant(i), 1)]), 0).0,
-            Self::Sin(i) => graph.cos_sin(&AtomAngleSum::new([(Atom::Constant(i), 1)]), 0).1,
+            Self::Cos(i) => {
+                graph
+                    .cos_sin(&AtomAngleSum::new([(Atom::Constant(i), 1)]), 0)
+                    .0
+            }
+            Self::Sin(i) => {
+                graph
+                    .cos_sin(&AtomAngleSum::new([(Atom::Constant(i), 1)]), 0)
+                    .1
+            }
             Self::Root(n) => {
                 let radicand = graph.integer(n);
                 graph.unary(crate::expr::Unary::Sqrt, radicand)
@@ -93,7 +106,10 @@ impl RationalFunction {
     }
 
     /// Normalises a quotient; the denominator must not be zero.
-    pub(crate) fn new(mut numerator: TrigonometricPolynomial, mut denominator: TrigonometricPolynomial) -> Self {
+    pub(crate) fn new(
+        mut numerator: TrigonometricPolynomial,
+        mut denominator: TrigonometricPolynomial,
+    ) -> Self {
         assert!(!denominator.is_empty(), "a denominator is not zero");
         if numerator.is_empty() {
             return Self::constant(Rational::ZERO);
@@ -163,7 +179,10 @@ impl RationalFunction {
     }
 
     /// Its value at a point of the field; `None` where the denominator vanishes.
-    pub(crate) fn value<const P: u64>(&self, point: &FieldPoint<FieldElement<P>>) -> Option<FieldElement<P>> {
+    pub(crate) fn value<const P: u64>(
+        &self,
+        point: &FieldPoint<FieldElement<P>>,
+    ) -> Option<FieldElement<P>> {
         let denominator = polynomial_value(&self.denominator, point)?.inverse()?;
         Some(polynomial_value(&self.numerator, point)? * denominator)
     }
@@ -265,7 +284,10 @@ fn with_fewest_terms(mut p: TrigonometricPolynomial) -> TrigonometricPolynomial 
                 let found = powers.iter().find(|(w, _)| *w == v);
                 found.map_or(0, |(_, n)| *n)
             };
-            let (cosines, sines) = (power_of(FactorVariable::Cos(i)), power_of(FactorVariable::Sin(i)));
+            let (cosines, sines) = (
+                power_of(FactorVariable::Cos(i)),
+                power_of(FactorVariable::Sin(i)),
+            );
             // cos^2n = (1 - sin^2)^n, term by term with alternating binomial coefficients.
             let n = cosines / 2;
             let mut coefficient = k.clone();
@@ -291,9 +313,11 @@ pub(crate) fn monomial_value<const P: u64>(
     powers: &PowerProduct,
     point: &FieldPoint<FieldElement<P>>,
 ) -> Option<FieldElement<P>> {
-    powers.iter().try_fold(FieldElement::ONE, |product, (v, n)| {
-        Some(product * v.value(point)?.power(u64::from(*n)))
-    })
+    powers
+        .iter()
+        .try_fold(FieldElement::ONE, |product, (v, n)| {
+            Some(product * v.value(point)?.power(u64::from(*n)))
+        })
 }
 
 fn polynomial_value<const P: u64>(

@@ -7,7 +7,9 @@ use modelmill_spec::Mechanism;
 use num_traits::ToPrimitive;
 
 use super::base;
-use super::rational_function::{TrigonometricPolynomial, PowerProduct, RationalFunction, FactorVariable};
+use super::rational_function::{
+    FactorVariable, PowerProduct, RationalFunction, TrigonometricPolynomial,
+};
 use crate::expr::Rational;
 use crate::tree::expressions::ParameterMonomial;
 
@@ -55,17 +57,22 @@ impl<'a> FileConstants<'a> {
             metres: 0,
         };
         let mut powers = vec![one];
-        let lengths: Vec<(FactorVariable, BigFloat, i32)> = (mechanism.constants.iter().enumerate())
-            .filter(|(_, c)| !c.is_angle && c.value != 0.0)
-            .filter_map(|(i, c)| {
-                let metres = match c.unit.as_str() {
-                    "m" => 1,
-                    "1" => 0,
-                    _ => return None,
-                };
-                Some((FactorVariable::Constant(i), BigFloat::from_shortest_decimal(c.value)?, metres))
-            })
-            .collect();
+        let lengths: Vec<(FactorVariable, BigFloat, i32)> =
+            (mechanism.constants.iter().enumerate())
+                .filter(|(_, c)| !c.is_angle && c.value != 0.0)
+                .filter_map(|(i, c)| {
+                    let metres = match c.unit.as_str() {
+                        "m" => 1,
+                        "1" => 0,
+                        _ => return None,
+                    };
+                    Some((
+                        FactorVariable::Constant(i),
+                        BigFloat::from_shortest_decimal(c.value)?,
+                        metres,
+                    ))
+                })
+                .collect();
         let mut push = |above: &[usize], below: &[usize]| {
             let of = |chosen: &[usize]| -> Vec<FactorVariable> {
                 chosen.iter().map(|i| lengths[*i].0).collect()
@@ -125,7 +132,8 @@ impl<'a> FileConstants<'a> {
         product: &ParameterMonomial,
         kept: &ParameterMonomial,
     ) -> RationalFunction {
-        let [of_product, of_kept] = [product, kept].map(|of| base::product_unit(self.mechanism, of));
+        let [of_product, of_kept] =
+            [product, kept].map(|of| base::product_unit(self.mechanism, of));
         // The column of a product has its inverse unit.
         let wanted = if of_product == of_kept {
             Some(0)

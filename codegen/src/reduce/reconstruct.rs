@@ -4,7 +4,7 @@
 use modelmill_algebra::field::{FieldElement, RandomStream};
 use modelmill_algebra::univariate;
 
-use super::fit::{PrimeFields, FunctionShape};
+use super::fit::{FunctionShape, PrimeFields};
 use super::oracle::{ConstantOccurrence, PrimeFieldOracle};
 use super::rational_function::RationalFunction;
 use crate::DeriveError;
@@ -94,8 +94,14 @@ impl<O: PrimeFieldOracle> DependenceSurvey<O> {
         total_degrees(oracle, origin, &self.constants, &indices, shapes, stream)?;
         let mut found = Vec::with_capacity(wanted.len());
         for (k, is_needed) in wanted {
-            let function =
-                shapes[*k].fit_function(&mut self.fields, oracle, origin, *k, &self.roots, stream)?;
+            let function = shapes[*k].fit_function(
+                &mut self.fields,
+                oracle,
+                origin,
+                *k,
+                &self.roots,
+                stream,
+            )?;
             let resists = function.is_none();
             found.push(function);
             if resists && *is_needed {
@@ -150,7 +156,11 @@ fn vary_constants<O: PrimeFieldOracle>(
 
 /// Constants in groups such that none of some functions depends on two of one group: they may be varied at once. Those of
 /// different joints of an arm mostly are such.
-fn independent_groups<'a>(moved: &'a [VariedConstant], functions: &[usize], shapes: &[FunctionShape]) -> Vec<Vec<&'a VariedConstant>> {
+fn independent_groups<'a>(
+    moved: &'a [VariedConstant],
+    functions: &[usize],
+    shapes: &[FunctionShape],
+) -> Vec<Vec<&'a VariedConstant>> {
     let mut groups: Vec<Vec<&VariedConstant>> = Vec::new();
     for one in moved {
         let depends = |k: &usize| shapes[*k].degrees.contains_key(&one.constant);
@@ -353,7 +363,10 @@ fn set_constant(point: &mut FieldPoint, (index, in_angle): ConstantOccurrence, t
 }
 
 /// Where a constant stands; half the tangent if inside sines and cosines.
-fn constant_value(point: &FieldPoint, (index, in_angle): ConstantOccurrence) -> Option<FieldElement> {
+fn constant_value(
+    point: &FieldPoint,
+    (index, in_angle): ConstantOccurrence,
+) -> Option<FieldElement> {
     let atom = Atom::Constant(index);
     if !in_angle {
         return point.values.get(&atom).copied();

@@ -10,7 +10,9 @@ use std::collections::BTreeMap;
 use modelmill_algebra::eliminate::{self, RowEchelonForm};
 use modelmill_algebra::field::FieldElement;
 
-use super::rational_function::{TrigonometricPolynomial, PowerProduct, RationalFunction, FactorVariable};
+use super::rational_function::{
+    FactorVariable, PowerProduct, RationalFunction, TrigonometricPolynomial,
+};
 use crate::DeriveError;
 use crate::expr::{FieldPoint, Rational};
 
@@ -75,7 +77,10 @@ impl ColumnRelation {
     }
 
     /// Its factors for the constants at which columns were reduced to `echelon`.
-    fn values<const P: u64>(&self, echelon: &RowEchelonForm<P>) -> Result<Vec<FieldElement<P>>, DeriveError> {
+    fn values<const P: u64>(
+        &self,
+        echelon: &RowEchelonForm<P>,
+    ) -> Result<Vec<FieldElement<P>>, DeriveError> {
         let entry = |p: usize, k: usize| echelon.entry(p, k).ok_or(DeriveError::RankChanged);
         let mut of_dependent = Vec::new();
         if !self.dependent.is_empty() {
@@ -151,7 +156,11 @@ pub(super) fn find_relations<const P: u64>(
 }
 
 /// The columns among those before `column` that it needs if the last ones are preferred.
-fn needed_columns<const P: u64>(echelon: &RowEchelonForm<P>, before: &[usize], column: usize) -> Vec<usize> {
+fn needed_columns<const P: u64>(
+    echelon: &RowEchelonForm<P>,
+    before: &[usize],
+    column: usize,
+) -> Vec<usize> {
     /// Columns as vectors over the retained ones, each with what it is made of.
     struct ColumnCombination<const P: u64> {
         pivot: usize,
@@ -163,7 +172,9 @@ fn needed_columns<const P: u64>(echelon: &RowEchelonForm<P>, before: &[usize], c
         let entries = echelon.pivots.iter().map(|p| echelon.entry(*p, k));
         entries.map(Option::unwrap_or_default).collect()
     };
-    let reduced = |known: &[ColumnCombination<P>], target: &mut Vec<FieldElement<P>>, of: &mut BTreeMap<_, _>| {
+    let reduced = |known: &[ColumnCombination<P>],
+                   target: &mut Vec<FieldElement<P>>,
+                   of: &mut BTreeMap<_, _>| {
         for one in known {
             let factor = -target[one.pivot];
             if factor == FieldElement::ZERO {
@@ -191,7 +202,11 @@ fn needed_columns<const P: u64>(echelon: &RowEchelonForm<P>, before: &[usize], c
         for x in vector.iter_mut().chain(of.values_mut()) {
             *x = *x * scale;
         }
-        known.push(ColumnCombination { pivot, vector, combination: of });
+        known.push(ColumnCombination {
+            pivot,
+            vector,
+            combination: of,
+        });
         let last = known.len() - 1;
         reduced(&known[last..], &mut target, &mut made);
         if target.iter().all(|x| *x == FieldElement::ZERO) {
@@ -256,8 +271,11 @@ impl SolvedRelations {
 
     /// Dependent columns whose relations to others that depend are not known, or hold quotients other than by lengths.
     pub(super) fn unwieldy_columns(&self) -> Vec<usize> {
-        let is_simple =
-            |f: &Option<RationalFunction>| f.as_ref().and_then(MonomialQuotient::from_function).is_some();
+        let is_simple = |f: &Option<RationalFunction>| {
+            f.as_ref()
+                .and_then(MonomialQuotient::from_function)
+                .is_some()
+        };
         let lines = self.0.iter();
         let unwieldy =
             lines.filter(|(r, factors)| !r.has_retained_only() && !factors.iter().all(is_simple));
@@ -266,13 +284,17 @@ impl SolvedRelations {
 
     /// Whether a factor on retained columns resists, so that no others need be looked for.
     pub(super) fn has_unknown_factor(&self) -> bool {
-        let mut direct = self.0.iter().filter(|(relation, _)| relation.has_retained_only());
+        let mut direct = self
+            .0
+            .iter()
+            .filter(|(relation, _)| relation.has_retained_only());
         direct.any(|(_, factors)| factors.iter().any(Option::is_none))
     }
 
     /// Puts others in the place of relations of the same columns, if they are known.
     pub(super) fn replace(&mut self, others: Self) {
-        let known = |(_, factors): &(ColumnRelation, RelationFactors)| factors.iter().all(Option::is_some);
+        let known =
+            |(_, factors): &(ColumnRelation, RelationFactors)| factors.iter().all(Option::is_some);
         for other in others.0.into_iter().filter(known) {
             if let Some(line) = self.0.iter_mut().find(|(r, _)| r.column == other.0.column) {
                 *line = other;
@@ -480,7 +502,8 @@ impl MonomialQuotient {
     }
 
     fn to_function(&self) -> RationalFunction {
-        let denominator = TrigonometricPolynomial::from([(self.denominator.clone(), Rational::ONE)]);
+        let denominator =
+            TrigonometricPolynomial::from([(self.denominator.clone(), Rational::ONE)]);
         RationalFunction::new(self.numerator.clone(), denominator)
     }
 }
@@ -499,7 +522,11 @@ fn quotient(a: &PowerProduct, b: &PowerProduct) -> PowerProduct {
     merge_powers(a, b, |n, m| n - m)
 }
 
-fn merge_powers(a: &PowerProduct, b: &PowerProduct, exponent: impl Fn(u32, u32) -> u32) -> PowerProduct {
+fn merge_powers(
+    a: &PowerProduct,
+    b: &PowerProduct,
+    exponent: impl Fn(u32, u32) -> u32,
+) -> PowerProduct {
     let mut found = PowerProduct::with_capacity(a.len() + b.len());
     let (mut a, mut b) = (a.iter().peekable(), b.iter().peekable());
     loop {

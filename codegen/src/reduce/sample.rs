@@ -6,12 +6,12 @@
 //! [`crate::loops::branches`].
 
 use modelmill_algebra::eliminate::RowEchelonForm;
-use modelmill_algebra::field::{FieldElement, ExtensionElement, FieldNumber, RandomStream};
+use modelmill_algebra::field::{ExtensionElement, FieldElement, FieldNumber, RandomStream};
 use modelmill_spec::Mechanism;
 
 use crate::DeriveError;
 use crate::expr::independent::IDLE;
-use crate::expr::{Atom, ExprId, FieldPoint, Graph, Node, EvaluationTape, Unary};
+use crate::expr::{Atom, EvaluationTape, ExprId, FieldPoint, Graph, Node, Unary};
 use crate::loops::branches::{self, RootBranch};
 use crate::loops::field_poses::{FieldPoseSampler, MOST_DRAWS};
 use crate::loops::plan::{SolvableCoordinates, plan};
@@ -50,8 +50,13 @@ impl MotionSampler {
                 .map(|c| c.name.clone())
                 .collect()
         };
-        let plan = plan(graph, mechanism, &projection.loops, SolvableCoordinates::Any)
-            .ok_or_else(|| DeriveError::LoopsNotSampled { loops: loops() })?;
+        let plan = plan(
+            graph,
+            mechanism,
+            &projection.loops,
+            SolvableCoordinates::Any,
+        )
+        .ok_or_else(|| DeriveError::LoopsNotSampled { loops: loops() })?;
         let mut all = outputs.to_vec();
         all.extend(&projection.passive_rates);
         all.extend(&projection.passive_accelerations);

@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::DeriveError;
 use crate::expr::independent::SEED;
-use crate::expr::{Atom, BigFloatPoint, ExprId, Graph, EvaluationTape};
+use crate::expr::{Atom, BigFloatPoint, EvaluationTape, ExprId, Graph};
 use crate::loops::numeric_poses::{NumericLoops, uniform_symmetric};
 use crate::loops::walk::{NEARLY_CLOSED, PoseWalk, all_residuals};
 use crate::regressor::projection::LoopProjection;
@@ -116,8 +116,15 @@ impl<'a> WalkSampler<'a> {
                 reason = "the exponent of a machine number"
             )]
             let scale = -(largest.log2() as i64);
-            let scaled: Vec<BigFloat> = values.iter().map(|x| x.scale_by_power_of_two(scale)).collect();
-            rows.extend(scaled.chunks(self.n_columns.max(1)).map(<[BigFloat]>::to_vec));
+            let scaled: Vec<BigFloat> = values
+                .iter()
+                .map(|x| x.scale_by_power_of_two(scale))
+                .collect();
+            rows.extend(
+                scaled
+                    .chunks(self.n_columns.max(1))
+                    .map(<[BigFloat]>::to_vec),
+            );
         }
         Ok(rows)
     }

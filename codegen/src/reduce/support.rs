@@ -9,7 +9,7 @@ use modelmill_algebra::eliminate;
 use modelmill_algebra::field::{FieldElement, RandomStream};
 
 use super::oracle::{ConstantOccurrence, PrimeFieldOracle};
-use super::rational_function::{PowerProduct, FactorVariable, monomial_value};
+use super::rational_function::{FactorVariable, PowerProduct, monomial_value};
 use crate::DeriveError;
 use crate::expr::{Atom, FieldPoint};
 
@@ -26,7 +26,8 @@ pub(super) fn nonzero_monomials<O: PrimeFieldOracle>(
 ) -> Result<Option<[Vec<PowerProduct>; 2]>, DeriveError> {
     /// Equations beyond the unknowns: they show that the ansatz holds.
     const MORE: usize = 4;
-    let mut kept: [BTreeSet<PowerProduct>; 2] = [0, 1].map(|_| BTreeSet::from([PowerProduct::new()]));
+    let mut kept: [BTreeSet<PowerProduct>; 2] =
+        [0, 1].map(|_| BTreeSet::from([PowerProduct::new()]));
     for n in 1..=variables.len() {
         let loose = &variables[..n];
         oracle.charge((numerator.len() + denominator.len()) * 100)?;
@@ -57,11 +58,12 @@ pub(super) fn nonzero_monomials<O: PrimeFieldOracle>(
         let [solution] = solutions.as_slice() else {
             return Ok(None);
         };
-        let with_coefficient = |monomials: &[PowerProduct], factors: &[FieldElement]| -> BTreeSet<PowerProduct> {
-            let pairs = monomials.iter().zip(factors);
-            let with_coefficient = pairs.filter(|(_, x)| **x != FieldElement::ZERO);
-            with_coefficient.map(|(m, _)| m.clone()).collect()
-        };
+        let with_coefficient =
+            |monomials: &[PowerProduct], factors: &[FieldElement]| -> BTreeSet<PowerProduct> {
+                let pairs = monomials.iter().zip(factors);
+                let with_coefficient = pairs.filter(|(_, x)| **x != FieldElement::ZERO);
+                with_coefficient.map(|(m, _)| m.clone()).collect()
+            };
         let (above, below) = solution.split_at(top.len());
         kept = [
             with_coefficient(&top, above),

@@ -6,7 +6,8 @@ use crate::expr::vector::{self, AxisRotation};
 use crate::expr::{ExprId, Graph};
 use crate::newton_euler::inertia::InertiaByProduct;
 use crate::newton_euler::{
-    self, BodyInertia, CarryDepths, InertiaElement, InertiaFactors, TreeMotion, JointSide, InertiaDiagonal, RecursionStyle, SymbolicWrench,
+    self, BodyInertia, CarryDepths, InertiaDiagonal, InertiaElement, InertiaFactors, JointSide,
+    RecursionStyle, SymbolicWrench, TreeMotion,
 };
 use crate::tree::KinematicTree;
 use crate::tree::expressions::ParameterMonomial;
@@ -166,7 +167,12 @@ impl RecursionFrames {
         }
     }
 
-    pub(crate) fn rotate_body(&self, graph: &mut Graph, link: usize, body: &BodyInertia) -> BodyInertia {
+    pub(crate) fn rotate_body(
+        &self,
+        graph: &mut Graph,
+        link: usize,
+        body: &BodyInertia,
+    ) -> BodyInertia {
         match self.turns.get(link) {
             Some(turn) => body.rotate(graph, turn),
             None => *body,
@@ -194,7 +200,11 @@ fn single_moment(inertia: &InertiaFactors) -> Option<usize> {
 }
 
 /// Whether one of some products is the moment of inertia of a link about its joint's axis.
-fn has_axial_column(inertia: &InertiaByProduct, link: usize, products: &[ParameterMonomial]) -> bool {
+fn has_axial_column(
+    inertia: &InertiaByProduct,
+    link: usize,
+    products: &[ParameterMonomial],
+) -> bool {
     products.iter().any(|product| {
         let mut bodies = inertia.link_inertias(product);
         let only = bodies.next();

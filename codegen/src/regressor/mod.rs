@@ -7,7 +7,7 @@ pub(crate) mod projection;
 use std::collections::BTreeSet;
 
 use modelmill_spec::{
-    CoordinateIdx, DriveKind, ModelEffect, EffectTerm, Mechanism, EffectPlace, PlaceQuantity,
+    CoordinateIdx, DriveKind, EffectPlace, EffectTerm, Mechanism, ModelEffect, PlaceQuantity,
 };
 
 use crate::DeriveError;
@@ -108,7 +108,8 @@ impl UnreducedEquations {
             .iter()
             .map(|product| {
                 let wrenches = form.wrenches(graph, &self.inertia, frames, product, products);
-                let on_tree = newton_euler::carry_wrench(graph, tree, style, n, form.depths, wrenches);
+                let on_tree =
+                    newton_euler::carry_wrench(graph, tree, style, n, form.depths, wrenches);
                 let value = |m: &ParameterMonomial| {
                     if m == product {
                         Graph::ONE
@@ -132,7 +133,8 @@ impl UnreducedEquations {
     ) -> Result<Vec<ExprId>, DeriveError> {
         let wrenches = form.wrenches(graph, &self.inertia, &self.tree, frames, value);
         let n = mechanism.coordinates.len();
-        let on_tree = newton_euler::backward_recursion(graph, &frames.tree, form.style, n, wrenches);
+        let on_tree =
+            newton_euler::backward_recursion(graph, &frames.tree, form.style, n, wrenches);
         self.drive_forces(graph, mechanism, &on_tree, value)
     }
 
@@ -211,7 +213,10 @@ impl UnreducedEquations {
                         EffectPlace::Coordinate(i) => &mut on_tree[i.0],
                         EffectPlace::Drive(d) => &mut on_drives[d.0],
                         // Masses are in the inertia, and the rest has no parameters.
-                        EffectPlace::Point(_) | EffectPlace::Part(_) | EffectPlace::Base | EffectPlace::Force => continue,
+                        EffectPlace::Point(_)
+                        | EffectPlace::Part(_)
+                        | EffectPlace::Base
+                        | EffectPlace::Force => continue,
                     };
                     let factor = self.effect_factor(graph, mechanism, effect, p, term)?;
                     let force = graph.mul(factor, value);
@@ -282,7 +287,10 @@ impl UnreducedEquations {
                 let [q, qd, qdd] = atoms.map(|a| Some(graph.atom(a)));
                 [q, qd, qdd, None]
             }
-            EffectPlace::Point(_) | EffectPlace::Part(_) | EffectPlace::Base | EffectPlace::Force => [None; 4],
+            EffectPlace::Point(_)
+            | EffectPlace::Part(_)
+            | EffectPlace::Base
+            | EffectPlace::Force => [None; 4],
         }
     }
 }
@@ -295,7 +303,9 @@ fn rotation_coordinate(mechanism: &Mechanism, place: EffectPlace) -> Option<Coor
             DriveKind::Joint(i) => i,
             DriveKind::Linear { .. } => return None,
         },
-        EffectPlace::Point(_) | EffectPlace::Part(_) | EffectPlace::Base | EffectPlace::Force => return None,
+        EffectPlace::Point(_) | EffectPlace::Part(_) | EffectPlace::Base | EffectPlace::Force => {
+            return None;
+        }
     };
     let motion = mechanism.coordinates[coordinate.0].motion;
     motion.is_angle().then_some(coordinate)

@@ -3,16 +3,18 @@
 use modelmill_spec::Mechanism;
 
 use super::document::{
-    self, PageDocument, PageEquation, InlineSpan, TextLine, PageTable, cell, linear_model, name, number, text,
+    self, InlineSpan, PageDocument, PageEquation, PageTable, TextLine, cell, linear_model, name,
+    number, text,
 };
 use super::rank::NumericRank;
 use crate::Derivation;
 use crate::expr::Rational;
-use crate::expr::print::{PrintedFormula, FormulaSymbol};
+use crate::expr::print::{FormulaSymbol, PrintedFormula};
 use crate::reduce::base::{
-    lumped_formulas, base_parameter_name as base_name, product_formula as product, dependent_sums, product_unit, expanded_formula,
+    base_parameter_name as base_name, dependent_sums, expanded_formula, lumped_formulas,
+    product_formula as product, product_unit,
 };
-use crate::reduce::{ReductionMethod, RationalFunction};
+use crate::reduce::{RationalFunction, ReductionMethod};
 use crate::tree::expressions::ParameterMonomial;
 
 /// Base parameter `k` written out term by term: what a script reads.
@@ -33,7 +35,8 @@ pub fn factored_base_expression(derivation: &Derivation, k: usize) -> PrintedFor
     )];
     let mut groups: Vec<(RationalFunction, Vec<(Rational, PrintedFormula)>)> = Vec::new();
     for (at, line) in reduction.dependencies.iter().enumerate() {
-        let what = PrintedFormula::product(Rational::ONE, lumped_formulas(mechanism, reduction, at));
+        let what =
+            PrintedFormula::product(Rational::ONE, lumped_formulas(mechanism, reduction, at));
         for (_, factor) in line.equals.iter().filter(|(at, _)| *at == k) {
             let (number, function) = factor.split_number();
             let member = (number, what.clone());
@@ -77,7 +80,9 @@ pub fn base_summand(derivation: &Derivation, k: usize, product_idx: usize) -> Pr
     let line = lines.find(|line| line.product == product_idx && line.via.is_empty());
     let factor = line.and_then(|line| line.equals.iter().find(|(at, _)| *at == k));
     match factor {
-        Some((_, factor)) => PrintedFormula::product(Rational::ONE, [factor.formula(mechanism), what]),
+        Some((_, factor)) => {
+            PrintedFormula::product(Rational::ONE, [factor.formula(mechanism), what])
+        }
         None => what,
     }
 }
@@ -242,7 +247,10 @@ pub(super) fn base_parameters(
         left: PrintedFormula::name(base_name(k)),
         right,
         tag: format!("16.{}", k + 1),
-        unit: Some(product_unit(mechanism, &reduction.products[reduction.retained[k]])),
+        unit: Some(product_unit(
+            mechanism,
+            &reduction.products[reduction.retained[k]],
+        )),
     };
     let sums = dependent_sums(mechanism, reduction);
     if !sums.is_empty() {

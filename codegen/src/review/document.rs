@@ -1,6 +1,6 @@
 //! A page before it takes a notation: headings, paragraphs, tables and equations, in order.
 
-use crate::expr::print::{PrintedFormula, FormulaSymbol};
+use crate::expr::print::{FormulaSymbol, PrintedFormula};
 
 /// A stretch of a line.
 #[derive(Clone, Debug)]
@@ -81,8 +81,10 @@ impl PageDocument {
             0 => {}
             n if n > LONG => {
                 let summary = format!("{n} {what}");
-                self.blocks
-                    .push(PageBlock::Folded(summary, vec![PageBlock::Equations(equations)]));
+                self.blocks.push(PageBlock::Folded(
+                    summary,
+                    vec![PageBlock::Equations(equations)],
+                ));
             }
             _ => self.blocks.push(PageBlock::Equations(equations)),
         }
@@ -107,7 +109,11 @@ pub(super) fn unit(unit: impl Into<String>) -> InlineSpan {
 
 /// `tau = H(q, q', q'') p`
 pub(super) fn linear_model(matrix: &str, parameters: &str) -> Vec<InlineSpan> {
-    let motion = |order| InlineSpan::Math(PrintedFormula::Symbol(FormulaSymbol::time_derivative("q", order)));
+    let motion = |order| {
+        InlineSpan::Math(PrintedFormula::Symbol(FormulaSymbol::time_derivative(
+            "q", order,
+        )))
+    };
     vec![
         name("tau"),
         text(" = "),

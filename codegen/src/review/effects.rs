@@ -1,8 +1,8 @@
 //! Effects with what they add.
 
-use modelmill_spec::{DriveKind, ModelEffect, Mechanism, EffectPlace};
+use modelmill_spec::{DriveKind, EffectPlace, Mechanism, ModelEffect};
 
-use super::document::{PageDocument, InlineSpan, TextLine, PageTable, cell, code, text};
+use super::document::{InlineSpan, PageDocument, PageTable, TextLine, cell, code, text};
 use crate::expr::Rational;
 use crate::expr::print::{PrintedFormula, exact_formula_at};
 
@@ -34,12 +34,11 @@ pub(super) fn effects(page: &mut PageDocument, mechanism: &Mechanism) {
     ]);
     let is_coupled = |effect: &ModelEffect| {
         let mut terms = effect.terms.iter();
-        effect.other.is_none()
-            && terms.any(|term| {
-                term.expression.mentions(
-                    &|symbol| matches!(symbol, modelmill_spec::ModelSymbol::Place(q) if q.is_other()),
-                )
-            })
+        effect.other.is_none() && terms.any(|term| {
+            term.expression.mentions(
+                &|symbol| matches!(symbol, modelmill_spec::ModelSymbol::Place(q) if q.is_other()),
+            )
+        })
     };
     if mechanism.effects.iter().any(is_coupled) {
         page.paragraph([
@@ -75,7 +74,12 @@ pub(super) fn effects(page: &mut PageDocument, mechanism: &Mechanism) {
 }
 
 /// What an effect adds, as a formula where it is one, else in words.
-fn effect_contribution(mechanism: &Mechanism, effect: &ModelEffect, each: &str, other: &str) -> TextLine {
+fn effect_contribution(
+    mechanism: &Mechanism,
+    effect: &ModelEffect,
+    each: &str,
+    other: &str,
+) -> TextLine {
     let names: Vec<PrintedFormula> = (effect.terms.iter())
         .map(|term| PrintedFormula::name(&*mechanism.parameters[term.parameter.0].name))
         .collect();

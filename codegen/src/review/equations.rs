@@ -6,7 +6,7 @@ use serde::{Serialize, Serializer, ser::SerializeMap};
 use super::base_parameters::{base_expression, factor_text};
 use super::rank::NumericRank;
 use crate::reduce::base::base_parameter_name as base_name;
-use crate::{Derivation, ReductionMethod, OperationCount, BaseReduction, ProgramStage};
+use crate::{BaseReduction, Derivation, OperationCount, ProgramStage, ReductionMethod};
 
 /// Everything that reduction says about a model.
 #[derive(Clone, Debug)]
@@ -186,7 +186,9 @@ impl ReducedEquations {
             },
             operations: ProgramOperations {
                 regressor: programs.regressor.count_operations(ProgramStage::State),
-                inverse_dynamics: programs.inverse_dynamics.count_operations(ProgramStage::State),
+                inverse_dynamics: programs
+                    .inverse_dynamics
+                    .count_operations(ProgramStage::State),
             },
             without_effect,
         }

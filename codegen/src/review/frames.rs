@@ -1,10 +1,11 @@
 //! Tables of frames, points, bodies and lumped masses.
 
 use modelmill_spec::{
-    FrameAxis, FrameConvention, CoordinateIdx, ExactExpression, ModelFrame, FreeBody, PartInertia, Mechanism, FrameStep, TwistAxes,
+    CoordinateIdx, ExactExpression, FrameAxis, FrameConvention, FrameStep, FreeBody, Mechanism,
+    ModelFrame, PartInertia, TwistAxes,
 };
 
-use super::document::{PageBlock, PageDocument, InlineSpan, TextLine, PageTable, cell, code, text};
+use super::document::{InlineSpan, PageBlock, PageDocument, PageTable, TextLine, cell, code, text};
 use crate::expr::Rational;
 use crate::expr::print::{PrintedFormula, angle_formula, exact_formula, length_formula};
 
@@ -130,7 +131,9 @@ fn dh_parameters(mechanism: &Mechanism, frame: &ModelFrame) -> [PrintedFormula; 
     };
     let translation = |wanted: FrameAxis| {
         PrintedFormula::sum(frame.steps.iter().filter_map(|step| match step {
-            FrameStep::Translate(axis, by) if *axis == wanted => Some(length_formula(mechanism, by)),
+            FrameStep::Translate(axis, by) if *axis == wanted => {
+                Some(length_formula(mechanism, by))
+            }
             _ => None,
         }))
     };
@@ -155,7 +158,11 @@ fn vector(mechanism: &Mechanism, at: &[ExactExpression; 3]) -> TextLine {
 }
 
 /// The entries of an inertia that are not zero, with their places.
-fn inertia_entries(mechanism: &Mechanism, names: [&str; 6], values: &[ExactExpression; 6]) -> TextLine {
+fn inertia_entries(
+    mechanism: &Mechanism,
+    names: [&str; 6],
+    values: &[ExactExpression; 6],
+) -> TextLine {
     let mut line = Vec::new();
     for (name, value) in names.iter().zip(values) {
         if value.is_zero() {

@@ -1,8 +1,10 @@
 //! Loops and drives: closure equations, how they are solved, and what the drives see.
 
-use modelmill_spec::{PlaceLoad, DriveKind, Mechanism};
+use modelmill_spec::{DriveKind, Mechanism, PlaceLoad};
 
-use super::document::{PageBlock, PageDocument, PageEquation, InlineSpan, TextLine, PageTable, cell, code, text};
+use super::document::{
+    InlineSpan, PageBlock, PageDocument, PageEquation, PageTable, TextLine, cell, code, text,
+};
 use crate::expr::print::{PrintedFormula, angle_sum_formula, formula, tree_size};
 use crate::expr::{ExprId, Graph, Rational, nominal_value};
 use crate::{Derivation, PassivePosition};
@@ -230,7 +232,10 @@ pub(super) fn drives(page: &mut PageDocument, derivation: &Derivation) {
                         PlaceLoad::Torque => "torque on ",
                         _ => "force on ",
                     };
-                    vec![text(kind), InlineSpan::Math(PrintedFormula::name(&*coordinate.name))]
+                    vec![
+                        text(kind),
+                        InlineSpan::Math(PrintedFormula::name(&*coordinate.name)),
+                    ]
                 }
                 DriveKind::Linear { from, to } => {
                     any_linear = true;

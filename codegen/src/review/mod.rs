@@ -21,11 +21,14 @@ mod render_text;
 #[cfg(test)]
 pub(crate) mod tests;
 
-pub use base_parameters::{base_expression, factored_base_expression, base_summand};
-pub use equations::{BaseParameterLine, DependencyLine, ReducedEquations, NumericMethod, ProgramOperations, RankSummary};
+pub use base_parameters::{base_expression, base_summand, factored_base_expression};
+pub use equations::{
+    BaseParameterLine, DependencyLine, NumericMethod, ProgramOperations, RankSummary,
+    ReducedEquations,
+};
 pub use rank::NumericRank;
 
-use modelmill_draw::{MechanismScene, DrawingStyle, inline_svg};
+use modelmill_draw::{DrawingStyle, MechanismScene, inline_svg};
 use modelmill_spec::Mechanism;
 
 use crate::Derivation;
@@ -56,7 +59,9 @@ pub fn page(derivation: &Derivation, format: PageFormat, numeric: Option<&Numeri
         PageFormat::Text => render_text::render(&document()),
         PageFormat::Markdown => render_markdown::render(&document()),
         PageFormat::Latex => render_latex::render(&document()),
-        PageFormat::Html => render_html::render(&document(), &mechanism_picture(&derivation.mechanism)),
+        PageFormat::Html => {
+            render_html::render(&document(), &mechanism_picture(&derivation.mechanism))
+        }
         #[cfg(any(test, feature = "json"))]
         PageFormat::Json => ReducedEquations::new(derivation, numeric).json(),
     }

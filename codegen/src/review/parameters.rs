@@ -2,7 +2,7 @@
 
 use modelmill_spec::Mechanism;
 
-use super::document::{PageDocument, InlineSpan, PageTable, cell, code, name, number, text, unit};
+use super::document::{InlineSpan, PageDocument, PageTable, cell, code, name, number, text, unit};
 use crate::Derivation;
 use crate::expr::print::{PrintedFormula, exact_formula};
 
@@ -57,7 +57,10 @@ pub(super) fn quantities(page: &mut PageDocument, mechanism: &Mechanism) {
         .collect();
     let head = vec!["symbol", "value", "unit", "meaning"];
     page.table("constants", PageTable { head, rows });
-    let gravity = mechanism.gravity.each_ref().map(|g| exact_formula(mechanism, g));
+    let gravity = mechanism
+        .gravity
+        .each_ref()
+        .map(|g| exact_formula(mechanism, g));
     if gravity.iter().all(PrintedFormula::is_zero) {
         page.paragraph([text("Gravity does not act.")]);
     } else {

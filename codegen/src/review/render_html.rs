@@ -5,7 +5,7 @@ use std::fmt::Write;
 use modelmill_boundary::text::html as escape;
 use modelmill_draw::page;
 
-use super::document::{PageBlock, PageDocument, PageEquation, InlineSpan, TextLine};
+use super::document::{InlineSpan, PageBlock, PageDocument, PageEquation, TextLine};
 use crate::expr::print::PrintedFormula;
 
 /// `picture` is an SVG of the mechanism.

@@ -4,7 +4,9 @@ use std::fmt::Write;
 
 use modelmill_boundary::text::latex as escape;
 
-use super::document::{PageBlock, PageDocument, PageEquation, InlineSpan, TextLine, PageTable, line_terms};
+use super::document::{
+    InlineSpan, PageBlock, PageDocument, PageEquation, PageTable, TextLine, line_terms,
+};
 use crate::expr::print::PrintedFormula;
 
 /// Length of the plain text of a line of an equation, beyond which it is broken.

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use modelmill_boundary::text::{code_in_markdown, html, markdown as escape};
 
-use super::document::{PageBlock, PageDocument, PageEquation, InlineSpan, TextLine};
+use super::document::{InlineSpan, PageBlock, PageDocument, PageEquation, TextLine};
 use super::render_latex;
 use super::render_text;
 
@@ -43,7 +43,11 @@ fn blocks(out: &mut String, blocks: &[PageBlock]) {
 
 fn write_equations(out: &mut String, equations: &[PageEquation]) {
     if equations.len() > MOST_DISPLAYED {
-        _ = writeln!(out, "```text\n{}```\n", render_text::equation_lines(equations));
+        _ = writeln!(
+            out,
+            "```text\n{}```\n",
+            render_text::equation_lines(equations)
+        );
         return;
     }
     for equation in equations {

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use modelmill_boundary::text;
 
-use super::document::{PageBlock, PageDocument, PageEquation, InlineSpan, TextLine, PageTable};
+use super::document::{InlineSpan, PageBlock, PageDocument, PageEquation, PageTable, TextLine};
 
 /// Width at which equations and paragraphs are broken.
 const WIDTH: usize = 110;

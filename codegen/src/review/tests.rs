@@ -6,7 +6,10 @@ use std::path::PathBuf;
 
 use modelmill_spec::Mechanism;
 
-use super::{ReducedEquations, PageFormat, NumericRank, base_expression, factored_base_expression, page, programs};
+use super::{
+    NumericRank, PageFormat, ReducedEquations, base_expression, factored_base_expression, page,
+    programs,
+};
 use crate::emit::tree::names::{NamedQuantities, operation_values};
 use crate::expr::Atom;
 use crate::expr::print::parse::parse;

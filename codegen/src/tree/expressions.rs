@@ -3,12 +3,13 @@
 use std::collections::BTreeMap;
 
 use modelmill_spec::{
-    ExactAngle, CoordinateIdx, ExactExpression, ExactFunction, ExactLength, Mechanism, PlaceQuantity, ModelSymbol,
+    CoordinateIdx, ExactAngle, ExactExpression, ExactFunction, ExactLength, Mechanism, ModelSymbol,
+    PlaceQuantity,
 };
 use num_traits::ToPrimitive;
 
 use crate::DeriveError;
-use crate::expr::{AtomAngleSum, Atom, ExprId, Graph, Rational, Unary};
+use crate::expr::{Atom, AtomAngleSum, ExprId, Graph, Rational, Unary};
 
 /// A product of powers of dynamic parameters: `m1*dc1^2` is `[(0, 1), (4, 2)]`. Sorted by parameter.
 ///
@@ -173,7 +174,10 @@ pub(crate) fn length(graph: &mut Graph, length: &ExactLength) -> Result<ExprId, 
 }
 
 /// An expression without dynamic parameters or quantities of a place.
-pub(crate) fn expression(graph: &mut Graph, exact: &ExactExpression) -> Result<ExprId, DeriveError> {
+pub(crate) fn expression(
+    graph: &mut Graph,
+    exact: &ExactExpression,
+) -> Result<ExprId, DeriveError> {
     expression_at(graph, exact, &|_| None)
 }
 
@@ -214,9 +218,9 @@ fn polynomial_at(
             ParameterPolynomial::constant(graph.rational(Rational::from(value.clone())))
         }
         ExactExpression::Pi => ParameterPolynomial::constant(graph.atom(Atom::Pi)),
-        ExactExpression::Symbol(ModelSymbol::Parameter(i)) => {
-            ParameterPolynomial(BTreeMap::from([(ParameterMonomial(vec![(i.0, 1)]), Graph::ONE)]))
-        }
+        ExactExpression::Symbol(ModelSymbol::Parameter(i)) => ParameterPolynomial(BTreeMap::from(
+            [(ParameterMonomial(vec![(i.0, 1)]), Graph::ONE)],
+        )),
         ExactExpression::Symbol(ModelSymbol::Place(quantity)) => match place(*quantity) {
             Some(value) => ParameterPolynomial::constant(value),
             None => {
@@ -251,7 +255,9 @@ fn polynomial_at(
             let inverse = ParameterPolynomial::constant(graph.pow(divisor, -1));
             polynomial_at(graph, a, place)?.times(&inverse, graph)?
         }
-        ExactExpression::Negative(a) => polynomial_at(graph, a, place)?.scale(&Rational::MINUS_ONE, graph),
+        ExactExpression::Negative(a) => {
+            polynomial_at(graph, a, place)?.scale(&Rational::MINUS_ONE, graph)
+        }
         ExactExpression::Power(a, n) if *n < 0 => {
             let base = expression_at(graph, a, place)?;
             if base == Graph::ZERO {
@@ -273,7 +279,11 @@ fn polynomial_at(
             {
                 let (c, s) = graph.cos_sin(&sum, pi12);
                 return Ok(ParameterPolynomial::constant(
-                    if *function == ExactFunction::Sin { s } else { c },
+                    if *function == ExactFunction::Sin {
+                        s
+                    } else {
+                        c
+                    },
                 ));
             }
             let argument = expression_at(graph, a, place)?;
@@ -299,7 +309,9 @@ pub(crate) fn name_place_coordinate(
         ExactExpression::Symbol(ModelSymbol::Place(found)) if *found == quantity => {
             ExactExpression::Symbol(ModelSymbol::Coordinate(coordinate))
         }
-        ExactExpression::Rational(_) | ExactExpression::Pi | ExactExpression::Symbol(_) => exact.clone(),
+        ExactExpression::Rational(_) | ExactExpression::Pi | ExactExpression::Symbol(_) => {
+            exact.clone()
+        }
         ExactExpression::Sum(operands) => ExactExpression::Sum(all(operands)),
         ExactExpression::Product(operands) => ExactExpression::Product(all(operands)),
         ExactExpression::Quotient(a, b) => ExactExpression::Quotient(inner(a), inner(b)),
@@ -354,7 +366,9 @@ impl AngleAccumulator {
         match exact {
             ExactExpression::Rational(value) if Rational::from(value.clone()).is_zero() => {}
             ExactExpression::Pi => self.pi = &self.pi + factor,
-            ExactExpression::Symbol(symbol @ (ModelSymbol::Constant(_) | ModelSymbol::Coordinate(_))) => {
+            ExactExpression::Symbol(
+                symbol @ (ModelSymbol::Constant(_) | ModelSymbol::Coordinate(_)),
+            ) => {
                 self.atoms.push((atom(*symbol), factor.clone()));
             }
             ExactExpression::Sum(operands) => {
@@ -374,7 +388,9 @@ impl AngleAccumulator {
                 let mut rest = None;
                 for operand in operands {
                     match operand {
-                        ExactExpression::Rational(value) => factor = &factor * &Rational::from(value.clone()),
+                        ExactExpression::Rational(value) => {
+                            factor = &factor * &Rational::from(value.clone())
+                        }
                         _ if rest.is_none() => rest = Some(operand),
                         _ => return None,
                     }

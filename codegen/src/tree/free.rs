@@ -20,7 +20,8 @@ fn coordinate_atoms<const N: usize>(
 
 /// The square of the length of a body's quaternion.
 pub(crate) fn quaternion_square(graph: &mut Graph, body: &FreeBody) -> ExprId {
-    let squares = coordinate_atoms(graph, Atom::Coordinate, body.quaternion).map(|x| graph.mul(x, x));
+    let squares =
+        coordinate_atoms(graph, Atom::Coordinate, body.quaternion).map(|x| graph.mul(x, x));
     graph.add_all(&squares)
 }
 
@@ -54,7 +55,12 @@ fn rotation_matrix(graph: &mut Graph, body: &FreeBody) -> [SymbolicVector; 3] {
 }
 
 /// Components in a body's axes of a vector that a twist gives in `axes`.
-pub(crate) fn to_body(graph: &mut Graph, body: &FreeBody, axes: TwistAxes, v: &SymbolicVector) -> SymbolicVector {
+pub(crate) fn to_body(
+    graph: &mut Graph,
+    body: &FreeBody,
+    axes: TwistAxes,
+    v: &SymbolicVector,
+) -> SymbolicVector {
     match axes {
         TwistAxes::Body => *v,
         TwistAxes::World => {
@@ -68,7 +74,12 @@ pub(crate) fn to_body(graph: &mut Graph, body: &FreeBody, axes: TwistAxes, v: &S
 }
 
 /// Components in the axes of a twist of a vector given in a body's.
-pub(crate) fn from_body(graph: &mut Graph, body: &FreeBody, axes: TwistAxes, v: &SymbolicVector) -> SymbolicVector {
+pub(crate) fn from_body(
+    graph: &mut Graph,
+    body: &FreeBody,
+    axes: TwistAxes,
+    v: &SymbolicVector,
+) -> SymbolicVector {
     match axes {
         TwistAxes::Body => *v,
         TwistAxes::World => rotation_matrix(graph, body).map(|row| graph.dot(&row, v)),

@@ -7,11 +7,11 @@ pub(crate) mod checks;
 pub(crate) mod expressions;
 pub(crate) mod free;
 
-use modelmill_spec::{FrameAxis, FrameIdx, FreeBody, Mechanism, FrameStep};
+use modelmill_spec::{FrameAxis, FrameIdx, FrameStep, FreeBody, Mechanism};
 
 use crate::DeriveError;
 use crate::expr::vector::{self, AxisRotation, SymbolicVector, push_rotation};
-use crate::expr::{AtomAngleSum, Atom, ExprId, Graph, Rational};
+use crate::expr::{Atom, AtomAngleSum, ExprId, Graph, Rational};
 
 /// A rigid frame that moves relative to its parent about or along its own z axis, or not at all.
 #[derive(Clone, Debug)]
@@ -155,7 +155,12 @@ impl KinematicTree {
     }
 
     /// Components in the link's frame of a vector given in the parent's frame.
-    pub(crate) fn to_link(&self, graph: &mut Graph, link: usize, v: &SymbolicVector) -> SymbolicVector {
+    pub(crate) fn to_link(
+        &self,
+        graph: &mut Graph,
+        link: usize,
+        v: &SymbolicVector,
+    ) -> SymbolicVector {
         let link = &self.links[link];
         let mut v = *v;
         for turn in &link.pre {

@@ -4,7 +4,7 @@ use std::error::Error;
 use std::f64::consts::TAU;
 
 use modelmill_generated::spidermill;
-use modelmill_rig::{RigPlant, Rig};
+use modelmill_rig::{Rig, RigPlant};
 use modelmill_runtime::PoseError;
 
 use crate::reference::ReferenceMotion;

@@ -13,7 +13,9 @@ const CUTOFF: f64 = 20.0;
 const ENDS: usize = 150;
 
 /// Base parameters that explain the forces best.
-pub(crate) fn identify(recording: &ControlRecording) -> Result<[f64; model::N_BASE], Box<dyn Error>> {
+pub(crate) fn identify(
+    recording: &ControlRecording,
+) -> Result<[f64; model::N_BASE], Box<dyn Error>> {
     let mut states = Vec::new();
     for q in &recording.q {
         states.push(filter_and_differentiate(&recording.t, q, CUTOFF, 4)?);

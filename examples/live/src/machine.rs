@@ -7,7 +7,7 @@ use std::error::Error;
 use std::f64::consts::TAU;
 use std::path::Path;
 
-use modelmill_rig::{RigLaw, RigPlace, Rig, RigState, RigTracker, forces};
+use modelmill_rig::{Rig, RigLaw, RigPlace, RigState, RigTracker, forces};
 use modelmill_runtime::Random;
 
 use crate::motion::{PERIOD, motion};

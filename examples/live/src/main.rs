@@ -18,11 +18,11 @@ include!(concat!(env!("OUT_DIR"), "/models.rs"));
 use std::error::Error;
 use std::time::Instant;
 
-use machine::{CYCLE, SimulatedMachine, FrictionWear, parameters_in_use};
+use machine::{CYCLE, FrictionWear, SimulatedMachine, parameters_in_use};
 use modelmill_rig::RigLaw;
 use modelmill_runtime::PoseError;
-use modelmill_runtime::live::{WatchChange, Options, WatchVerdict};
-use smoothing::{SmoothedState, MotionSmoother};
+use modelmill_runtime::live::{Options, WatchChange, WatchVerdict};
+use smoothing::{MotionSmoother, SmoothedState};
 use spidermill_worn as model;
 
 /// Rate of a spindle below which its friction may be anything, m/s.

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use modelmill_runtime::Random;
-use modelmill_runtime::live::{Options, WatchVerdict, ParameterWatch};
+use modelmill_runtime::live::{Options, ParameterWatch, WatchVerdict};
 
 use crate::machine::{CYCLE, parameters_in_use, times};
 use crate::motion::motion;

@@ -5,8 +5,8 @@ use std::fmt::Write as _;
 use crate::PaperExperiment;
 use crate::lengths::DistanceErrors;
 use crate::runs::PeriodicTrajectory;
-use crate::study::{TreatmentRun, DriveColumns};
-use modelmill::text::svg::{SvgFigure, PanelStyle, sheet};
+use crate::study::{DriveColumns, TreatmentRun};
+use modelmill::text::svg::{PanelStyle, SvgFigure, sheet};
 
 /// Largest relative error that is drawn.
 const RELATIVE: f64 = 1.0;
@@ -31,7 +31,12 @@ fn scale(limit: f64) -> PanelStyle<'static> {
 }
 
 /// Angles of a trajectory around their means, and the forces along it.
-pub(crate) fn motion(title: &str, periodic: &PeriodicTrajectory, along: &TreatmentRun, drives: &[String]) -> String {
+pub(crate) fn motion(
+    title: &str,
+    periodic: &PeriodicTrajectory,
+    along: &TreatmentRun,
+    drives: &[String],
+) -> String {
     let mut figure = SvgFigure::new(title, &along.time);
     let angles: DriveColumns = periodic
         .series

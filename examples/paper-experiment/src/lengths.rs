@@ -7,7 +7,7 @@ use modelmill_identify::excite::{ExcitationMotion, FourierSeries};
 use modelmill_identify::{PreparationRecord, PreparedRun};
 
 use crate::bundled;
-use crate::study::{TreatmentRun, DriveErrors};
+use crate::study::{DriveErrors, TreatmentRun};
 use modelmill::along;
 use modelmill::stretch::RecordingSegment;
 use modelmill::{Host, Outcome};

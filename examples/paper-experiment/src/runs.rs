@@ -3,7 +3,8 @@
 use std::f64::consts::PI;
 
 use modelmill_identify::excite::{
-    ExcitationLimits, ExcitationMotion, Options, ExcitationPlant, FourierSeries, condition_number, excite, max_progress_steps,
+    ExcitationLimits, ExcitationMotion, ExcitationPlant, FourierSeries, Options, condition_number,
+    excite, max_progress_steps,
 };
 use modelmill_identify::{PreparationRecord, PreparedRun};
 use modelmill_rig::{Rig, RigState, Trajectory};
@@ -34,13 +35,19 @@ pub(crate) struct PeriodicTrajectory {
 }
 
 /// Searches for a trajectory; its coefficients are rounded, and it keeps all limits nevertheless.
-pub(crate) fn search(model: &Model, options: &Options, message: &str) -> Outcome<PeriodicTrajectory> {
+pub(crate) fn search(
+    model: &Model,
+    options: &Options,
+    message: &str,
+) -> Outcome<PeriodicTrajectory> {
     let all_limits = limits::merged_limits(model, &[])?;
     let coordinates = limits::active_limits(model, &all_limits)?;
     let plant = ModelPlant::new(model, &all_limits);
-    let search = model.host().run_job(message, max_progress_steps(options), |job| {
-        excite(&plant, &coordinates, options, &|more| job.flow(more))
-    })?;
+    let search = model
+        .host()
+        .run_job(message, max_progress_steps(options), |job| {
+            excite(&plant, &coordinates, options, &|more| job.flow(more))
+        })?;
     let found = search.map_err(|error| Error::input(format!("{}: {error}", model.path)))?;
     // Rounding may leave the limits by a hair; shrinking by parts in a thousand returns.
     let series = (0..50)
@@ -52,7 +59,10 @@ pub(crate) fn search(model: &Model, options: &Options, message: &str) -> Outcome
                 model.path
             ))
         })?;
-    let motion = ExcitationMotion::sample(&series, modelmill_identify::excite::samples_per_period(options));
+    let motion = ExcitationMotion::sample(
+        &series,
+        modelmill_identify::excite::samples_per_period(options),
+    );
     Ok(PeriodicTrajectory {
         condition_number: plant
             .regressor(&motion)
@@ -76,7 +86,11 @@ fn round_coefficients(series: &[FourierSeries], factor: f64, period: f64) -> Vec
     series.iter().map(one).collect()
 }
 
-fn is_within_limits(plant: &ModelPlant<'_>, limits: &[ExcitationLimits], series: &[FourierSeries]) -> bool {
+fn is_within_limits(
+    plant: &ModelPlant<'_>,
+    limits: &[ExcitationLimits],
+    series: &[FourierSeries],
+) -> bool {
     let within = |one: &FourierSeries, limits: &ExcitationLimits| {
         let ranges = [Some(limits.position), limits.rate, limits.acceleration];
         ranges.into_iter().enumerate().all(|(derivative, range)| {
@@ -91,7 +105,12 @@ fn is_within_limits(plant: &ModelPlant<'_>, limits: &[ExcitationLimits], series:
 
 /// Drives a rig along a trajectory: exact states and forces, as sensors without faults would read them. What remains
 /// between them and a model is then the model's doing.
-pub(crate) fn run(rig: &Rig, model: &Model, periodic: &PeriodicTrajectory, rate: f64) -> Outcome<RecordingSegment> {
+pub(crate) fn run(
+    rig: &Rig,
+    model: &Model,
+    periodic: &PeriodicTrajectory,
+    rate: f64,
+) -> Outcome<RecordingSegment> {
     let coordinates = model
         .active_coordinates()
         .iter()

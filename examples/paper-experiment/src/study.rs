@@ -206,11 +206,14 @@ pub(crate) fn consistent_values(
         force: Some(along::forces(consistent, data, &consistent.nominal)?),
         ..data.run.clone()
     };
-    Ok(
-        regression::identify(paper, &[RecordingSegment::from(run)], &[], &EstimatorOptions::default())?
-            .solution
-            .values,
-    )
+    Ok(regression::identify(
+        paper,
+        &[RecordingSegment::from(run)],
+        &[],
+        &EstimatorOptions::default(),
+    )?
+    .solution
+    .values)
 }
 
 /// The paper's base parameters for other values of some parameters.
@@ -236,7 +239,8 @@ fn physical(model: &Model, fit: &FitFile) -> Outcome<Vec<PhysicalSolution>> {
     let (system, _) = table_1::system(model, &unknown, &values, fit);
     match interpret(&system) {
         Ok(
-            PhysicalInterpretation::Exact { solutions } | PhysicalInterpretation::LeastSquares { solutions, .. },
+            PhysicalInterpretation::Exact { solutions }
+            | PhysicalInterpretation::LeastSquares { solutions, .. },
         ) => Ok(solutions),
         Ok(PhysicalInterpretation::Undetermined { .. }) => Ok(Vec::new()),
         Err(error) => Err(Error::input(format!("{}: {error}", model.path))),

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use modelmill::files::{DiskFiles, FileError, FileSource, PathKind, MemoryFiles, OpenFile};
+use modelmill::files::{DiskFiles, FileError, FileSource, MemoryFiles, OpenFile, PathKind};
 
 /// What is in the plan comes from memory, all else from disk.
 pub(crate) struct PlanFiles {

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use modelmill::recording::PreparedRecording;
-use modelmill::runs::{ReferenceFit, FittedValue};
+use modelmill::runs::{FittedValue, ReferenceFit};
 use modelmill_identify::ParameterInfo;
 use serde_json::{Value, json};
 
@@ -65,7 +65,9 @@ impl FleetModel {
     pub fn columns(&self) -> Vec<String> {
         let model = self.common.model();
         let time = std::iter::once("t".to_owned());
-        time.chain(model.active_coordinates()).chain(model.drives()).collect()
+        time.chain(model.active_coordinates())
+            .chain(model.drives())
+            .collect()
     }
 
     /// Names of the drives.
@@ -103,7 +105,11 @@ impl FleetModel {
         self.summary_or_bad(name, read.map_err(FleetFault::from))
     }
 
-    fn summary_or_bad(&self, name: &str, recording: Result<PreparedRecording, FleetFault>) -> FleetSummary {
+    fn summary_or_bad(
+        &self,
+        name: &str,
+        recording: Result<PreparedRecording, FleetFault>,
+    ) -> FleetSummary {
         recording
             .and_then(|recording| self.sum_recording(name, recording))
             .unwrap_or_else(|fault| FleetSummary {
@@ -115,7 +121,11 @@ impl FleetModel {
             })
     }
 
-    fn sum_recording(&self, name: &str, mut recording: PreparedRecording) -> Result<FleetSummary, FleetFault> {
+    fn sum_recording(
+        &self,
+        name: &str,
+        mut recording: PreparedRecording,
+    ) -> Result<FleetSummary, FleetFault> {
         let time = recording.raw_column("t").unwrap_or_default();
         let columns: Vec<(&str, bool, &[f64], f64)> = self
             .still
@@ -150,13 +160,16 @@ impl FleetModel {
         exclude_dead_sensors(&mut recording, &drives, &sensors);
         let sums = self.common.sums(&recording)?;
         let is_dead = |drive: &String| sensors.iter().any(|one| one.of == *drive);
-        let left = drives.iter().zip(&sums.residual_ratios).map(|(drive, left)| {
-            if is_dead(drive) {
-                0.0
-            } else {
-                left * left * samples as f64
-            }
-        });
+        let left = drives
+            .iter()
+            .zip(&sums.residual_ratios)
+            .map(|(drive, left)| {
+                if is_dead(drive) {
+                    0.0
+                } else {
+                    left * left * samples as f64
+                }
+            });
         Ok(FleetSummary {
             mark: self.mark,
             recordings: 1,
@@ -195,7 +208,9 @@ impl FleetModel {
         };
         Ok(FleetFit {
             parameters: self.common.fit_parameters(base)?,
-            residual_shares: (0..summary.residual_squares.len()).map(|d| summary.residual_share(d)).collect(),
+            residual_shares: (0..summary.residual_squares.len())
+                .map(|d| summary.residual_share(d))
+                .collect(),
             recordings: summary.recordings,
             bad: summary.bad.len(),
         })
@@ -237,7 +252,11 @@ impl FleetModel {
 }
 
 /// The forces of sensors that died count in no equation.
-fn exclude_dead_sensors(recording: &mut PreparedRecording, drives: &[String], sensors: &[SensorFault]) {
+fn exclude_dead_sensors(
+    recording: &mut PreparedRecording,
+    drives: &[String],
+    sensors: &[SensorFault],
+) {
     let is_dead: Vec<bool> = (drives.iter())
         .map(|drive| sensors.iter().any(|one| one.is_force && one.of == *drive))
         .collect();
@@ -261,7 +280,9 @@ fn exclude_dead_sensors(recording: &mut PreparedRecording, drives: &[String], se
 }
 
 /// Columns in the order of time. Rows of equal time stay as they are, and are refused later.
-fn sort_by_time(mut columns: Vec<(String, Vec<f64>)>) -> Result<Vec<(String, Vec<f64>)>, FleetFault> {
+fn sort_by_time(
+    mut columns: Vec<(String, Vec<f64>)>,
+) -> Result<Vec<(String, Vec<f64>)>, FleetFault> {
     let Some((_, time)) = columns.iter().find(|(name, _)| name == "t") else {
         // The reader of recordings says what is missing, and knows what the plan maps onto time.
         return Ok(columns);

@@ -28,7 +28,7 @@ use modelmill::print::Message;
 pub use ground::{FleetFit, FleetModel};
 pub use modelmill::runs::FittedValue;
 pub use plan::{FleetPlan, FleetReference};
-pub use sensors::{SensorFault, FrozenReading};
+pub use sensors::{FrozenReading, SensorFault};
 pub use summary::{BadRecording, FleetSummary};
 
 /// Why something cannot be done, in one sentence with a remedy.

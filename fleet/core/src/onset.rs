@@ -106,14 +106,16 @@ mod tests {
     fn steps_and_ramps_are_told_apart_with_their_day() {
         // So steep that no two days are alike.
         for slope in [8.0, 300.0] {
-            let found = clearest_onset(&series(&|k| slope * (k as f64 - 3.0).max(0.0))).expect("an onset");
+            let found =
+                clearest_onset(&series(&|k| slope * (k as f64 - 3.0).max(0.0))).expect("an onset");
             assert_eq!(found.day, 4);
             assert!(
                 (found.per_day.expect("a ramp") - slope).abs() < 0.3,
                 "{found:?}"
             );
         }
-        let found = clearest_onset(&series(&|k| if k >= 6 { 12.0 } else { 0.0 })).expect("an onset");
+        let found =
+            clearest_onset(&series(&|k| if k >= 6 { 12.0 } else { 0.0 })).expect("an onset");
         assert_eq!((found.day, found.per_day), (6, None));
     }
 

@@ -1,6 +1,6 @@
 //! Which robots differ from the others of their kind, and in what: by summaries alone.
 
-use modelmill::runs::{RunChange, FittedValue};
+use modelmill::runs::{FittedValue, RunChange};
 use modelmill_identify::changes::NormalEquations;
 use serde_json::{Value, json};
 
@@ -81,7 +81,11 @@ pub fn outliers(ground: &FleetModel, robots: &[RobotSummary]) -> Result<FleetOut
         })
         .collect();
     let is_alike = |k: &usize| {
-        fits[*k].is_some() && apart[*k].iter().flatten().all(|apart| apart.abs() < SIMILARITY_LIMIT)
+        fits[*k].is_some()
+            && apart[*k]
+                .iter()
+                .flatten()
+                .all(|apart| apart.abs() < SIMILARITY_LIMIT)
     };
     let alike: Vec<usize> = (0..robots.len()).filter(is_alike).collect();
     let mut found = Vec::new();
@@ -114,14 +118,16 @@ pub fn outliers(ground: &FleetModel, robots: &[RobotSummary]) -> Result<FleetOut
             let clearest = (0..possible).map(beyond).fold(0.0, f64::max);
             // What robots hardly differ in, such as the zero of a sensor, stands clear of them even where it explains little of a load:
             // the name is that of the change that explains most.
-            let clear = |g: &usize| beyond(*g) > OUTLIER_LIMIT && beyond(*g) > ASSOCIATED_SHARE * clearest;
+            let clear =
+                |g: &usize| beyond(*g) > OUTLIER_LIMIT && beyond(*g) > ASSOCIATED_SHARE * clearest;
             let named = (0..possible)
                 .filter(clear)
                 .max_by(|a, b| roots[*a].total_cmp(&roots[*b]));
             if let Some(g) = named {
-                let mut change = ground
-                    .common
-                    .single_change(&parts, &robots[*which].summary.all_columns, g);
+                let mut change =
+                    ground
+                        .common
+                        .single_change(&parts, &robots[*which].summary.all_columns, g);
                 let rivals = (0..possible).filter(|other| *other != g && clear(other));
                 let rivals = rivals.map(|other| ground.common.name_of_change(other));
                 change.rivals = rivals.collect();

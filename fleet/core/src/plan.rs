@@ -5,7 +5,9 @@ use std::path::Path;
 use std::sync::Arc;
 
 use modelmill::files::{DiskFiles, MemoryFiles};
-use modelmill::recording::{StatePreparation, RecordingOptions, PreparedRecording, SmoothingMethod};
+use modelmill::recording::{
+    PreparedRecording, RecordingOptions, SmoothingMethod, StatePreparation,
+};
 use modelmill::runs::ReferenceFit;
 use modelmill::{Host, Model};
 use modelmill_identify::changes::NormalEquations;
@@ -112,7 +114,11 @@ impl FleetPlan {
     /// cannot be read are left out; [`Reference::recordings`] names the others.
     ///
     /// Fails where the model has no meaning, or none of the recordings can be read and evaluated.
-    pub fn from_recordings(model: &Path, reading: &RecordingOptions, reference: &[&Path]) -> Result<Self, FleetFault> {
+    pub fn from_recordings(
+        model: &Path,
+        reading: &RecordingOptions,
+        reference: &[&Path],
+    ) -> Result<Self, FleetFault> {
         let host = Host::new();
         let derived = host.model(model)?;
         let files = derived.loaded.sources.files.iter();
@@ -154,7 +160,11 @@ impl FleetPlan {
         plan.reference = FleetReference {
             recordings: recordings.iter().map(|one| one.file().to_owned()).collect(),
             values: ground.values().to_vec(),
-            sizes: ground.sizes().iter().map(ReferenceSums::from_moments).collect(),
+            sizes: ground
+                .sizes()
+                .iter()
+                .map(ReferenceSums::from_moments)
+                .collect(),
             still: standstill_shares(&derived, &recordings),
         };
         Ok(plan)
@@ -217,7 +227,12 @@ impl FleetPlan {
         }
         let host = Host::new().with_files(Arc::new(files));
         let model = host.model(&self.model)?;
-        let sizes: Option<Vec<NormalEquations>> = self.reference.sizes.iter().map(ReferenceSums::moments).collect();
+        let sizes: Option<Vec<NormalEquations>> = self
+            .reference
+            .sizes
+            .iter()
+            .map(ReferenceSums::moments)
+            .collect();
         let sizes = sizes.ok_or_else(|| {
             FleetFault::new("the plan's reference does not fit itself: its sums lack products; make it anew with `modelmill-fleet plan`")
         })?;
@@ -234,7 +249,10 @@ const DECIMATION_RATIO: f64 = 8.0;
 /// The preparation with nothing left open: the cut-off and decimation that suit the first recording, by the filter that all can be
 /// given alike. Where the first is best taken for a Fourier series, which others need not share, a low-pass well above its highest
 /// harmonic stands in.
-fn fixed_preparation(chosen: &PreparedRecording, reading: &RecordingOptions) -> Result<StatePreparation, FleetFault> {
+fn fixed_preparation(
+    chosen: &PreparedRecording,
+    reading: &RecordingOptions,
+) -> Result<StatePreparation, FleetFault> {
     let run = chosen
         .segments
         .first()
@@ -277,7 +295,10 @@ fn standstill_shares(model: &Model, recordings: &[PreparedRecording]) -> Vec<(St
     let names = model.active_coordinates().into_iter().chain(model.drives());
     names
         .map(|name| {
-            let of = |one: &PreparedRecording| one.raw_column(&name).map_or(0.0, FrozenReading::longest_share);
+            let of = |one: &PreparedRecording| {
+                one.raw_column(&name)
+                    .map_or(0.0, FrozenReading::longest_share)
+            };
             let most = recordings.iter().map(of).fold(0.0, f64::max);
             (name, most)
         })

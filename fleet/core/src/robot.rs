@@ -1,6 +1,6 @@
 //! The days of one robot: parameters over time, when something changed and stayed changed, and which sensors died.
 
-use modelmill::runs::{RunChange, FittedValue, ParameterStep};
+use modelmill::runs::{FittedValue, ParameterStep, RunChange};
 use modelmill_identify::changes::{NormalEquations, UncertainValue, weighted_mean};
 use serde_json::{Value, json};
 
@@ -70,7 +70,11 @@ pub struct RobotHistory {
 /// Looks at the days of a robot, which are in order of time, each with the summary of its recordings.
 ///
 /// Fails where summaries are of another plan.
-pub fn robot_history(ground: &FleetModel, name: &str, days: &[(String, FleetSummary)]) -> Result<RobotHistory, FleetFault> {
+pub fn robot_history(
+    ground: &FleetModel,
+    name: &str,
+    days: &[(String, FleetSummary)],
+) -> Result<RobotHistory, FleetFault> {
     for (_, summary) in days {
         ground.check_plan(summary)?;
     }
@@ -159,7 +163,9 @@ fn clearest_change(ground: &FleetModel, runs: &[DayRun], within: f64) -> Option<
     let parameters = runs.first()?.0.len();
     let onsets = (0..parameters).filter_map(|k| Some((k, clearest_onset(&series(k))?)));
     let (_, found) = onsets.max_by(|a, b| a.1.gain.total_cmp(&b.1.gain))?;
-    let sums = |some: &[DayRun]| -> Vec<NormalEquations> { some.iter().map(|run| run.1.clone()).collect() };
+    let sums = |some: &[DayRun]| -> Vec<NormalEquations> {
+        some.iter().map(|run| run.1.clone()).collect()
+    };
     let (before, later) = runs.split_at(found.day);
     let changes = ground.common.changes(&sums(before), &sums(later), within);
     if changes.is_empty() {

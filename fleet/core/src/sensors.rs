@@ -82,7 +82,8 @@ pub(crate) fn sensor_faults(
                 let of = &values[within.clone()];
                 other != k
                     && !is_force
-                    && FrozenReading::from_values(of).samples as f64 / of.len().max(1) as f64 <= usual + FROZEN_MARGIN
+                    && FrozenReading::from_values(of).samples as f64 / of.len().max(1) as f64
+                        <= usual + FROZEN_MARGIN
             });
         if moves {
             faults.push(SensorFault {

@@ -11,7 +11,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use modelmill_fleet::FleetFault;
-use modelmill_rig::{RigBody, SensorChannel, GaussianNoise, RigState, RigTracker, forces};
+use modelmill_rig::{GaussianNoise, RigBody, RigState, RigTracker, SensorChannel, forces};
 use nalgebra::{Matrix3, Vector3};
 use parquet::basic::{Compression, Repetition, Type as Physical};
 use parquet::data_type::{DoubleType, FloatType};

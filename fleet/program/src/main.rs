@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use modelmill::recording::{StatePreparation, RecordingOptions};
+use modelmill::recording::{RecordingOptions, StatePreparation};
 use modelmill_fleet::{FleetFault, folder};
 use modelmill_fleet_program::{generate, identify, score};
 
@@ -184,8 +184,11 @@ fn run(command: FleetCommand) -> Result<String, FleetFault> {
         FleetCommand::Plan(args) => {
             let reference: Vec<&std::path::Path> =
                 args.reference.iter().map(PathBuf::as_path).collect();
-            let plan =
-                modelmill_fleet::FleetPlan::from_recordings(&args.model, &args.reading.reading()?, &reference)?;
+            let plan = modelmill_fleet::FleetPlan::from_recordings(
+                &args.model,
+                &args.reading.reading()?,
+                &reference,
+            )?;
             folder::write_atomic(&args.out, plan.json().as_bytes())?;
             Ok(format!(
                 "{} from {} reference recordings: cut-off {} Hz, one in {} samples kept\n",

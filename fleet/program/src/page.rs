@@ -17,7 +17,8 @@ const MOST_PICTURED: usize = 60;
 pub(crate) fn page(found: &FleetResults) -> String {
     let title = format!("A fleet of {} robots", found.robots.len());
     let mut page = begin_page(&title);
-    let is_quiet = found.outliers.found.is_empty() && found.robots.iter().all(RobotHistory::is_quiet);
+    let is_quiet =
+        found.outliers.found.is_empty() && found.robots.iter().all(RobotHistory::is_quiet);
     let class = if is_quiet { "adequate" } else { "missing" };
     let _ = writeln!(
         page,
@@ -32,8 +33,16 @@ pub(crate) fn page(found: &FleetResults) -> String {
             outlier_table(found),
         ),
         ("sensors", "Sensors that died", dead_sensor_table(found)),
-        ("usual", "What is usual in this fleet", usual_values_table(found)),
-        ("bad", "Recordings that gave no answer", bad_recordings_table(found)),
+        (
+            "usual",
+            "What is usual in this fleet",
+            usual_values_table(found),
+        ),
+        (
+            "bad",
+            "Recordings that gave no answer",
+            bad_recordings_table(found),
+        ),
     ];
     for (id, title, html) in sections {
         let _ = write!(
@@ -69,7 +78,9 @@ fn change_list(changes: &[RunChange]) -> String {
 fn change_clarity(robot: &RobotHistory) -> f64 {
     let steps = robot.changes.iter().flat_map(|since| &since.steps);
     steps
-        .map(|step| (step.now.value - step.before.value).abs() / step.before.difference_deviation(step.now))
+        .map(|step| {
+            (step.now.value - step.before.value).abs() / step.before.difference_deviation(step.now)
+        })
         .filter(|x| x.is_finite())
         .fold(0.0, f64::max)
 }

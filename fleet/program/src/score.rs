@@ -15,7 +15,8 @@ fn read(path: &Path) -> Result<Value, FleetFault> {
             path.display()
         ))
     })?;
-    serde_json::from_str(&text).map_err(|error| FleetFault::new(format!("{}: {error}", path.display())))
+    serde_json::from_str(&text)
+        .map_err(|error| FleetFault::new(format!("{}: {error}", path.display())))
 }
 
 /// How many of a kind there are, how many were found, and with their day within a day.

@@ -56,9 +56,16 @@ impl Fleet {
 
     fn ground(&self) -> FleetModel {
         let first = self.at("recordings/robot=R00000/day=2026-03-01/recording=0/data.parquet");
-        let plan =
-            FleetPlan::from_recordings(&self.at("model.toml"), &RecordingOptions::default(), &[&first]).expect("a plan");
-        assert_eq!(FleetPlan::parse("the plan", &plan.json()).expect("a plan"), plan);
+        let plan = FleetPlan::from_recordings(
+            &self.at("model.toml"),
+            &RecordingOptions::default(),
+            &[&first],
+        )
+        .expect("a plan");
+        assert_eq!(
+            FleetPlan::parse("the plan", &plan.json()).expect("a plan"),
+            plan
+        );
         plan.derive_model().expect("a ground")
     }
 }
@@ -182,7 +189,10 @@ fn summaries_add_in_any_order_and_samples_come_in_any() {
     assert_ne!(shuffled, columns);
     let [a, b] = [columns, shuffled].map(|columns| ground.summarise("one", columns));
     assert_eq!(a, b);
-    assert_eq!((a.recordings, &a.all_columns), (1, &summaries[3].all_columns));
+    assert_eq!(
+        (a.recordings, &a.all_columns),
+        (1, &summaries[3].all_columns)
+    );
 }
 
 #[test]

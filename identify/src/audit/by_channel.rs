@@ -29,7 +29,10 @@ impl ChannelRegressor {
             let rows = DMatrix::from_fn(samples, which.len(), |i, k| {
                 regressor[(i * channels + c, which[k])]
             });
-            ChannelRows { column_indices: which, rows }
+            ChannelRows {
+                column_indices: which,
+                rows,
+            }
         };
         Self {
             columns: regressor.ncols(),
@@ -82,7 +85,10 @@ impl ChannelRegressor {
             for i in 0..rows.nrows() {
                 rows[(i, own)] = of[i * n + c];
             }
-            ChannelRows { column_indices: which, rows }
+            ChannelRows {
+                column_indices: which,
+                rows,
+            }
         });
         Self {
             channels: channels.collect(),
@@ -112,7 +118,11 @@ impl ChannelRegressor {
         let mut result = DVector::zeros(self.columns);
         for (c, channel) in self.channels.iter().enumerate() {
             let own = DVector::from_fn(channel.rows.nrows(), |i, _| of[i * n + c]);
-            for (k, column) in channel.column_indices.iter().zip(channel.rows.column_iter()) {
+            for (k, column) in channel
+                .column_indices
+                .iter()
+                .zip(channel.rows.column_iter())
+            {
                 result[*k] += column.dot(&own);
             }
         }
@@ -203,7 +213,11 @@ mod tests {
         let weights = DVector::from_fn(n * samples, |_, _| noise.normal().abs());
         let measured = DVector::from_fn(n * samples, |_, _| noise.normal());
         let rows = ChannelRegressor::new(&whole, n);
-        assert!(rows.channels.iter().all(|c| c.column_indices.len() < columns));
+        assert!(
+            rows.channels
+                .iter()
+                .all(|c| c.column_indices.len() < columns)
+        );
         let values = DVector::from_fn(columns, |_, _| noise.normal());
         let close = |a: &DMatrix<f64>, b: &DMatrix<f64>| (a - b).amax() < 1e-12;
         let column = |v: DVector<f64>| DMatrix::from_column_slice(v.len(), 1, v.as_slice());

@@ -32,7 +32,10 @@ impl SignalRecording {
         let Ok(time) = self.column("t") else {
             return Vec::new();
         };
-        let mut notes: Vec<RecordingNote> = self.clock_error_note(time, coordinates).into_iter().collect();
+        let mut notes: Vec<RecordingNote> = self
+            .clock_error_note(time, coordinates)
+            .into_iter()
+            .collect();
         notes.extend(self.repeated_samples_note(time, coordinates));
         notes
     }

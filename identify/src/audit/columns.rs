@@ -149,7 +149,11 @@ impl SignalRecording {
 
     /// Rates and accelerations that are not the derivatives of what stands beside them, one note for each
     /// explanation; and whether there were any rates that are.
-    fn rate_mismatch_notes(&self, coordinates: &[(String, bool)], time: &[f64]) -> (Vec<RecordingNote>, bool) {
+    fn rate_mismatch_notes(
+        &self,
+        coordinates: &[(String, bool)],
+        time: &[f64],
+    ) -> (Vec<RecordingNote>, bool) {
         let mut found: Vec<(Message, Vec<String>, Vec<String>, f64)> = Vec::new();
         let mut settled = false;
         for (name, is_angle) in coordinates {
@@ -298,7 +302,7 @@ mod tests {
 
     use super::*;
     use crate::test_noise::TestNoise;
-    use crate::{StatePreparation, ReadOptions};
+    use crate::{ReadOptions, StatePreparation};
 
     /// A recording of one angle with its rate, each number by its own function of the time.
     fn recording(
@@ -394,7 +398,8 @@ mod tests {
     fn a_wrapped_angle_is_named_with_its_line() {
         let wrap = |t: f64| (0.8 * t + PI).rem_euclid(2.0 * PI) - PI;
         let wrapped = recording(4000, |t| t, wrap, |_| 0.8);
-        let notes = wrapped.suspicious_columns(&[("q".to_owned(), true)], DerivativeSource::Positions);
+        let notes =
+            wrapped.suspicious_columns(&[("q".to_owned(), true)], DerivativeSource::Positions);
         assert!(
             notes.len() == 1
                 && notes[0].says.in_library_words().contains("jumps by 2 pi")

@@ -87,7 +87,9 @@ impl ForceDelays {
         let mut starts = vec![vec![0.0; channels]];
         starts.push(vec![audit.coarse_shift(&all, &now.residuals)?; channels]);
         if channels > 1 {
-            let each = all.iter().map(|c| audit.coarse_shift(&[*c], &now.residuals));
+            let each = all
+                .iter()
+                .map(|c| audit.coarse_shift(&[*c], &now.residuals));
             starts.push(each.map(Option::unwrap_or_default).collect());
         }
         starts.dedup_by(|a, b| a.iter().zip(b).all(|(a, b)| (*a - *b).abs() < 0.5 * step));
@@ -125,7 +127,10 @@ impl DelayAudit<'_> {
     }
 
     /// The forces of some channels at times later by a shift of each, and rows that count; the forces of others are zero.
-    fn shift_forces(&self, shifts: impl Iterator<Item = (usize, f64)>) -> (DVector<f64>, Vec<bool>) {
+    fn shift_forces(
+        &self,
+        shifts: impl Iterator<Item = (usize, f64)>,
+    ) -> (DVector<f64>, Vec<bool>) {
         let channels = self.forces.len();
         let mut forces = DVector::zeros(self.used_rows.len());
         let mut counts = self.used_rows.clone();
@@ -172,7 +177,9 @@ impl DelayAudit<'_> {
             (left[c] * size).max(f64::MIN_POSITIVE.sqrt()).recip()
         };
         let weights: Vec<f64> = (0..n).map(weight).collect();
-        let (mut weighted, rows) = self.regressor.dense_rows(channels, &self.used_rows, &weights);
+        let (mut weighted, rows) = self
+            .regressor
+            .dense_rows(channels, &self.used_rows, &weights);
         for mut column in weighted.column_iter_mut() {
             let norm = column.norm();
             if norm > 0.0 {
@@ -240,7 +247,9 @@ impl DelayAudit<'_> {
             let further: Vec<f64> = (0..channels)
                 .map(|c| fit.values[width + c % delays])
                 .collect();
-            let is_near = further.iter().all(|f| f.abs() < WHOLE_STEP_TOLERANCE * step);
+            let is_near = further
+                .iter()
+                .all(|f| f.abs() < WHOLE_STEP_TOLERANCE * step);
             if (is_near && round > 0) || round + 1 == ROUNDS {
                 let widths = Self::half_widths(&columns, &fit, &forces, delays)?;
                 let of = |c: usize| DelayEstimate {
@@ -251,7 +260,9 @@ impl DelayAudit<'_> {
                 return Some(self.evaluate_fit(&fit, &forces, &counts, found));
             }
             for (shift, further) in shifts.iter_mut().zip(&further) {
-                let steps = (further / step).clamp(-MAX_ROUND_STEPS, MAX_ROUND_STEPS).round();
+                let steps = (further / step)
+                    .clamp(-MAX_ROUND_STEPS, MAX_ROUND_STEPS)
+                    .round();
                 *shift = (*shift + steps * step).clamp(-self.max_delay, self.max_delay);
             }
             (forces, counts) = self.shift_all_forces(&shifts);

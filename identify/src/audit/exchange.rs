@@ -113,8 +113,11 @@ mod tests {
     #[test]
     fn exchanged_and_turned_forces_are_found() {
         let (samples, forces) = forces();
-        let explained =
-            ForceAudit::new(ChannelRegressor::new(&rows(|k| k as f64 * 0.002, &samples), 2)).unwrap();
+        let explained = ForceAudit::new(ChannelRegressor::new(
+            &rows(|k| k as f64 * 0.002, &samples),
+            2,
+        ))
+        .unwrap();
         let interleaved = |channels: [&Vec<f64>; 2], sign: f64| {
             let rows = samples
                 .iter()

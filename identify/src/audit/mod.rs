@@ -11,7 +11,7 @@ mod robust;
 mod signals;
 
 pub use by_channel::ChannelRegressor;
-pub use delay::{DelayEstimate, DelayAudit, ForceDelays};
+pub use delay::{DelayAudit, DelayEstimate, ForceDelays};
 pub use exchange::{ForceAudit, WiringFault};
 pub use positions::PositionFault;
 pub use robust::{RobustFit, robust_fit};

@@ -180,7 +180,9 @@ fn backlash_width(time: &[f64], q: &[f64]) -> Option<f64> {
         let about = (i - JUMP_NEIGHBOURS..=i + JUMP_NEIGHBOURS).filter(|k| *k != i);
         2.0 * fit_cubic(about.map(|k| (time[k] - time[i], q[k] - q[i])), 1.0)[0]
     };
-    let jumps: Vec<f64> = (JUMP_NEIGHBOURS..q.len() - JUMP_NEIGHBOURS).map(jump).collect();
+    let jumps: Vec<f64> = (JUMP_NEIGHBOURS..q.len() - JUMP_NEIGHBOURS)
+        .map(jump)
+        .collect();
     let noise = 1.4826 * median(jumps.iter().map(|x| x.abs()).collect());
     let mut found: Vec<f64> = Vec::new();
     for (i, own) in jumps.iter().enumerate() {

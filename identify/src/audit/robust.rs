@@ -63,7 +63,8 @@ pub fn robust_fit(
         if weights.iter().all(|weight| *weight == 0.0) {
             return None;
         }
-        let (normal, right) = regressor.normal_equations(&weights, measured, 0..regressor.samples());
+        let (normal, right) =
+            regressor.normal_equations(&weights, measured, 0..regressor.samples());
         let values = solve_normal(normal, &right)?;
         rest = measured - regressor.multiply(values.as_slice());
         found = Some(values);
@@ -85,7 +86,9 @@ pub(super) fn solve_normal(normal: DMatrix<f64>, right: &DVector<f64>) -> Option
 }
 
 /// Normal equations of columns scaled to one, with a trace of a ridge: their factor and the scales.
-pub(super) fn factor_normal(mut normal: DMatrix<f64>) -> Option<(Cholesky<f64, Dyn>, DVector<f64>)> {
+pub(super) fn factor_normal(
+    mut normal: DMatrix<f64>,
+) -> Option<(Cholesky<f64, Dyn>, DVector<f64>)> {
     let scale = normal
         .diagonal()
         .map(|x| if x > 0.0 { x.sqrt().recip() } else { 0.0 });

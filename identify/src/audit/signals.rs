@@ -29,7 +29,11 @@ const SHARP: f64 = 0.01;
 impl SignalRecording {
     /// Warnings about single signals. `coordinates` are `(name, whether it is an angle)`; columns that cannot be used
     /// are passed over.
-    pub fn signal_notes(&self, coordinates: &[(String, bool)], drives: &[String]) -> Vec<RecordingNote> {
+    pub fn signal_notes(
+        &self,
+        coordinates: &[(String, bool)],
+        drives: &[String],
+    ) -> Vec<RecordingNote> {
         let positions: Vec<&[f64]> = coordinates
             .iter()
             .filter_map(|(name, _)| self.column(name).ok())
@@ -48,7 +52,8 @@ impl SignalRecording {
             };
             notes.extend(self.slow_update_note(drive, force));
             let saturated = self.saturation_note(drive, force, &positions);
-            notes.extend(saturated.or_else(|| self.noisy_saturation_note(drive, force, &positions)));
+            notes
+                .extend(saturated.or_else(|| self.noisy_saturation_note(drive, force, &positions)));
         }
         notes
     }
@@ -96,7 +101,12 @@ impl SignalRecording {
     }
 
     /// A force that stays at a limit but for noise, although it comes to it and leaves it at a slope.
-    fn noisy_saturation_note(&self, name: &str, force: &[f64], positions: &[&[f64]]) -> Option<RecordingNote> {
+    fn noisy_saturation_note(
+        &self,
+        name: &str,
+        force: &[f64],
+        positions: &[&[f64]],
+    ) -> Option<RecordingNote> {
         let n = force.len();
         if n < 20 * FEWEST_AT_LIMIT {
             return None;
@@ -166,7 +176,12 @@ impl SignalRecording {
     }
 
     /// A force that stays exactly at its largest or smallest value while something moves.
-    fn saturation_note(&self, name: &str, force: &[f64], positions: &[&[f64]]) -> Option<RecordingNote> {
+    fn saturation_note(
+        &self,
+        name: &str,
+        force: &[f64],
+        positions: &[&[f64]],
+    ) -> Option<RecordingNote> {
         let low = force.iter().copied().fold(f64::INFINITY, f64::min);
         let high = force.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         if low >= high {
@@ -281,7 +296,8 @@ mod tests {
             let _ = writeln!(text, "{t},{},{}", q(t), force(t));
         }
         let recording =
-            SignalRecording::from_reader(text.as_bytes(), "run.csv", &ReadOptions::default()).unwrap();
+            SignalRecording::from_reader(text.as_bytes(), "run.csv", &ReadOptions::default())
+                .unwrap();
         let notes = recording.signal_notes(&[("q".to_owned(), true)], &["motor".to_owned()]);
         let says = notes.iter().map(|note| note.says.in_library_words());
         says.collect()
@@ -357,7 +373,8 @@ mod tests {
             }
             let recording =
                 SignalRecording::from_bytes(text.as_bytes(), "run.csv", &ReadOptions::default());
-            Remedy::options(recording.unwrap().degree_conversion_options("q")).spell(&LibrarySpelling)
+            Remedy::options(recording.unwrap().degree_conversion_options("q"))
+                .spell(&LibrarySpelling)
         };
         assert_eq!(
             of(1.0),

@@ -112,9 +112,17 @@ mod tests {
     fn white_noise_and_nothing_have_no_memory() {
         let mut noise = TestNoise::new(9);
         let white: Vec<f64> = (0..5_000).map(|_| noise.normal()).collect();
-        assert!(AutoregressiveNoise::from_residual(&[&white], 0.0).coefficients.len() < 3);
+        assert!(
+            AutoregressiveNoise::from_residual(&[&white], 0.0)
+                .coefficients
+                .len()
+                < 3
+        );
         let nothing = AutoregressiveNoise::from_residual(&[&[0.0; 100]], 0.0);
-        assert_eq!((nothing.coefficients.len(), nothing.standard_deviation), (0, 0.0));
+        assert_eq!(
+            (nothing.coefficients.len(), nothing.standard_deviation),
+            (0, 0.0)
+        );
         // A wave is foreseen without an error, but not below the floor.
         let wave: Vec<f64> = (0..5_000).map(|i| (0.1 * f64::from(i)).sin()).collect();
         assert!(AutoregressiveNoise::from_residual(&[&wave], 0.0).standard_deviation < 0.01);

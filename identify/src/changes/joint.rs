@@ -64,7 +64,9 @@ pub fn fit_jointly(parts: &[JointRun], shared: &[usize], scaled: bool) -> JointF
         for _ in 0..STEPS {
             step = GaussNewtonStep::new(parts, shared, &at, true);
             let tried = [1.0, 0.5, 0.25, 0.1, 0.01].map(|part| step.apply_step(&at, part));
-            let rest = |point: &JointIterate| GaussNewtonStep::new(parts, shared, point, true).squares_before;
+            let rest = |point: &JointIterate| {
+                GaussNewtonStep::new(parts, shared, point, true).squares_before
+            };
             let best = tried.into_iter().find_map(|point| {
                 let left = rest(&point);
                 (left < step.squares_before).then_some((left, point))
@@ -146,11 +148,15 @@ impl GaussNewtonStep {
 
     fn result(&self, at: &JointIterate) -> JointFit {
         let scales = at.scales.iter().filter(|_| self.scaled);
-        let own = at.own.iter().zip(&self.own).map(|(values, one)| JointValues {
-            values: values.clone(),
-            covariance: self.noise * one.covariance(&self.solution.covariance),
-            determined: one.determined_flags(&self.solution.determined),
-        });
+        let own = at
+            .own
+            .iter()
+            .zip(&self.own)
+            .map(|(values, one)| JointValues {
+                values: values.clone(),
+                covariance: self.noise * one.covariance(&self.solution.covariance),
+                determined: one.determined_flags(&self.solution.determined),
+            });
         JointFit {
             shared: JointValues {
                 values: DVector::from_iterator(
@@ -166,7 +172,13 @@ impl GaussNewtonStep {
 }
 
 /// The linear problem of one run around a point: columns of its own values, of shared ones, and of scales.
-fn linearise_run(part: &JointRun, shared: &[usize], at: &JointIterate, own: &DVector<f64>, scaled: bool) -> NormalEquations {
+fn linearise_run(
+    part: &JointRun,
+    shared: &[usize],
+    at: &JointIterate,
+    own: &DVector<f64>,
+    scaled: bool,
+) -> NormalEquations {
     let columns: Vec<usize> = part.own.iter().chain(shared).copied().collect();
     let n = columns.len();
     let mut all = NormalEquations::new(n + if scaled { at.scales.len() } else { 0 });
@@ -210,7 +222,12 @@ mod tests {
     use crate::test_noise::TestNoise;
 
     /// Two channels, two shared columns and one that is a run's own; forces times a scale of each channel.
-    fn part(noise: &mut TestNoise, shared: [f64; 2], own: f64, scales: [f64; 2]) -> Vec<NormalEquations> {
+    fn part(
+        noise: &mut TestNoise,
+        shared: [f64; 2],
+        own: f64,
+        scales: [f64; 2],
+    ) -> Vec<NormalEquations> {
         let channel = |scale: f64| {
             let z: Vec<Vec<f64>> = (0..3)
                 .map(|_| (0..300).map(|_| noise.normal()).collect())

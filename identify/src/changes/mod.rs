@@ -24,5 +24,8 @@ mod segments;
 pub use coloured::AutoregressiveNoise;
 pub use joint::{JointFit, JointRun, JointValues, fit_jointly};
 pub use moments::{NormalEquations, NormalSolution};
-pub use search::{PossibleChange, SelectedChange, RunPair, ChangeHypotheses, fit_single_change, single_change_gains, search_changes, within_run_spread};
-pub use segments::{UncertainValue, weighted_mean, change_points};
+pub use search::{
+    ChangeHypotheses, PossibleChange, RunPair, SelectedChange, fit_single_change, search_changes,
+    single_change_gains, within_run_spread,
+};
+pub use segments::{UncertainValue, change_points, weighted_mean};

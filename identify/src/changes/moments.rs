@@ -134,7 +134,13 @@ impl NormalEquations {
             total: table[(n, n)].max(0.0),
             rows: self.rows,
         };
-        let of = |i: usize, x: f64| if kept[i] { divide_by_scale(x, scale[i]) } else { 0.0 };
+        let of = |i: usize, x: f64| {
+            if kept[i] {
+                divide_by_scale(x, scale[i])
+            } else {
+                0.0
+            }
+        };
         let eliminated = EliminatedValues {
             offset: DVector::from_fn(first, |i, _| of(i, table[(i, n)])),
             coefficients: DMatrix::from_fn(first, others, |i, j| {
@@ -149,13 +155,18 @@ impl NormalEquations {
             }),
             determined: (0..first)
                 .map(|i| {
-                    let is_free =
-                        |k: usize| kept[k] || scale[k] == 0.0 || table[(k, i)].abs() < WEAK_DEPENDENCE;
+                    let is_free = |k: usize| {
+                        kept[k] || scale[k] == 0.0 || table[(k, i)].abs() < WEAK_DEPENDENCE
+                    };
                     kept[i] && (0..first).all(is_free)
                 })
                 .collect(),
             depends_on: (0..first)
-                .map(|i| (first..n).map(|j| table[(i, j)].abs() > WEAK_DEPENDENCE).collect())
+                .map(|i| {
+                    (first..n)
+                        .map(|j| table[(i, j)].abs() > WEAK_DEPENDENCE)
+                        .collect()
+                })
                 .collect(),
             rank: kept.iter().filter(|kept| **kept).count(),
         };
@@ -181,10 +192,18 @@ impl NormalEquations {
         let n = self.rhs.len();
         let (mut table, scale) = self.scaled_equations();
         let kept: Vec<bool> = (0..n).map(|k| sweep(&mut table, k)).collect();
-        let value = |x: f64, i: usize| if kept[i] { divide_by_scale(x, scale[i]) } else { 0.0 };
+        let value = |x: f64, i: usize| {
+            if kept[i] {
+                divide_by_scale(x, scale[i])
+            } else {
+                0.0
+            }
+        };
         // A column that was held is a combination of kept ones, which therefore are not determined.
         let determined = |i: usize| {
-            kept[i] && (0..n).all(|k| kept[k] || scale[k] == 0.0 || table[(k, i)].abs() < WEAK_DEPENDENCE)
+            kept[i]
+                && (0..n)
+                    .all(|k| kept[k] || scale[k] == 0.0 || table[(k, i)].abs() < WEAK_DEPENDENCE)
         };
         NormalSolution {
             values: DVector::from_fn(n, |i, _| value(table[(i, n)], i)),

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::changes::moments::{SchurComplement, NormalEquations, NormalSolution};
+use crate::changes::moments::{NormalEquations, NormalSolution, SchurComplement};
 
 /// How many times the logarithm of the number of rows a value must gain: 1 is Schwarz' criterion, which holds for white noise;
 /// what is left of real runs is never quite white.
@@ -92,7 +92,10 @@ pub fn search_changes(runs: &RunPair, search: &ChangeHypotheses) -> Vec<Selected
     }) {
         chosen.remove(at);
     }
-    let mut found: Vec<SelectedChange> = chosen.iter().map(|g| bench.build_change(&chosen, *g)).collect();
+    let mut found: Vec<SelectedChange> = chosen
+        .iter()
+        .map(|g| bench.build_change(&chosen, *g))
+        .collect();
     found.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     found
 }
@@ -107,7 +110,11 @@ pub fn single_change_gains(runs: &RunPair, search: &ChangeHypotheses) -> Vec<f64
 }
 
 /// One change with no other beside it, whatever it explains.
-pub fn fit_single_change(runs: &RunPair, search: &ChangeHypotheses, which: usize) -> SelectedChange {
+pub fn fit_single_change(
+    runs: &RunPair,
+    search: &ChangeHypotheses,
+    which: usize,
+) -> SelectedChange {
     ChangeSelector::new(runs, search).build_change(&[which], which)
 }
 
@@ -136,8 +143,8 @@ pub fn within_run_spread(blocks: &[NormalEquations], search: &ChangeHypotheses) 
         }
         let bench = ChangeSelector::new(&runs, search);
         for (g, candidate) in search.changes.iter().enumerate() {
-            let beyond =
-                bench.squares_gain(&[], g) - chance_gain(candidate.columns.len(), search.changes.len());
+            let beyond = bench.squares_gain(&[], g)
+                - chance_gain(candidate.columns.len(), search.changes.len());
             most = most.max(beyond * bench.noise / worth);
         }
     }
@@ -182,7 +189,11 @@ fn remove_index(chosen: &[usize], one: usize) -> Vec<usize> {
 }
 
 /// Rows of both runs together: the shared columns, and behind them those of changes, which are the later run's alone.
-fn stack_runs([reference, later]: [&NormalEquations; 2], shared: &[usize], columns: &[usize]) -> NormalEquations {
+fn stack_runs(
+    [reference, later]: [&NormalEquations; 2],
+    shared: &[usize],
+    columns: &[usize],
+) -> NormalEquations {
     let mut all = later.select_columns(columns);
     let reference = reference.select_columns(shared);
     let n = shared.len();
@@ -215,7 +226,10 @@ struct ChangeSelector<'a> {
 
 impl<'a> ChangeSelector<'a> {
     fn new(runs: &'a RunPair, search: &'a ChangeHypotheses) -> Self {
-        let sums = [sum_except(&runs.reference, None), sum_except(&runs.later, None)];
+        let sums = [
+            sum_except(&runs.reference, None),
+            sum_except(&runs.later, None),
+        ];
         let mut all = sums[0].select_columns(&search.shared);
         all.merge(&sums[1].select_columns(&search.shared));
         let telling = all.solve().independent;
@@ -229,7 +243,8 @@ impl<'a> ChangeSelector<'a> {
             .iter()
             .chain(search.changes.iter().flat_map(|one| &one.columns));
         let everything: Vec<usize> = everything.copied().collect();
-        let beside = stack_runs(sums.each_ref(), &shared, &everything).schur_complement(shared.len());
+        let beside =
+            stack_runs(sums.each_ref(), &shared, &everything).schur_complement(shared.len());
         let mut starts = vec![0];
         for candidate in &search.changes {
             starts.push(starts[starts.len() - 1] + candidate.columns.len());
@@ -247,7 +262,8 @@ impl<'a> ChangeSelector<'a> {
             starts,
             noise,
             value_price: STRICTER * rows.max(2.0).ln(),
-            min_gain: (MIN_SPREAD_RATIO * runs.within_run_spread * worth / noise).max(MIN_SIGNIFICANCE * MIN_SIGNIFICANCE),
+            min_gain: (MIN_SPREAD_RATIO * runs.within_run_spread * worth / noise)
+                .max(MIN_SIGNIFICANCE * MIN_SIGNIFICANCE),
             sums,
         }
     }
@@ -268,12 +284,17 @@ impl<'a> ChangeSelector<'a> {
         let columns = chosen
             .iter()
             .flat_map(|g| self.starts[*g]..self.starts[*g + 1]);
-        let (rest, kept) = self.complement.residual_squares(&columns.collect::<Vec<usize>>());
+        let (rest, kept) = self
+            .complement
+            .residual_squares(&columns.collect::<Vec<usize>>());
         let mut kept = kept.into_iter();
         let charged = chosen.iter().map(|g| {
             let candidate = &self.search.changes[*g];
             let own = kept.by_ref().take(candidate.columns.len());
-            own.filter(|kept| *kept).count().min(candidate.max_charged_values) as f64 + candidate.rarity
+            own.filter(|kept| *kept)
+                .count()
+                .min(candidate.max_charged_values) as f64
+                + candidate.rarity
         });
         let charged = charged.sum();
         (rest / self.noise, charged)
@@ -281,7 +302,8 @@ impl<'a> ChangeSelector<'a> {
 
     /// By how much a further change lowers the sum of squares, over the variance of the noise.
     fn squares_gain(&self, chosen: &[usize], further: usize) -> f64 {
-        self.residual_and_charges(chosen).0 - self.residual_and_charges(&add_index(chosen, further)).0
+        self.residual_and_charges(chosen).0
+            - self.residual_and_charges(&add_index(chosen, further)).0
     }
 
     /// What some changes leave, with a price on each value.

@@ -1,8 +1,8 @@
 //! What a recording cannot tell apart: effects that, put in place of a found one, explain it as well.
 
-use super::bench::{EffectSelector, SelectedEffect, ScoredEffectSet, n_columns};
+use super::bench::{EffectSelector, ScoredEffectSet, SelectedEffect, n_columns};
 use super::beside::ConditioningSet;
-use super::problem::{LocatedEffect, ColumnSource};
+use super::problem::{ColumnSource, LocatedEffect};
 
 /// How much worse (twice the logarithm of the likelihood, with the samples that the residual is worth) a set may be and
 /// still not be told from the best.
@@ -46,14 +46,16 @@ impl EffectSelector<'_> {
             let worth = self.effective_equations(&rest, &channels);
             let table = self.projected_gram(picks);
             // How much worse a set is in place of the found one, if it may stand for what the found one adds to `fewer`.
-            let in_place = |bench: &Self, fewer: &[SelectedEffect], trial: &ScoredEffectSet| -> Option<f64> {
-                let left = bench.fit_from_gram(&table, fewer.to_vec()).squares;
-                let worse = worth * (trial.squares / squares.max(f64::MIN_POSITIVE)).ln();
-                // What takes nothing off cannot be stood in for.
-                let own = left - squares;
-                let stands_in = own > NEGLIGIBLE_SHARE * left && left - trial.squares > MIN_SUBSTITUTE_SHARE * own;
-                (worse < MIN_DISTINCTION && stands_in && trial.is_possible()).then_some(worse)
-            };
+            let in_place =
+                |bench: &Self, fewer: &[SelectedEffect], trial: &ScoredEffectSet| -> Option<f64> {
+                    let left = bench.fit_from_gram(&table, fewer.to_vec()).squares;
+                    let worse = worth * (trial.squares / squares.max(f64::MIN_POSITIVE)).ln();
+                    // What takes nothing off cannot be stood in for.
+                    let own = left - squares;
+                    let stands_in = own > NEGLIGIBLE_SHARE * left
+                        && left - trial.squares > MIN_SUBSTITUTE_SHARE * own;
+                    (worse < MIN_DISTINCTION && stands_in && trial.is_possible()).then_some(worse)
+                };
             let mut found: Vec<EffectAlias> = Vec::new();
             for candidate in self.current_choices.clone().iter().flatten() {
                 if picks.iter().any(|p| p.candidate == candidate.candidate) {
@@ -72,7 +74,9 @@ impl EffectSelector<'_> {
                     continue; // It holds the found one and more, so that nothing speaks for it.
                 }
                 // A curve that is bent by a constant of its own comes near to any that is not.
-                if self.candidate(candidate).searched_constants > self.candidate(&pick).searched_constants {
+                if self.candidate(candidate).searched_constants
+                    > self.candidate(&pick).searched_constants
+                {
                     continue;
                 }
                 let mut set = others.clone();
@@ -156,9 +160,17 @@ impl EffectSelector<'_> {
     }
 
     /// A set with a wrong reading or a further body that comes near to what is found, by columns of its own size.
-    fn refit_at_size(&mut self, candidate: &SelectedEffect, tried: ScoredEffectSet, squares: f64) -> ScoredEffectSet {
+    fn refit_at_size(
+        &mut self,
+        candidate: &SelectedEffect,
+        tried: ScoredEffectSet,
+        squares: f64,
+    ) -> ScoredEffectSet {
         let source = &self.candidate(candidate).source;
-        let is_sized = matches!(source, ColumnSource::ReadingFault(_) | ColumnSource::Body(_));
+        let is_sized = matches!(
+            source,
+            ColumnSource::ReadingFault(_) | ColumnSource::Body(_)
+        );
         if !is_sized || tried.squares > CLOSE * squares {
             return tried;
         }
@@ -178,7 +190,12 @@ impl EffectSelector<'_> {
     }
 
     /// Whether all columns of one effect lie in the span of a set and another one.
-    pub(crate) fn is_in_conditional_span(&self, one: &SelectedEffect, other: &SelectedEffect, beside: &ConditioningSet) -> bool {
+    pub(crate) fn is_in_conditional_span(
+        &self,
+        one: &SelectedEffect,
+        other: &SelectedEffect,
+        beside: &ConditioningSet,
+    ) -> bool {
         if one.columns == other.columns {
             return true;
         }

@@ -9,8 +9,11 @@ use super::beside::ConditioningSet;
 use super::column::ForceColumn;
 use super::factored::GramFactor;
 use super::noise::effective_samples;
-use super::pool::{FitScope, ColumnPool, dot, solve_gram};
-use super::problem::{CandidateEffect, ColumnChoice, EffectParameter, DiagnosisProblem, SignConstraint, ColumnSource, ColumnProvider};
+use super::pool::{ColumnPool, FitScope, dot, solve_gram};
+use super::problem::{
+    CandidateEffect, ColumnChoice, ColumnProvider, ColumnSource, DiagnosisProblem, EffectParameter,
+    SignConstraint,
+};
 
 /// If an estimate of the wrong sign takes off less than this share of the squared error, the sign is chance.
 const SIGN_IS_CHANCE: f64 = 0.05;
@@ -83,7 +86,8 @@ pub(crate) struct EffectSelector<'a> {
 
 impl<'a> EffectSelector<'a> {
     pub(crate) fn new(problem: &'a DiagnosisProblem, supply: &'a dyn ColumnProvider) -> Self {
-        let mut pool = ColumnPool::new(&problem.layout).exclude_samples(&problem.undecided_samples());
+        let mut pool =
+            ColumnPool::new(&problem.layout).exclude_samples(&problem.undecided_samples());
         let base = problem.base.iter().map(|c| pool.add(c)).collect();
         pool.prior_equations.clone_from(&problem.prior);
         let measured = pool.add(&problem.measured);
@@ -150,7 +154,11 @@ impl<'a> EffectSelector<'a> {
     }
 
     /// What some effects with given factors leave, `[channel][sample]`.
-    pub(crate) fn residual(&self, picks: &[SelectedEffect], factors: &DVector<f64>) -> Vec<Vec<f64>> {
+    pub(crate) fn residual(
+        &self,
+        picks: &[SelectedEffect],
+        factors: &DVector<f64>,
+    ) -> Vec<Vec<f64>> {
         self.pool
             .residual(self.measured, &self.columns(picks), factors.as_slice())
     }
@@ -199,7 +207,8 @@ impl<'a> EffectSelector<'a> {
         let problem = self.problem;
         let candidates = problem.candidates.iter().enumerate();
         let mut asked = candidates.clone().filter(|(k, _)| is_asked(*k));
-        let carried = if asked.any(|(_, candidate)| candidate.source == ColumnSource::LoadDependent) {
+        let carried = if asked.any(|(_, candidate)| candidate.source == ColumnSource::LoadDependent)
+        {
             self.load_dependent_effects(picks)
         } else {
             HashMap::new()
@@ -214,7 +223,9 @@ impl<'a> EffectSelector<'a> {
                 ColumnSource::Columns(_) => self
                     .best_choice(k, &beside)
                     .map(|(best, _)| self.select_choice(k, best)),
-                ColumnSource::Body(_) | ColumnSource::Constant(_) if picks.iter().all(|p| p.candidate != k) => {
+                ColumnSource::Body(_) | ColumnSource::Constant(_)
+                    if picks.iter().all(|p| p.candidate != k) =>
+                {
                     Some(SelectedEffect {
                         candidate: k,
                         constants: Vec::new(),
@@ -222,7 +233,10 @@ impl<'a> EffectSelector<'a> {
                         rank: candidate.parameters.len(),
                     })
                 }
-                ColumnSource::Tilt(_) | ColumnSource::ReadingFault(_) | ColumnSource::Body(_) | ColumnSource::Constant(_) => {
+                ColumnSource::Tilt(_)
+                | ColumnSource::ReadingFault(_)
+                | ColumnSource::Body(_)
+                | ColumnSource::Constant(_) => {
                     Some(self.linearise_model_change(k, picks, &beside.factors))
                 }
                 ColumnSource::LoadDependent => carried.get(&k).cloned(),
@@ -236,7 +250,11 @@ impl<'a> EffectSelector<'a> {
     }
 
     /// The choice of a candidate that explains most beside a set, and how much; an only one is not asked.
-    pub(crate) fn best_choice(&self, candidate: usize, beside: &ConditioningSet) -> Option<(usize, f64)> {
+    pub(crate) fn best_choice(
+        &self,
+        candidate: usize,
+        beside: &ConditioningSet,
+    ) -> Option<(usize, f64)> {
         let choices = &self.choices[candidate];
         if choices.len() == 1 {
             return Some((0, 0.0));
@@ -268,7 +286,11 @@ impl<'a> EffectSelector<'a> {
     /// A set of effects by some fit. Of an effect with several parameters, one whose sign makes no physical sense is zero
     /// if next to nothing speaks against that: half of the time an estimate of what is not there has the wrong sign.
     /// Not so where a kind refines another or is bent by a constant: without one of its parameters it is another kind.
-    fn fit_with_signs(&self, mut picks: Vec<SelectedEffect>, fit: impl Fn(&[SelectedEffect]) -> (DVector<f64>, f64)) -> ScoredEffectSet {
+    fn fit_with_signs(
+        &self,
+        mut picks: Vec<SelectedEffect>,
+        fit: impl Fn(&[SelectedEffect]) -> (DVector<f64>, f64),
+    ) -> ScoredEffectSet {
         let (mut factors, squares) = fit(&picks);
         if self.wrong_parameters(&picks, factors.as_slice()).is_empty() {
             return self.score_set(picks, factors.as_slice(), squares);
@@ -278,7 +300,9 @@ impl<'a> EffectSelector<'a> {
             let several = |i: usize| {
                 let columns = picks[i].columns.iter().filter(|k| **k != self.zero);
                 let candidate = self.candidate(&picks[i]);
-                candidate.refines.is_none() && candidate.searched_constants == 0 && columns.count() > 1
+                candidate.refines.is_none()
+                    && candidate.searched_constants == 0
+                    && columns.count() > 1
             };
             let wrong = self.wrong_parameters(&picks, factors.as_slice());
             let Some((i, j)) = wrong.into_iter().find(|(i, _)| several(*i)) else {
@@ -302,7 +326,12 @@ impl<'a> EffectSelector<'a> {
     }
 
     /// A trial from factors of base and effects.
-    fn score_set(&self, picks: Vec<SelectedEffect>, factors: &[f64], squares: f64) -> ScoredEffectSet {
+    fn score_set(
+        &self,
+        picks: Vec<SelectedEffect>,
+        factors: &[f64],
+        squares: f64,
+    ) -> ScoredEffectSet {
         let wrong = self.wrong_parameters(&picks, factors);
         let mut wrong_sign: Vec<usize> = wrong.into_iter().map(|(i, _)| i).collect();
         wrong_sign.dedup();
@@ -415,11 +444,18 @@ impl<'a> EffectSelector<'a> {
         for (i, k) in columns.iter().enumerate() {
             place[*k] = i;
         }
-        ProjectedGram { gram: left, row_of_column: place }
+        ProjectedGram {
+            gram: left,
+            row_of_column: place,
+        }
     }
 
     /// A set of effects, fitted by a table that holds its columns.
-    pub(crate) fn fit_from_gram(&self, table: &ProjectedGram, picks: Vec<SelectedEffect>) -> ScoredEffectSet {
+    pub(crate) fn fit_from_gram(
+        &self,
+        table: &ProjectedGram,
+        picks: Vec<SelectedEffect>,
+    ) -> ScoredEffectSet {
         self.fit_with_signs(picks, |picks| {
             let mut which: Vec<usize> = picks
                 .iter()

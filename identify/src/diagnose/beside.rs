@@ -55,13 +55,20 @@ impl EffectSelector<'_> {
     }
 
     /// The same of columns that are not in the pool.
-    pub(crate) fn explained_by_columns(&self, columns: &[ForceColumn], beside: &ConditioningSet) -> f64 {
-        let product = |a: &ForceColumn, b: &ForceColumn| self.pool.weighted_product_of(a, b, &self.weights);
+    pub(crate) fn explained_by_columns(
+        &self,
+        columns: &[ForceColumn],
+        beside: &ConditioningSet,
+    ) -> f64 {
+        let product =
+            |a: &ForceColumn, b: &ForceColumn| self.pool.weighted_product_of(a, b, &self.weights);
         let in_pool = |k: usize| self.pool.column(k);
         let (n, m) = (columns.len(), beside.columns.len());
         beside.explained_squares(&InnerProductBlocks {
             own: DMatrix::from_fn(n, n, |i, j| product(&columns[i], &columns[j])),
-            with_set: DMatrix::from_fn(m, n, |i, j| product(in_pool(beside.columns[i]), &columns[j])),
+            with_set: DMatrix::from_fn(m, n, |i, j| {
+                product(in_pool(beside.columns[i]), &columns[j])
+            }),
             measured: DVector::from_fn(n, |i, _| product(in_pool(self.measured), &columns[i])),
         })
     }
@@ -80,11 +87,19 @@ impl EffectSelector<'_> {
             }
         }
         let values = left.symmetric_eigenvalues();
-        values.iter().filter(|value| **value > INDEPENDENCE_TOLERANCE).count()
+        values
+            .iter()
+            .filter(|value| **value > INDEPENDENCE_TOLERANCE)
+            .count()
     }
 
     /// Whether some columns lie in the span of others and a set.
-    pub(crate) fn is_in_joint_span(&self, some: &[usize], others: &[usize], beside: &ConditioningSet) -> bool {
+    pub(crate) fn is_in_joint_span(
+        &self,
+        some: &[usize],
+        others: &[usize],
+        beside: &ConditioningSet,
+    ) -> bool {
         let all = [others, some].concat();
         let products = self.products_of(&all, beside);
         let left = beside.project_out_set(&products);

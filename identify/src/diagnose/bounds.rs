@@ -3,9 +3,9 @@
 
 use nalgebra::DMatrix;
 
-use super::bench::{EffectSelector, SelectedEffect, ProjectedGram};
+use super::bench::{EffectSelector, ProjectedGram, SelectedEffect};
 use super::factored::GramFactor;
-use super::problem::{SignConstraint, ColumnSource};
+use super::problem::{ColumnSource, SignConstraint};
 
 /// Columns of what is added to a set that are looked at; with more nothing is said.
 const MOST: usize = 7;
@@ -27,7 +27,11 @@ pub(crate) struct ExtensionBound<'a> {
 
 impl EffectSelector<'_> {
     /// A set in a table that holds its columns and those of what may be added.
-    pub(crate) fn extension_bound<'a>(&self, table: &'a ProjectedGram, set: &[SelectedEffect]) -> ExtensionBound<'a> {
+    pub(crate) fn extension_bound<'a>(
+        &self,
+        table: &'a ProjectedGram,
+        set: &[SelectedEffect],
+    ) -> ExtensionBound<'a> {
         let columns = set.iter().flat_map(|pick| &pick.columns);
         let places: Vec<usize> = columns.map(|k| table.row_of_column[*k]).collect();
         let n = places.len();
@@ -62,7 +66,10 @@ impl EffectSelector<'_> {
     /// Numbers that are free in an effect at least: those with the wrong sign may be none.
     fn fewest_freedoms(&self, pick: &SelectedEffect) -> usize {
         let candidate = self.candidate(pick);
-        let has_sign = candidate.parameters.iter().any(|p| p.sign != SignConstraint::Any);
+        let has_sign = candidate
+            .parameters
+            .iter()
+            .any(|p| p.sign != SignConstraint::Any);
         let is_body = matches!(candidate.source, ColumnSource::Body(_));
         let may_lose = candidate.refines.is_none() && candidate.searched_constants == 0;
         if may_lose && (has_sign || is_body) {
@@ -124,7 +131,8 @@ impl ExtensionBound<'_> {
 mod tests {
     use super::super::column::ForceColumn;
     use super::super::problem::{
-        CandidateEffect, ColumnChoice, LocatedEffect, EffectParameter, SampleLayout, CandidateNature, NoColumnProvider, DiagnosisProblem, SampleSegment,
+        CandidateEffect, CandidateNature, ColumnChoice, DiagnosisProblem, EffectParameter,
+        LocatedEffect, NoColumnProvider, SampleLayout, SampleSegment,
     };
     use super::super::search::criterion;
     use super::*;
@@ -191,7 +199,8 @@ mod tests {
         };
         let mut bench = EffectSelector::new(&problem, &NoColumnProvider);
         bench.update_choices(&[]);
-        let present: Vec<SelectedEffect> = bench.current_choices.iter().flatten().cloned().collect();
+        let present: Vec<SelectedEffect> =
+            bench.current_choices.iter().flatten().cloned().collect();
         let table = bench.projected_gram(&[]);
         let worth = 100.0;
         let mut near = 0;

@@ -6,7 +6,7 @@
 
 use super::disturbance::{Disturbance, EstimatedQuantity};
 use super::hum::{self, SlowSpectralLine};
-use super::pool::{FitScope, ColumnPool, dot, solve_gram};
+use super::pool::{ColumnPool, FitScope, dot, solve_gram};
 use super::problem::DiagnosisProblem;
 use crate::signal::median;
 
@@ -36,10 +36,15 @@ pub(crate) fn clean_forces(problem: &mut DiagnosisProblem) -> Vec<Disturbance> {
 
 /// Takes slow lines off forces that were not cleaned yet, and cleans what they leave: their crests are taken for outliers where
 /// nobody knows of them. Says what there was.
-pub(crate) fn clean_with_slow_lines(problem: &mut DiagnosisProblem, slow: &[SlowSpectralLine]) -> Vec<Disturbance> {
+pub(crate) fn clean_with_slow_lines(
+    problem: &mut DiagnosisProblem,
+    slow: &[SlowSpectralLine],
+) -> Vec<Disturbance> {
     let mut found = count_removed_squares(problem, |problem| {
         let lines = slow.iter();
-        lines.filter_map(|line| line.remove_from_force(problem)).collect()
+        lines
+            .filter_map(|line| line.remove_from_force(problem))
+            .collect()
     });
     found.extend(clean_forces(problem));
     found
@@ -104,7 +109,8 @@ fn remove_outliers(problem: &mut DiagnosisProblem) -> Vec<Disturbance> {
             let spread = 1.4826 * median(apart.iter().map(|x| x.abs()).collect());
             let force = problem.measured_force(d);
             let size = (dot(&force, &force) / force.len().max(1) as f64).sqrt();
-            let bound = (OUTLIER_DEVIATIONS * spread.max(problem.noise[d])).max(ROUNDING_SHARE * size);
+            let bound =
+                (OUTLIER_DEVIATIONS * spread.max(problem.noise[d])).max(ROUNDING_SHARE * size);
             let new: Vec<usize> = (0..rest.len())
                 .filter(|i| apart[*i].abs() > bound && !reverses[*i])
                 .collect();
@@ -267,7 +273,11 @@ mod tests {
     #[test]
     fn noise_has_neither_outliers_nor_lines() {
         for seed in 0..40 {
-            assert_eq!(clean_forces(&mut problem(seed, |_, _| 0.0)), [], "seed {seed}");
+            assert_eq!(
+                clean_forces(&mut problem(seed, |_, _| 0.0)),
+                [],
+                "seed {seed}"
+            );
         }
     }
 

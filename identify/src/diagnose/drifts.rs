@@ -2,14 +2,20 @@
 //! numbers of its own, and a zero that drifts has a level besides, since nobody knows when it was right.
 
 use super::column::ForceColumn;
-use super::problem::{CandidateEffect, ColumnChoice, LocatedEffect, EffectParameter, CandidateNature, DiagnosisProblem, SignConstraint, ColumnSource};
+use super::problem::{
+    CandidateEffect, CandidateNature, ColumnChoice, ColumnSource, DiagnosisProblem,
+    EffectParameter, LocatedEffect, SignConstraint,
+};
 
 /// A drift of the offset and of the friction of every channel; `units` are those of the forces.
 pub fn drift_candidates(problem: &DiagnosisProblem, units: &[String]) -> Vec<CandidateEffect> {
     let layout = &problem.layout;
     let mut recordings: Vec<&str> = layout.segments.iter().map(|s| s.name.as_str()).collect();
     recordings.dedup();
-    let ramps: Vec<[Vec<f64>; 2]> = recordings.iter().map(|name| recording_ramp(problem, name)).collect();
+    let ramps: Vec<[Vec<f64>; 2]> = recordings
+        .iter()
+        .map(|name| recording_ramp(problem, name))
+        .collect();
     let mut candidates = Vec::new();
     for (d, channel) in layout.channels.iter().enumerate() {
         let product = |ramp: &[f64], column: &ForceColumn| -> ForceColumn {

@@ -15,7 +15,11 @@ const UNKNOWN_CAUSE_IF_UNEXPLAINED: f64 = 0.25;
 impl EffectSelector<'_> {
     /// Values of each member's parameters with their standard deviations; none where others say the same. Rows count as
     /// many samples as the residual is worth.
-    pub(crate) fn estimate_parameters(&self, picks: &[SelectedEffect], on: FitScope) -> Vec<Vec<(f64, Option<f64>)>> {
+    pub(crate) fn estimate_parameters(
+        &self,
+        picks: &[SelectedEffect],
+        on: FitScope,
+    ) -> Vec<Vec<(f64, Option<f64>)>> {
         let which = self.columns(picks);
         let (factors, _) = self.fit(picks, on);
         let rest = self.residual(picks, &factors);

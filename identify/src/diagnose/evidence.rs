@@ -106,7 +106,12 @@ impl SelectionEvidence {
 
 impl EffectSelector<'_> {
     /// Evidence for the set `after` beside `before`; `channels` are those on which they differ.
-    pub(crate) fn evidence(&self, before: &[SelectedEffect], after: &[SelectedEffect], channels: &[usize]) -> SelectionEvidence {
+    pub(crate) fn evidence(
+        &self,
+        before: &[SelectedEffect],
+        after: &[SelectedEffect],
+        channels: &[usize],
+    ) -> SelectionEvidence {
         let [old_rest, new_rest] = [before, after].map(|picks| {
             let (factors, _) = self.fit(picks, FitScope::All);
             self.residual(picks, &factors)
@@ -118,8 +123,9 @@ impl EffectSelector<'_> {
         let [old_squares, new_squares] = [squares(&old_rest), squares(&new_rest)];
         let is_noise_known = self.is_white(&new_rest, channels)
             && self.is_above_fit_error(before, old_squares - new_squares, channels);
-        let held_out =
-            |by_folds: bool| [before, after].map(|picks| self.validation_errors(picks, channels, by_folds));
+        let held_out = |by_folds: bool| {
+            [before, after].map(|picks| self.validation_errors(picks, channels, by_folds))
+        };
         let is_per_run = |pick: &SelectedEffect| self.candidate(pick).is_per_run;
         let mut compared = held_out(before.iter().chain(after).any(is_per_run));
         // A check that speaks for a change, however softly, joins the fit where all that is left is white noise: both together
@@ -150,7 +156,9 @@ impl EffectSelector<'_> {
         let worth = self.effective_equations(&new_rest, channels);
         // The best of so many fits chance better than any one of them.
         let choices = (self.problem.candidates.len().max(1) as f64).ln();
-        let price = |picks: &[SelectedEffect]| count(picks) * worth.ln() + 2.0 * picks.len() as f64 * choices;
+        let price = |picks: &[SelectedEffect]| {
+            count(picks) * worth.ln() + 2.0 * picks.len() as f64 * choices
+        };
         SelectionEvidence {
             gain: if total > 0.0 { n * mean / total } else { 0.0 },
             blocks_t: t,
@@ -177,7 +185,8 @@ impl EffectSelector<'_> {
     fn is_white(&self, rest: &[Vec<f64>], channels: &[usize]) -> bool {
         channels.iter().all(|d| {
             let counted = rest[*d].iter().filter(|r| **r != 0.0).count() as f64;
-            self.effective_equations(rest, &[*d]) > WHITE * counted && self.squares_over_noise(rest, &[*d]) < LIKE_NOISE
+            self.effective_equations(rest, &[*d]) > WHITE * counted
+                && self.squares_over_noise(rest, &[*d]) < LIKE_NOISE
         })
     }
 
@@ -214,7 +223,12 @@ impl EffectSelector<'_> {
 
     /// Weighted squared errors of some channels in blocks of time to which the set was not fitted: those of the check, or
     /// each fold of all recordings where there is none or where they have parameters of their own.
-    pub(crate) fn validation_errors(&self, picks: &[SelectedEffect], channels: &[usize], by_folds: bool) -> Vec<f64> {
+    pub(crate) fn validation_errors(
+        &self,
+        picks: &[SelectedEffect],
+        channels: &[usize],
+        by_folds: bool,
+    ) -> Vec<f64> {
         let layout = &self.problem.layout;
         let square = |rest: &[Vec<f64>], range: &std::ops::Range<usize>| -> f64 {
             let of = |d: &usize| {

@@ -39,7 +39,10 @@ impl GramFactor {
         }
         let m = kept.len();
         let lower = upper.view((0, 0), (m, m)).transpose();
-        Self { lower, independent_columns: kept }
+        Self {
+            lower,
+            independent_columns: kept,
+        }
     }
 
     /// `L^-1 x` for each column: its square is what the columns explain.

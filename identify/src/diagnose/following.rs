@@ -8,11 +8,14 @@ use nalgebra::DVector;
 use super::bench::{EffectSelector, SelectedEffect};
 use super::column::ForceColumn;
 use super::pool::{FitScope, solve_gram};
-use super::problem::{CandidateEffect, LoadDependentQuery, ColumnSource};
+use super::problem::{CandidateEffect, ColumnSource, LoadDependentQuery};
 
 impl EffectSelector<'_> {
     /// Candidates that depend on what the drives carry, with the columns that a fit gives them.
-    pub(crate) fn load_dependent_effects(&mut self, picks: &[SelectedEffect]) -> HashMap<usize, SelectedEffect> {
+    pub(crate) fn load_dependent_effects(
+        &mut self,
+        picks: &[SelectedEffect],
+    ) -> HashMap<usize, SelectedEffect> {
         let is_carried = |c: &CandidateEffect| matches!(c.source, ColumnSource::LoadDependent);
         if !self.problem.candidates.iter().any(is_carried) {
             return HashMap::new();
@@ -37,7 +40,9 @@ impl EffectSelector<'_> {
             .collect();
         let parts = which[..n].iter().copied().zip(factors.iter().copied());
         let parts = parts.zip(is_part_of_load);
-        self.sum_columns(parts.filter_map(|(part, is_part_of_load)| is_part_of_load.then_some(part)))
+        self.sum_columns(
+            parts.filter_map(|(part, is_part_of_load)| is_part_of_load.then_some(part)),
+        )
     }
 
     /// The same where drives carry the other friction of the set too: which friction lies between load and drive no model says.
@@ -64,7 +69,11 @@ impl EffectSelector<'_> {
     }
 
     /// Candidates that depend on what the drives carry.
-    fn load_friction_effects(&mut self, load: &ForceColumn, which: LoadDependentQuery) -> HashMap<usize, SelectedEffect> {
+    fn load_friction_effects(
+        &mut self,
+        load: &ForceColumn,
+        which: LoadDependentQuery,
+    ) -> HashMap<usize, SelectedEffect> {
         let made = self.provider.load_dependent_columns(load, which);
         let picks = made.into_iter().map(|(candidate, choice)| {
             let pick = SelectedEffect {
@@ -126,7 +135,11 @@ impl EffectSelector<'_> {
                         force.add(*factor, self.pool.column(*k));
                     }
                 }
-                vec![self.reading_fault_column(*reading, &force, found.map_or(0.0, |value| value[0]))]
+                vec![self.reading_fault_column(
+                    *reading,
+                    &force,
+                    found.map_or(0.0, |value| value[0]),
+                )]
             }
             ColumnSource::Body(body) => {
                 body.columns(found.map_or([0.0; 3], |values| body.centre(&values)))
@@ -137,7 +150,9 @@ impl EffectSelector<'_> {
                 let base = &factors.as_slice()[..self.base.len()];
                 vec![constant.secant_column(error, base, self.weights.len())]
             }
-            ColumnSource::Columns(_) | ColumnSource::LoadDependent => unreachable!("they change no model"),
+            ColumnSource::Columns(_) | ColumnSource::LoadDependent => {
+                unreachable!("they change no model")
+            }
         };
         SelectedEffect {
             candidate,
@@ -148,7 +163,11 @@ impl EffectSelector<'_> {
     }
 
     /// A member that depends on what the drives carry, with or without friction as explains more; its constant stays.
-    fn best_load_dependent(&mut self, picks: &[SelectedEffect], member: usize) -> Option<SelectedEffect> {
+    fn best_load_dependent(
+        &mut self,
+        picks: &[SelectedEffect],
+        member: usize,
+    ) -> Option<SelectedEffect> {
         let candidate = picks[member].candidate;
         let value = picks[member].constants.first().map(|(_, value)| *value);
         let which = LoadDependentQuery::One(candidate, value);
@@ -164,7 +183,10 @@ impl EffectSelector<'_> {
     }
 
     /// Makes the columns of effects that depend on the fit anew.
-    pub(crate) fn refresh_columns(&mut self, mut picks: Vec<SelectedEffect>) -> Vec<SelectedEffect> {
+    pub(crate) fn refresh_columns(
+        &mut self,
+        mut picks: Vec<SelectedEffect>,
+    ) -> Vec<SelectedEffect> {
         let known = self.pool.len();
         for _ in 0..3 {
             for i in 0..picks.len() {

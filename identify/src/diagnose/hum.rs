@@ -8,7 +8,7 @@ use std::f64::consts::TAU;
 
 use super::column::ForceColumn;
 use super::disturbance::{Disturbance, EstimatedQuantity, is_white};
-use super::pool::{FitScope, ColumnPool, dot, solve_gram};
+use super::pool::{ColumnPool, FitScope, dot, solve_gram};
 use super::problem::DiagnosisProblem;
 use crate::signal::{hann_power, median};
 
@@ -125,7 +125,9 @@ pub(crate) fn slow_lines(
             std::slice::from_ref(&unfit[channel]),
             frequency,
         );
-        let Some((frequency, wave)) = SinusoidFitter::new(problem, rest, channel).find_sinusoid(frequency) else {
+        let Some((frequency, wave)) =
+            SinusoidFitter::new(problem, rest, channel).find_sinusoid(frequency)
+        else {
             continue;
         };
         let explains_more = dot(&wave.residual, &wave.residual) < MAX_REMAINING_SHARE * by_no_state;
@@ -165,7 +167,8 @@ struct SinusoidFit {
 
 impl<'a> SinusoidFitter<'a> {
     fn new(problem: &'a DiagnosisProblem, rest: &'a [Vec<f64>], channel: usize) -> Self {
-        let mut pool = ColumnPool::new(&problem.layout).exclude_samples(&problem.undecided_samples());
+        let mut pool =
+            ColumnPool::new(&problem.layout).exclude_samples(&problem.undecided_samples());
         let columns = problem.base.iter().chain(&problem.friction);
         let known = columns.map(|c| pool.add(c)).collect();
         let target = pool.add(ForceColumn(rest.iter().cloned().map(Some).collect()));
@@ -209,7 +212,10 @@ impl<'a> SinusoidFitter<'a> {
         let squares = weighed.map(|(left, weight)| weight * dot(left, left)).sum();
         let mut taken = vec![0.0; layout.samples()];
         let waves = self.pool.split_off(self.target + 1);
-        for (wave, factor) in waves.iter().zip(factors.iter().skip(self.base_columns.len())) {
+        for (wave, factor) in waves
+            .iter()
+            .zip(factors.iter().skip(self.base_columns.len()))
+        {
             for (sum, x) in taken.iter_mut().zip(wave.0[self.channel].iter().flatten()) {
                 *sum += factor * x;
             }
@@ -325,7 +331,11 @@ fn strongest_frequency(problem: &DiagnosisProblem, rest: &[f64]) -> Option<f64> 
 }
 
 /// The line that stands out most from the spectrum about it: by how much, and its frequency, Hz.
-fn most_prominent_line(problem: &DiagnosisProblem, rest: &[f64], lowest: f64) -> Option<(f64, f64)> {
+fn most_prominent_line(
+    problem: &DiagnosisProblem,
+    rest: &[f64],
+    lowest: f64,
+) -> Option<(f64, f64)> {
     let mut best: Option<(f64, f64)> = None;
     let mut start = 0;
     for stretch in &problem.layout.segments {
@@ -356,7 +366,12 @@ fn most_prominent_line(problem: &DiagnosisProblem, rest: &[f64], lowest: f64) ->
 }
 
 /// The frequency about which a sine and a cosine explain most of all channels.
-fn refine_frequency(problem: &DiagnosisProblem, rest: &[Vec<f64>], unfit: &[Vec<bool>], about: f64) -> f64 {
+fn refine_frequency(
+    problem: &DiagnosisProblem,
+    rest: &[Vec<f64>],
+    unfit: &[Vec<bool>],
+    about: f64,
+) -> f64 {
     let longest = problem.layout.segments.iter();
     let longest = longest.map(|s| s.samples as f64 * s.step);
     let width = 1.0 / longest.fold(f64::MIN_POSITIVE, f64::max);
@@ -379,7 +394,13 @@ fn refine_frequency(problem: &DiagnosisProblem, rest: &[Vec<f64>], unfit: &[Vec<
 }
 
 /// Takes the best sine and cosine off a series, stretch by stretch: fitted without what is `unfit`, taken off all that is not `spared`.
-fn subtract_sinusoid(problem: &DiagnosisProblem, rest: &mut [f64], unfit: &[bool], spared: &[bool], frequency: f64) {
+fn subtract_sinusoid(
+    problem: &DiagnosisProblem,
+    rest: &mut [f64],
+    unfit: &[bool],
+    spared: &[bool],
+    frequency: f64,
+) {
     let mut start = 0;
     for stretch in &problem.layout.segments {
         let part = &mut rest[start..start + stretch.samples];
@@ -437,7 +458,9 @@ mod tests {
 
     fn taken_off(problem: &mut DiagnosisProblem, rest: &[Vec<f64>]) -> Vec<Disturbance> {
         let lines = slow_lines(problem, rest, &vec![0.0; rest.len()], &[]);
-        let off = lines.iter().filter_map(|line| line.remove_from_force(problem));
+        let off = lines
+            .iter()
+            .filter_map(|line| line.remove_from_force(problem));
         off.collect()
     }
 

@@ -4,7 +4,7 @@
 use super::bench::EffectSelector;
 use super::noise::{ROUNDING, white_noise};
 use super::pool::{FitScope, dot};
-use super::problem::{NoColumnProvider, DiagnosisProblem};
+use super::problem::{DiagnosisProblem, NoColumnProvider};
 
 impl DiagnosisProblem {
     /// Whether no force of a channel is read.

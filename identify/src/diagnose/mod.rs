@@ -49,14 +49,17 @@ pub use body::AttachedBody;
 pub use cleaning::quantisation_step;
 pub use column::ForceColumn;
 pub use constant::ConstantCorrection;
-pub use disturbance::{ResidualBudget, Disturbance, EstimatedQuantity};
+pub use disturbance::{Disturbance, EstimatedQuantity, ResidualBudget};
 pub use drifts::drift_candidates;
 pub use evidence::SelectionEvidence;
-pub use laws::{LawFactor, SiteLaw, LawProduct, LawProposal, LawShape, LawSite, LawTerm, LawVariable};
+pub use laws::{
+    LawFactor, LawProduct, LawProposal, LawShape, LawSite, LawTerm, LawVariable, SiteLaw,
+};
 pub use noise::{ROUNDING, effective_samples, white_noise};
 pub use problem::{
-    CandidateEffect, LoadDependentQuery, ColumnChoice, LocatedEffect, EffectParameter, ReadingFaultKind, SampleLayout, CandidateNature, NoColumnProvider, DiagnosisProblem,
-    ForceReadingFault, SignConstraint, ColumnSource, SampleSegment, ColumnProvider,
+    CandidateEffect, CandidateNature, ColumnChoice, ColumnProvider, ColumnSource, DiagnosisProblem,
+    EffectParameter, ForceReadingFault, LoadDependentQuery, LocatedEffect, NoColumnProvider,
+    ReadingFaultKind, SampleLayout, SampleSegment, SignConstraint,
 };
 pub use readings::reading_fault_candidates;
 pub use tilt::{ForceSensitivity, TiltCandidate};
@@ -296,7 +299,10 @@ fn diagnose_cleaned(
 }
 
 /// Friction that the model lacks and that drifts besides is one effect: friction that changes with time.
-fn merge_drifting_friction(effects: &mut Vec<IdentifiedEffect>, disturbances: &mut Vec<Disturbance>) {
+fn merge_drifting_friction(
+    effects: &mut Vec<IdentifiedEffect>,
+    disturbances: &mut Vec<Disturbance>,
+) {
     disturbances.retain(|drift| {
         let is_its = |found: &IdentifiedEffect| {
             found.effect.at == drift.at && FRICTION.contains(&found.effect.kind.as_str())
@@ -318,7 +324,8 @@ fn merge_drifting_friction(effects: &mut Vec<IdentifiedEffect>, disturbances: &m
 
 /// Noise of all channels relative to the measured forces.
 fn noise_floor(budgets: &[ResidualBudget]) -> f64 {
-    let sum = |of: &dyn Fn(&ResidualBudget) -> f64| budgets.iter().map(|b| of(b).powi(2)).sum::<f64>();
+    let sum =
+        |of: &dyn Fn(&ResidualBudget) -> f64| budgets.iter().map(|b| of(b).powi(2)).sum::<f64>();
     let force = sum(&|budget| budget.force);
     if force > 0.0 {
         (sum(&|budget| budget.noise) / force).sqrt()
@@ -355,7 +362,11 @@ impl EffectSelector<'_> {
     }
 
     /// Laws for what a set leaves, and where they may act.
-    fn find_laws(&self, picks: &[SelectedEffect], left: &SetResidual) -> (Vec<LawSite>, Vec<LawProposal>) {
+    fn find_laws(
+        &self,
+        picks: &[SelectedEffect],
+        left: &SetResidual,
+    ) -> (Vec<LawSite>, Vec<LawProposal>) {
         if self.problem.effects_only {
             return (Vec::new(), Vec::new());
         }
@@ -369,7 +380,11 @@ impl EffectSelector<'_> {
 
     /// The members of a set that laws do not make needless: an effect that goes where a law for most of the rest comes is part of
     /// that law, if it acts on drives that feel the law.
-    fn effects_outside_laws(&self, picks: &[SelectedEffect], laws: &[LawProposal]) -> Vec<SelectedEffect> {
+    fn effects_outside_laws(
+        &self,
+        picks: &[SelectedEffect],
+        laws: &[LawProposal],
+    ) -> Vec<SelectedEffect> {
         let is_part = |pick: &SelectedEffect, proposal: &LawProposal| {
             let channels = self.affected_channels(std::slice::from_ref(pick));
             let effect = &self.candidate(pick).effect;
@@ -377,13 +392,17 @@ impl EffectSelector<'_> {
                 && proposal.law.replaced_effects.contains(effect)
                 && channels.iter().all(|d| proposal.channels.contains(d))
         };
-        let is_needed = |pick: &&SelectedEffect| !laws.iter().any(|proposal| is_part(pick, proposal));
+        let is_needed =
+            |pick: &&SelectedEffect| !laws.iter().any(|proposal| is_part(pick, proposal));
         picks.iter().filter(is_needed).cloned().collect()
     }
 
     /// A set without members that explain less than what stays unexplained where they act, and what it leaves: part of a law that
     /// nobody knows is as likely there as the effect.
-    fn drop_below_unexplained(&mut self, mut picks: Vec<SelectedEffect>) -> (Vec<SelectedEffect>, SetResidual) {
+    fn drop_below_unexplained(
+        &mut self,
+        mut picks: Vec<SelectedEffect>,
+    ) -> (Vec<SelectedEffect>, SetResidual) {
         loop {
             let left = self.set_residual(&picks);
             let mut least: Option<(f64, Vec<SelectedEffect>)> = None;
@@ -441,9 +460,15 @@ impl EffectSelector<'_> {
         self.current_choices.iter().map(share).collect()
     }
 
-    fn selection_step(&self, before: &[SelectedEffect], after: &[SelectedEffect], evidence: Option<SelectionEvidence>) -> SelectionStep {
+    fn selection_step(
+        &self,
+        before: &[SelectedEffect],
+        after: &[SelectedEffect],
+        evidence: Option<SelectionEvidence>,
+    ) -> SelectionStep {
         let effects = |set: &[SelectedEffect], other: &[SelectedEffect]| -> Vec<LocatedEffect> {
-            let is_new = |pick: &&SelectedEffect| other.iter().all(|p| p.candidate != pick.candidate);
+            let is_new =
+                |pick: &&SelectedEffect| other.iter().all(|p| p.candidate != pick.candidate);
             let new = set.iter().filter(is_new);
             new.map(|pick| self.candidate(pick).effect.clone())
                 .collect()
@@ -465,7 +490,10 @@ impl EffectSelector<'_> {
         let split = layout.fit_samples();
         let rest = self.full_residual(picks);
         let channels = 0..rest.len();
-        let forces: Vec<Vec<f64>> = channels.clone().map(|d| self.problem.measured_force(d)).collect();
+        let forces: Vec<Vec<f64>> = channels
+            .clone()
+            .map(|d| self.problem.measured_force(d))
+            .collect();
         let norm = |part: &[f64]| dot(part, part);
         let squares = |of: &[Vec<f64>], range: std::ops::Range<usize>| -> Vec<f64> {
             of.iter().map(|all| norm(&all[range.clone()])).collect()
@@ -483,8 +511,12 @@ impl EffectSelector<'_> {
             squares(&rest, judged.clone())
         } else {
             // Weights differ by channel, figures do not.
-            let held_out =
-                |d: usize| self.validation_errors(picks, &[d], true).iter().sum::<f64>() / self.weights[d];
+            let held_out = |d: usize| {
+                self.validation_errors(picks, &[d], true)
+                    .iter()
+                    .sum::<f64>()
+                    / self.weights[d]
+            };
             channels.map(held_out).collect()
         };
         let forces = squares(&forces, judged);
@@ -508,7 +540,12 @@ impl EffectSelector<'_> {
 
     /// Whether a change makes what is left larger where everything counts, in the fit and in the check: then it explains what
     /// decides at the cost of what lies next to reversals, where an effect would be seen, too.
-    fn is_worse_overall(&self, before: &[SelectedEffect], after: &[SelectedEffect], channels: &[usize]) -> bool {
+    fn is_worse_overall(
+        &self,
+        before: &[SelectedEffect],
+        after: &[SelectedEffect],
+        channels: &[usize],
+    ) -> bool {
         if self.problem.jumps.is_empty() {
             return false;
         }
@@ -590,8 +627,10 @@ impl EffectSelector<'_> {
             });
         }
         considered.sort_by(|a, b| {
-            (b.rejection_reason.is_none().cmp(&a.rejection_reason.is_none()))
-                .then(b.explained.total_cmp(&a.explained))
+            (b.rejection_reason
+                .is_none()
+                .cmp(&a.rejection_reason.is_none()))
+            .then(b.explained.total_cmp(&a.explained))
         });
         considered
     }

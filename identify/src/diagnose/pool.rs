@@ -60,7 +60,11 @@ impl<'a> ColumnPool<'a> {
             of_folds: RefCell::default(),
             folds: layout.blocks(FOLDS),
             lost: layout.left_out.clone(),
-            left_out: layout.left_out.iter().map(|out| true_indices(out)).collect(),
+            left_out: layout
+                .left_out
+                .iter()
+                .map(|out| true_indices(out))
+                .collect(),
             prior_equations: None,
         }
     }
@@ -81,7 +85,13 @@ impl<'a> ColumnPool<'a> {
     }
 
     /// Inner product of two columns' values on a channel over some samples, without those that are left out.
-    pub(crate) fn inner_product(&self, channel: usize, a: &[f64], b: &[f64], range: Range<usize>) -> f64 {
+    pub(crate) fn inner_product(
+        &self,
+        channel: usize,
+        a: &[f64],
+        b: &[f64],
+        range: Range<usize>,
+    ) -> f64 {
         let less = self.excluded_product(channel, a, b, &range);
         dot(&a[range.clone()], &b[range]) - less
     }
@@ -190,7 +200,9 @@ impl<'a> ColumnPool<'a> {
                     for (c, b) in columns.iter().enumerate() {
                         let is_twice = rows == columns && c > r;
                         let (later, earlier) = (*a.max(b), a.min(b));
-                        if !is_twice && self.has_common_channel(*a, *b) && !products[later].contains_key(earlier)
+                        if !is_twice
+                            && self.has_common_channel(*a, *b)
+                            && !products[later].contains_key(earlier)
                         {
                             unknown.push((r, c));
                         }
@@ -209,7 +221,12 @@ impl<'a> ColumnPool<'a> {
     }
 
     /// The same as [`Pool::products_of`] of some pairs of a tile, in their order.
-    fn compute_tile(&self, rows: &[usize], columns: &[usize], pairs: &[(usize, usize)]) -> Vec<Box<[f64]>> {
+    fn compute_tile(
+        &self,
+        rows: &[usize],
+        columns: &[usize],
+        pairs: &[(usize, usize)],
+    ) -> Vec<Box<[f64]>> {
         let mut found: Vec<Vec<f64>> = vec![Vec::new(); pairs.len()];
         for part in [&self.fit, &self.check] {
             for d in 0..self.channels {
@@ -244,7 +261,12 @@ impl<'a> ColumnPool<'a> {
     }
 
     /// The same of columns that need not be in the pool, computed anew.
-    pub(crate) fn weighted_product_of(&self, a: &ForceColumn, b: &ForceColumn, weights: &[f64]) -> f64 {
+    pub(crate) fn weighted_product_of(
+        &self,
+        a: &ForceColumn,
+        b: &ForceColumn,
+        weights: &[f64],
+    ) -> f64 {
         let on = |(d, a, b)| weights[d] * self.inner_product(d, a, b, self.all_samples());
         a.common_channels(b).map(on).sum()
     }
@@ -261,9 +283,14 @@ impl<'a> ColumnPool<'a> {
         let (fit, check) = known.split_at(known.len() / 2);
         // Which channels these are is told without a look at the columns.
         let common = (0..self.channels).filter(|d| self.acts_on(a, *d) && self.acts_on(b, *d));
-        let sums = common
-            .zip(fit.iter().zip(check))
-            .map(|(d, (fit, check))| weights[d] * if on == FitScope::All { fit + check } else { *fit });
+        let sums = common.zip(fit.iter().zip(check)).map(|(d, (fit, check))| {
+            weights[d]
+                * if on == FitScope::All {
+                    fit + check
+                } else {
+                    *fit
+                }
+        });
         sums.sum()
     }
 
@@ -284,7 +311,10 @@ impl<'a> ColumnPool<'a> {
 
     /// What is known of two factors before any sample, as part of their inner product.
     fn prior_term(&self, a: usize, b: usize) -> f64 {
-        let entry = self.prior_equations.as_ref().and_then(|prior| prior.get((a, b)));
+        let entry = self
+            .prior_equations
+            .as_ref()
+            .and_then(|prior| prior.get((a, b)));
         entry.copied().unwrap_or(0.0)
     }
 
@@ -340,7 +370,12 @@ impl<'a> ColumnPool<'a> {
     }
 
     /// The same of all samples but those that were not measured.
-    pub(crate) fn full_residual(&self, of: usize, others: &[usize], factors: &[f64]) -> Vec<Vec<f64>> {
+    pub(crate) fn full_residual(
+        &self,
+        of: usize,
+        others: &[usize],
+        factors: &[f64],
+    ) -> Vec<Vec<f64>> {
         let samples = self.check.end;
         let mut rest: Vec<Vec<f64>> = (self.columns[of].0.iter())
             .map(|values| values.clone().unwrap_or_else(|| vec![0.0; samples]))
@@ -499,7 +534,8 @@ mod tests {
         measured.add(-3.0, pool.column(two));
         let y = pool.add(measured.clone());
         let weights = [1.0, 4.0];
-        let (factors, squares) = solve_gram(&pool.gram(&[one, two, copy, y], &weights, FitScope::All));
+        let (factors, squares) =
+            solve_gram(&pool.gram(&[one, two, copy, y], &weights, FitScope::All));
         let column = |k: usize| -> Vec<f64> {
             let part = |d: usize| pool.column(k).0[d].clone().unwrap_or_else(|| vec![0.0; 50]);
             let weighed = part(1).into_iter().map(|x| 2.0 * x);

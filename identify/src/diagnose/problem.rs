@@ -176,7 +176,11 @@ pub trait ColumnProvider {
     fn columns_for_constant(&self, candidate: usize, constant: f64) -> Option<Vec<ForceColumn>>;
 
     /// Columns of candidates that depend on what the drives carry.
-    fn load_dependent_columns(&self, load: &ForceColumn, which: LoadDependentQuery) -> Vec<(usize, ColumnChoice)>;
+    fn load_dependent_columns(
+        &self,
+        load: &ForceColumn,
+        which: LoadDependentQuery,
+    ) -> Vec<(usize, ColumnChoice)>;
 
     /// Places on which laws that no library holds may act; asked where something stays unexplained.
     fn sites(&self) -> Vec<LawSite> {
@@ -192,7 +196,11 @@ impl ColumnProvider for NoColumnProvider {
         None
     }
 
-    fn load_dependent_columns(&self, _: &ForceColumn, _: LoadDependentQuery) -> Vec<(usize, ColumnChoice)> {
+    fn load_dependent_columns(
+        &self,
+        _: &ForceColumn,
+        _: LoadDependentQuery,
+    ) -> Vec<(usize, ColumnChoice)> {
         Vec::new()
     }
 }

@@ -2,11 +2,12 @@
 //! that a fit says.
 
 use super::aliases::MIN_DISTINCTION;
-use super::bench::{EffectSelector, SelectedEffect, ScoredEffectSet};
+use super::bench::{EffectSelector, ScoredEffectSet, SelectedEffect};
 use super::column::ForceColumn;
 use super::pool::FitScope;
 use super::problem::{
-    CandidateEffect, LocatedEffect, EffectParameter, ReadingFaultKind, CandidateNature, DiagnosisProblem, ForceReadingFault, SignConstraint, ColumnSource,
+    CandidateEffect, CandidateNature, ColumnSource, DiagnosisProblem, EffectParameter,
+    ForceReadingFault, LocatedEffect, ReadingFaultKind, SignConstraint,
 };
 
 /// Below this part of a sample a derivative says what a delay does.
@@ -60,7 +61,10 @@ pub fn reading_fault_candidates(problem: &DiagnosisProblem) -> Vec<CandidateEffe
                 refines: None,
                 nature: CandidateNature::Effect,
                 is_per_run: false,
-                source: ColumnSource::ReadingFault(ForceReadingFault { kind: fault, channel }),
+                source: ColumnSource::ReadingFault(ForceReadingFault {
+                    kind: fault,
+                    channel,
+                }),
             }
         })
         .collect()
@@ -68,7 +72,12 @@ pub fn reading_fault_candidates(problem: &DiagnosisProblem) -> Vec<CandidateEffe
 
 impl EffectSelector<'_> {
     /// What forces change by when they are read wrongly, for each unit of the parameter, between none and its value.
-    pub(crate) fn reading_fault_column(&self, reading: ForceReadingFault, force: &ForceColumn, value: f64) -> ForceColumn {
+    pub(crate) fn reading_fault_column(
+        &self,
+        reading: ForceReadingFault,
+        force: &ForceColumn,
+        value: f64,
+    ) -> ForceColumn {
         let channels = force.0.iter().enumerate();
         let of = |(d, values): (usize, &Option<Vec<f64>>)| {
             let values = values.as_ref()?;
@@ -91,7 +100,8 @@ impl EffectSelector<'_> {
                     let rates = has_jumps.then(|| self.problem.friction.get(3 * d));
                     let rates = rates.flatten().and_then(|column| column.0[d].as_deref());
                     let rates = rates.map(|rates| &rates[start..start + stretch.samples]);
-                    let late = (0..part.len()).map(|i| interpolate_force(part, rates, i as f64 - samples));
+                    let late =
+                        (0..part.len()).map(|i| interpolate_force(part, rates, i as f64 - samples));
                     changes.extend(late.zip(part).map(|(then, now)| (then - now) / value));
                 } else {
                     let filtered = low_pass(part, samples.abs()).into_iter().zip(part);
@@ -108,12 +118,16 @@ impl EffectSelector<'_> {
     /// slight: the low-pass is taken where it leaves clearly less.
     pub(crate) fn refit_dependent_columns(&mut self, trial: &ScoredEffectSet) -> ScoredEffectSet {
         let curved = |bench: &Self, pick: &SelectedEffect| match bench.candidate(pick).source {
-            ColumnSource::ReadingFault(reading) if reading.kind != ReadingFaultKind::Scaled => Some(reading),
+            ColumnSource::ReadingFault(reading) if reading.kind != ReadingFaultKind::Scaled => {
+                Some(reading)
+            }
             _ => None,
         };
         let is_curved = |(i, pick): (usize, &SelectedEffect)| Some((i, curved(self, pick)?));
         let Some((at, reading)) = trial.picks.iter().enumerate().find_map(is_curved) else {
-            let is_body = |pick: &SelectedEffect| matches!(self.candidate(pick).source, ColumnSource::Body(_));
+            let is_body = |pick: &SelectedEffect| {
+                matches!(self.candidate(pick).source, ColumnSource::Body(_))
+            };
             if trial.picks.iter().any(is_body) {
                 let refreshed = self.refresh_columns(trial.picks.clone());
                 return ScoredEffectSet {
@@ -148,7 +162,8 @@ impl EffectSelector<'_> {
             let (factors, _) = self.fit(&other.picks, FitScope::All);
             let rest = self.residual(&other.picks, &factors);
             let channels: Vec<usize> = (0..rest.len()).collect();
-            let better = self.effective_equations(&rest, &channels) * (best.squares / other.squares).ln();
+            let better =
+                self.effective_equations(&rest, &channels) * (best.squares / other.squares).ln();
             let has_signs = other.is_possible();
             if !best.is_possible() || has_signs && better > MIN_DISTINCTION {
                 best = other;
@@ -226,7 +241,7 @@ fn interpolate_force(values: &[f64], rates: Option<&[f64]>, at: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnose::problem::{SampleLayout, NoColumnProvider, SampleSegment};
+    use crate::diagnose::problem::{NoColumnProvider, SampleLayout, SampleSegment};
 
     /// Where one in nine samples is kept nothing jumps any more, so that a force is smooth where its drive turns round, too.
     #[test]

@@ -74,7 +74,11 @@ pub(crate) fn repeatable_shares(
 type FoldErrors = Vec<Vec<f64>>;
 
 /// Errors by normal equations of the features. Inner products fold by fold; their sum less one fold is what the others say.
-fn errors_by_features(features: &DMatrix<f64>, targets: &DMatrix<f64>, folds: &[Range<usize>]) -> FoldErrors {
+fn errors_by_features(
+    features: &DMatrix<f64>,
+    targets: &DMatrix<f64>,
+    folds: &[Range<usize>],
+) -> FoldErrors {
     let m = features.ncols();
     let rows = |of: &DMatrix<f64>, fold: &Range<usize>| of.rows_range(fold.clone()).into_owned();
     let parts: Vec<[DMatrix<f64>; 2]> = (folds.iter())
@@ -180,9 +184,13 @@ fn state_features(variables: &[(String, Vec<f64>)], picked: &[usize]) -> Vec<Vec
         // Of positions also what only begins beyond a place, as stops do, and friction that remembers where it reversed.
         if !name.ends_with("_d") && !name.ends_with("_dd") {
             shapes.extend(hinges(&values, spread));
-            let memories = MEMORIES.iter().map(|share| dahl_state(&values, share * spread));
+            let memories = MEMORIES
+                .iter()
+                .map(|share| dahl_state(&values, share * spread));
             shapes.extend(memories);
-            let stops = STOPS.iter().map(|share| stop_operator(&values, share * spread));
+            let stops = STOPS
+                .iter()
+                .map(|share| stop_operator(&values, share * spread));
             shapes.extend(stops);
         }
         scaled.push(values.iter().map(|x| (x - mean) / (2.0 * spread)).collect());

@@ -3,10 +3,10 @@
 
 use std::collections::HashSet;
 
-use super::bench::{EffectSelector, SelectedEffect, ProjectedGram, ScoredEffectSet};
+use super::bench::{EffectSelector, ProjectedGram, ScoredEffectSet, SelectedEffect};
 use super::evidence::SelectionEvidence;
 use super::pool::FitScope;
-use super::problem::{DiagnosisProblem, ColumnSource};
+use super::problem::{ColumnSource, DiagnosisProblem};
 
 /// Sets that are followed at once.
 const BEAM: usize = 6;
@@ -120,7 +120,10 @@ impl EffectSelector<'_> {
                 evidence: None,
             });
         }
-        EffectSearchResult { steps, rejected: refused }
+        EffectSearchResult {
+            steps,
+            rejected: refused,
+        }
     }
 
     /// The next step from what is accepted, with all constants and columns that depend on the fit made anew. What does not keep
@@ -184,12 +187,20 @@ impl EffectSelector<'_> {
     }
 
     /// Evidence for one set beside another, on the channels on which they differ.
-    fn evidence_between(&self, before: &[SelectedEffect], after: &[SelectedEffect]) -> SelectionEvidence {
+    fn evidence_between(
+        &self,
+        before: &[SelectedEffect],
+        after: &[SelectedEffect],
+    ) -> SelectionEvidence {
         self.evidence(before, after, &self.differing_channels(before, after))
     }
 
     /// Channels on which two sets differ.
-    fn differing_channels(&self, before: &[SelectedEffect], after: &[SelectedEffect]) -> Vec<usize> {
+    fn differing_channels(
+        &self,
+        before: &[SelectedEffect],
+        after: &[SelectedEffect],
+    ) -> Vec<usize> {
         let mut differ = set_difference(after, before);
         differ.extend(set_difference(before, after));
         self.affected_channels(&differ)
@@ -197,7 +208,11 @@ impl EffectSelector<'_> {
 
     /// Whether evidence speaks for one set beside another that is to take its place. What was found step by step need not prove
     /// itself again as a whole: a large loss that its parameters are worth is enough.
-    pub(crate) fn is_worse(&mut self, settled: &[SelectedEffect], before: &[SelectedEffect]) -> bool {
+    pub(crate) fn is_worse(
+        &mut self,
+        settled: &[SelectedEffect],
+        before: &[SelectedEffect],
+    ) -> bool {
         self.weigh_channels(before);
         let channels: Vec<usize> = (0..self.weights.len()).collect();
         self.evidence(settled, before, &channels).is_worth_keeping()
@@ -205,7 +220,8 @@ impl EffectSelector<'_> {
 
     /// Whether a set is another one and a further effect, which may take the place of what it holds.
     fn is_addition(&self, accepted: &[SelectedEffect], trial: &ScoredEffectSet) -> bool {
-        let is_new = |pick: &&SelectedEffect| accepted.iter().all(|p| p.candidate != pick.candidate);
+        let is_new =
+            |pick: &&SelectedEffect| accepted.iter().all(|p| p.candidate != pick.candidate);
         let mut news = trial.picks.iter().filter(is_new);
         let (Some(new), None) = (news.next(), news.next()) else {
             return false;
@@ -252,7 +268,11 @@ impl EffectSelector<'_> {
     }
 
     /// All sets that one more effect makes of those in the beam, the best of them improved by exchanges; best first.
-    fn grow_sets(&mut self, accepted: &[SelectedEffect], beam: &[Vec<SelectedEffect>]) -> Vec<ScoredEffectSet> {
+    fn grow_sets(
+        &mut self,
+        accepted: &[SelectedEffect],
+        beam: &[Vec<SelectedEffect>],
+    ) -> Vec<ScoredEffectSet> {
         let all: Vec<SelectedEffect> = beam.iter().flatten().cloned().collect();
         let table = self.projected_gram(&all);
         let (factors, _) = self.fit(accepted, FitScope::All);
@@ -295,7 +315,8 @@ impl EffectSelector<'_> {
             .min_by(|a, b| a.squares.total_cmp(&b.squares))
             .map_or(worth, |best| {
                 let (factors, _) = self.fit(&best.picks, FitScope::All);
-                worth.max(self.effective_equations(&self.residual(&best.picks, &factors), &channels))
+                worth
+                    .max(self.effective_equations(&self.residual(&best.picks, &factors), &channels))
             });
         let problem = self.problem;
         let score = |trial: &ScoredEffectSet| criterion(problem, trial, worth);
@@ -347,7 +368,10 @@ impl EffectSelector<'_> {
                     None => break,
                 }
             }
-            if trials.iter().all(|known| !is_same_set(&known.picks, &best.picks)) {
+            if trials
+                .iter()
+                .all(|known| !is_same_set(&known.picks, &best.picks))
+            {
                 trials.push(best);
             }
         }
@@ -361,8 +385,14 @@ impl EffectSelector<'_> {
 
     /// The best of all pairs of further effects beside the accepted ones, and in place of any of these: a pair may explain all
     /// where neither does much alone, and where what is shared by two places comes first.
-    fn best_pairs(&self, accepted: &[SelectedEffect], table: &ProjectedGram, worth: f64) -> Vec<ScoredEffectSet> {
-        let is_new = |pick: &&SelectedEffect| accepted.iter().all(|p| p.candidate != pick.candidate);
+    fn best_pairs(
+        &self,
+        accepted: &[SelectedEffect],
+        table: &ProjectedGram,
+        worth: f64,
+    ) -> Vec<ScoredEffectSet> {
+        let is_new =
+            |pick: &&SelectedEffect| accepted.iter().all(|p| p.candidate != pick.candidate);
         let alone = |pick: &SelectedEffect| {
             let mut set = accepted.to_vec();
             set.push(pick.clone());
@@ -370,7 +400,8 @@ impl EffectSelector<'_> {
         };
         let simple = self.current_choices.iter().flatten().filter(is_new);
         let simple = simple.filter(|pick| self.freedoms(pick) <= 2);
-        let mut further: Vec<(f64, &SelectedEffect)> = simple.map(|pick| (alone(pick), pick)).collect();
+        let mut further: Vec<(f64, &SelectedEffect)> =
+            simple.map(|pick| (alone(pick), pick)).collect();
         further.sort_by(|a, b| a.0.total_cmp(&b.0));
         further.truncate(PAIRED);
         let mut kept: Vec<Vec<SelectedEffect>> = vec![accepted.to_vec()];
@@ -408,7 +439,8 @@ impl EffectSelector<'_> {
     /// Tries members of a set against candidates that come close, each with constants that are searched finely: on their
     /// grids the wrong one may have been nearer to its best value.
     fn exchange_finely(&mut self, mut picks: Vec<SelectedEffect>) -> Vec<SelectedEffect> {
-        let is_searched = |bench: &Self, pick: &SelectedEffect| bench.candidate(pick).searched_constants > 0;
+        let is_searched =
+            |bench: &Self, pick: &SelectedEffect| bench.candidate(pick).searched_constants > 0;
         let mut table = self.projected_gram(&picks);
         for i in 0..picks.len() {
             let mut others = picks.clone();
@@ -472,7 +504,11 @@ impl EffectSelector<'_> {
     }
 
     /// Where several simple effects with no more freedoms than a large one explain more, the first of them.
-    fn simplest_single_effect(&self, accepted: &[SelectedEffect], best: &ScoredEffectSet) -> Option<(ScoredEffectSet, SelectionEvidence)> {
+    fn simplest_single_effect(
+        &self,
+        accepted: &[SelectedEffect],
+        best: &ScoredEffectSet,
+    ) -> Option<(ScoredEffectSet, SelectionEvidence)> {
         let before: usize = accepted.iter().map(|p| self.freedoms(p)).sum();
         let budget = best.freedoms.checked_sub(before)?;
         if budget < 2 {
@@ -511,7 +547,8 @@ impl EffectSelector<'_> {
             if next.squares < best.squares {
                 let first = first?;
                 let news = set_difference(&first.picks, accepted);
-                let evidence = self.evidence(accepted, &first.picks, &self.affected_channels(&news));
+                let evidence =
+                    self.evidence(accepted, &first.picks, &self.affected_channels(&news));
                 return evidence.is_sufficient().then_some((first, evidence));
             }
         }
@@ -544,7 +581,8 @@ impl EffectSelector<'_> {
             trial.is_possible()
                 && Self::replaced_effects(accepted, &trial.picks).is_empty()
                 && simple.rank < own.rank
-                && self.candidate(simple).searched_constants <= self.candidate(own).searched_constants
+                && self.candidate(simple).searched_constants
+                    <= self.candidate(own).searched_constants
                 && (refines || self.is_in_conditional_span(simple, own, &beside))
         });
         let mut simpler: Vec<(ScoredEffectSet, SelectionEvidence)> = Vec::new();
@@ -587,7 +625,10 @@ impl EffectSelector<'_> {
     }
 
     /// Members of a set that are no longer in another.
-    fn replaced_effects(accepted: &[SelectedEffect], picks: &[SelectedEffect]) -> Vec<SelectedEffect> {
+    fn replaced_effects(
+        accepted: &[SelectedEffect],
+        picks: &[SelectedEffect],
+    ) -> Vec<SelectedEffect> {
         let gone = |pick: &&SelectedEffect| picks.iter().all(|p| p.candidate != pick.candidate);
         accepted.iter().filter(gone).cloned().collect()
     }
@@ -624,7 +665,10 @@ fn overlap(problem: &DiagnosisProblem, picks: &[SelectedEffect]) -> f64 {
 }
 
 /// Picks of a set whose candidate is not in another.
-pub(crate) fn set_difference(set: &[SelectedEffect], other: &[SelectedEffect]) -> Vec<SelectedEffect> {
+pub(crate) fn set_difference(
+    set: &[SelectedEffect],
+    other: &[SelectedEffect],
+) -> Vec<SelectedEffect> {
     let is_new = |pick: &&SelectedEffect| other.iter().all(|p| p.candidate != pick.candidate);
     let new: Vec<SelectedEffect> = set.iter().filter(is_new).cloned().collect();
     if new.is_empty() { set.to_vec() } else { new }

@@ -2,7 +2,7 @@
 
 use super::bench::{EffectSelector, SelectedEffect, n_columns};
 use super::pool::FitScope;
-use super::problem::{ReadingFaultKind, ForceReadingFault, ColumnSource};
+use super::problem::{ColumnSource, ForceReadingFault, ReadingFaultKind};
 use super::search::criterion;
 
 /// By how much the criterion must fall for an exchange of members.
@@ -20,11 +20,16 @@ impl EffectSelector<'_> {
             let mut others = picks.clone();
             let own = others.remove(i);
             self.update_choices(&others);
-            let rank = self.current_choices[own.candidate].as_ref().map_or(0, |p| p.rank);
+            let rank = self.current_choices[own.candidate]
+                .as_ref()
+                .map_or(0, |p| p.rank);
             let beside = self.conditioning_set(&others);
             let nested: Vec<SelectedEffect> = (self.current_choices.iter().flatten())
                 .filter(|one| one.rank < rank)
-                .filter(|one| self.candidate(one).searched_constants <= self.candidate(&own).searched_constants)
+                .filter(|one| {
+                    self.candidate(one).searched_constants
+                        <= self.candidate(&own).searched_constants
+                })
                 .filter(|one| self.is_in_conditional_span(one, &own, &beside))
                 .cloned()
                 .collect();
@@ -35,8 +40,12 @@ impl EffectSelector<'_> {
                 let trial = self.fit_set(set);
                 // What takes the place of a wider effect must be worth something by itself.
                 if trial.is_possible()
-                    && !self.evidence(&trial.picks, &picks, &channels).is_sufficient()
-                    && self.evidence(&others, &trial.picks, &channels).is_sufficient()
+                    && !self
+                        .evidence(&trial.picks, &picks, &channels)
+                        .is_sufficient()
+                    && self
+                        .evidence(&others, &trial.picks, &channels)
+                        .is_sufficient()
                 {
                     picks = trial.picks;
                     break;
@@ -125,7 +134,12 @@ impl EffectSelector<'_> {
     }
 
     /// A set with one effect for two of its members that together are the same.
-    fn merge_identical_pair(&mut self, picks: &[SelectedEffect], i: usize, j: usize) -> Option<Vec<SelectedEffect>> {
+    fn merge_identical_pair(
+        &mut self,
+        picks: &[SelectedEffect],
+        i: usize,
+        j: usize,
+    ) -> Option<Vec<SelectedEffect>> {
         let pair = [picks[i].clone(), picks[j].clone()];
         let others = without_members(picks, &[i, j]);
         let wide = self.wider_candidates(&pair);
@@ -142,7 +156,12 @@ impl EffectSelector<'_> {
 
     /// A set with one effect for two members at a place, of which it holds one, or is one with other constants, if the evidence
     /// that speaks for it does not speak for the pair beside it.
-    fn merge_similar_pair(&mut self, picks: &[SelectedEffect], i: usize, j: usize) -> Option<Vec<SelectedEffect>> {
+    fn merge_similar_pair(
+        &mut self,
+        picks: &[SelectedEffect],
+        i: usize,
+        j: usize,
+    ) -> Option<Vec<SelectedEffect>> {
         let pair = [picks[i].clone(), picks[j].clone()];
         let [one, two] = pair.each_ref().map(|p| &self.candidate(p).effect);
         if one.at != two.at {
@@ -161,7 +180,8 @@ impl EffectSelector<'_> {
         let seen = self.choose_candidates(&others, &is_curve);
         let channels = self.affected_channels(&pair);
         for one in seen.into_iter().flatten() {
-            let is_held = |p: &SelectedEffect| p.candidate == one.candidate || self.is_in_span(p, &one);
+            let is_held =
+                |p: &SelectedEffect| p.candidate == one.candidate || self.is_in_span(p, &one);
             if !pair.iter().any(is_held) {
                 continue;
             }
@@ -173,7 +193,9 @@ impl EffectSelector<'_> {
             if trial.is_possible()
                 && !for_both.is_sufficient()
                 && for_both.bic < AS_GOOD
-                && self.evidence(&others, &trial.picks, &channels).is_sufficient()
+                && self
+                    .evidence(&others, &trial.picks, &channels)
+                    .is_sufficient()
                 && !self.is_worse(&trial.picks, picks)
             {
                 return Some(trial.picks);
@@ -186,7 +208,8 @@ impl EffectSelector<'_> {
     fn wider_candidates(&self, pair: &[SelectedEffect]) -> Vec<usize> {
         let candidates = self.problem.candidates.iter().enumerate();
         let may_hold = candidates.filter(|(k, candidate)| {
-            let has_room = candidate.searched_constants == 0 && candidate.parameters.len() >= n_columns(pair);
+            let has_room =
+                candidate.searched_constants == 0 && candidate.parameters.len() >= n_columns(pair);
             // What does not depend on the fit is known already.
             has_room
                 && match &candidate.source {

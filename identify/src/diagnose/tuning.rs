@@ -2,14 +2,17 @@
 
 use super::bench::{EffectSelector, SelectedEffect};
 use super::column::ForceColumn;
-use super::problem::{LoadDependentQuery, ColumnSource};
+use super::problem::{ColumnSource, LoadDependentQuery};
 
 /// Where values of a constant are costly one is looked at, and others up to this factor away.
 const COARSE_SEARCH_FACTOR: f64 = 4.0;
 
 impl EffectSelector<'_> {
     /// Chooses the constants of each effect of a set anew, beside those of the others.
-    pub(crate) fn choose_constants(&mut self, mut picks: Vec<SelectedEffect>) -> Vec<SelectedEffect> {
+    pub(crate) fn choose_constants(
+        &mut self,
+        mut picks: Vec<SelectedEffect>,
+    ) -> Vec<SelectedEffect> {
         let problem = self.problem;
         for _ in 0..2 {
             let before = picks.clone();
@@ -44,7 +47,11 @@ impl EffectSelector<'_> {
 
     /// The same where one member is new in a set: of those that act on a drive on which it acts. Others feel it through the
     /// base alone.
-    pub(crate) fn refine_around_member(&mut self, picks: Vec<SelectedEffect>, member: usize) -> Vec<SelectedEffect> {
+    pub(crate) fn refine_around_member(
+        &mut self,
+        picks: Vec<SelectedEffect>,
+        member: usize,
+    ) -> Vec<SelectedEffect> {
         let channels = self.affected_channels(&picks[member..=member]);
         let acts_there = |pick: &SelectedEffect| {
             let own = self.affected_channels(std::slice::from_ref(pick));
@@ -71,8 +78,14 @@ impl EffectSelector<'_> {
             };
             let (name, value) = (name.clone(), *value);
             let mut grid: Vec<f64> = match &problem.candidates[candidate].source {
-                ColumnSource::Columns(choices) => choices.iter().map(|c| c.constants[0].1).collect(),
-                ColumnSource::LoadDependent => vec![value / COARSE_SEARCH_FACTOR, value, value * COARSE_SEARCH_FACTOR],
+                ColumnSource::Columns(choices) => {
+                    choices.iter().map(|c| c.constants[0].1).collect()
+                }
+                ColumnSource::LoadDependent => vec![
+                    value / COARSE_SEARCH_FACTOR,
+                    value,
+                    value * COARSE_SEARCH_FACTOR,
+                ],
                 _ => continue,
             };
             grid.sort_by(f64::total_cmp);

@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::bench::{EffectSelector, SelectedEffect};
 use super::pool::dot;
-use super::problem::{LocatedEffect, CandidateNature, ColumnSource};
+use super::problem::{CandidateNature, ColumnSource, LocatedEffect};
 
 /// Samples that are looked at, at most.
 const MOST: usize = 2000;
@@ -15,7 +15,11 @@ const ROUNDING: f64 = 1e-18;
 
 impl EffectSelector<'_> {
     /// Effects that may hide beside a set, which leaves `rest`.
-    pub(crate) fn find_undetermined(&self, picks: &[SelectedEffect], rest: &[Vec<f64>]) -> Vec<LocatedEffect> {
+    pub(crate) fn find_undetermined(
+        &self,
+        picks: &[SelectedEffect],
+        rest: &[Vec<f64>],
+    ) -> Vec<LocatedEffect> {
         let every = self.pool.all_samples().len().div_ceil(MOST).max(1);
         let mut basis: Vec<DVector<f64>> = Vec::new();
         for k in self.columns(picks) {

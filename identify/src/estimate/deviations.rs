@@ -27,7 +27,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::estimate::error::LeastSquaresError;
-use crate::estimate::lags::{LagProducts, BartlettWindows, bandwidth, lags_for_bandwidth};
+use crate::estimate::lags::{BartlettWindows, LagProducts, bandwidth, lags_for_bandwidth};
 use crate::estimate::rows::{RowVisitor, check_rows};
 use crate::estimate::solution::RegressionSolution;
 
@@ -80,7 +80,9 @@ pub fn uncertainty_with_autocorrelation<E: From<LeastSquaresError>>(
     mut show: impl FnMut(&mut RowVisitor<'_>) -> Result<(), E>,
 ) -> Result<ParameterUncertainty, E> {
     let mut scores = InfluenceScores::new(solution, channels.max(1));
-    from_influences(solution, channels, |take| scores.show_influences(&mut show, take))
+    from_influences(solution, channels, |take| {
+        scores.show_influences(&mut show, take)
+    })
 }
 
 /// Takes each sample's influence on the parameters and its residuals.
@@ -358,7 +360,8 @@ mod tests {
             regression.add_rows(&w, &y).unwrap();
             let solution = regression.solve().unwrap();
             let honest =
-                uncertainty_with_autocorrelation(&solution, channels, |visit| visit(&w, &y)).unwrap();
+                uncertainty_with_autocorrelation(&solution, channels, |visit| visit(&w, &y))
+                    .unwrap();
             for j in 0..3 {
                 let error = (solution.values[j] - truth[j]).abs();
                 hits.0[j] += f64::from(u8::from(error <= 2.0 * honest.std[j])) / f64::from(trials);
@@ -400,11 +403,13 @@ mod tests {
         let mut regression = LeastSquares::new(3);
         regression.add_rows(&w, &y).unwrap();
         let solution = regression.solve().unwrap();
-        let deviations = uncertainty_with_autocorrelation(&solution, 1, |visit| visit(&w, &y)).unwrap();
+        let deviations =
+            uncertainty_with_autocorrelation(&solution, 1, |visit| visit(&w, &y)).unwrap();
         assert!(deviations.std[0].is_finite() && deviations.std[1].is_finite());
         assert!(deviations.std[2].is_infinite());
         let other =
-            uncertainty_with_autocorrelation(&solution, 1, |visit| visit(&w[..30], &y[..10])).unwrap_err();
+            uncertainty_with_autocorrelation(&solution, 1, |visit| visit(&w[..30], &y[..10]))
+                .unwrap_err();
         assert_eq!(
             other,
             LeastSquaresError::PassesDiffer {

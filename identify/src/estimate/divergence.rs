@@ -114,7 +114,9 @@ impl MisfitFunction<'_> {
     ) -> Result<usize, PhysicalError> {
         let mut damping = 1e-9;
         for iteration in 0..500 {
-            let point = self.evaluate_at(x, weight).ok_or(PhysicalError::NoConvergence)?;
+            let point = self
+                .evaluate_at(x, weight)
+                .ok_or(PhysicalError::NoConvergence)?;
             let second = &point.data + &point.prior;
             let mut moved = false;
             while !moved && damping < 1e9 {

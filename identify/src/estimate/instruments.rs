@@ -90,7 +90,11 @@ pub fn estimate_with_instruments<E: From<LeastSquaresError>>(
             Ok(())
         } else {
             let (first, now) = (regression.rows(), rows);
-            Err(LeastSquaresError::PassesDiffer { first, this_pass: now }.into())
+            Err(LeastSquaresError::PassesDiffer {
+                first,
+                this_pass: now,
+            }
+            .into())
         }
     })?;
     Ok(InstrumentalEstimate {
@@ -109,7 +113,10 @@ struct InstrumentalSolution {
     to_parameters: DMatrix<f64>,
 }
 
-fn solve_instrumental(regression: &LeastSquares, n: usize) -> Result<InstrumentalSolution, LeastSquaresError> {
+fn solve_instrumental(
+    regression: &LeastSquares,
+    n: usize,
+) -> Result<InstrumentalSolution, LeastSquaresError> {
     let width = 2 * n + 1;
     let triangle = regression.augmented_factor();
     let entry = |i: usize, j: usize| triangle[i * width + j];

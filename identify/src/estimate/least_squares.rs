@@ -15,7 +15,7 @@ use nalgebra::DMatrix;
 use crate::estimate::error::LeastSquaresError;
 use crate::estimate::reflections::{HouseholderBlock, LANES, fold_into_factor};
 use crate::estimate::rows::{all_finite, check_rows, is_uninformative};
-use crate::estimate::solution::{RowCount, RegressionSolution, solve_r_factor};
+use crate::estimate::solution::{RegressionSolution, RowCount, solve_r_factor};
 
 /// Numbers that are reduced together at most, so that they stay in the fastest caches.
 const BLOCK_NUMBERS: usize = 4096;

@@ -33,18 +33,19 @@ mod undetermined;
 mod weighted_rows;
 
 pub use body_matrices::{BodyMatrix, MatrixMap, planar_pseudo_inertia, pseudo_inertia};
-pub use deviations::{ParameterUncertainty, FEWEST_ROWS, uncertainty_with_autocorrelation};
+pub use deviations::{FEWEST_ROWS, ParameterUncertainty, uncertainty_with_autocorrelation};
 pub use divergence::BaseMap;
 pub use error::{LeastSquaresError, PhysicalError};
-pub use essential::{DroppedParameter, EssentialParameters, EssentialOptions, select_essential};
+pub use essential::{DroppedParameter, EssentialOptions, EssentialParameters, select_essential};
 pub use instruments::{InstrumentalEstimate, estimate_with_instruments};
 pub use least_squares::LeastSquares;
 pub use numeric_rank::{
-    NumericDependency, NumericReduction, RegressorRank, condition_number, numeric_rank, reduce_numerically,
+    NumericDependency, NumericReduction, RegressorRank, condition_number, numeric_rank,
+    reduce_numerically,
 };
 pub use physical::{NOMINAL_WEIGHT, PhysicalParameters, physical_parameters};
 pub use prior::{ParameterPrior, solve_with_prior};
-pub use reweighted::{WeightedEstimate, EstimateOptions, HUBER_BOUND, estimate};
+pub use reweighted::{EstimateOptions, HUBER_BOUND, WeightedEstimate, estimate};
 pub use rows::RowVisitor;
 pub use solution::{RANK_TOLERANCE, RegressionSolution};
 pub use triangle::RFactor;

@@ -98,7 +98,9 @@ pub fn physical_parameters(
         iterations += problem.minimise(&mut x, weight)?;
     }
     // What is left open if nominal values may be off by their own size.
-    let point = problem.evaluate_at(&x, 1.0).ok_or(PhysicalError::NoConvergence)?;
+    let point = problem
+        .evaluate_at(&x, 1.0)
+        .ok_or(PhysicalError::NoConvergence)?;
     let inverse = pseudo_inverse(&(&point.data + &point.prior));
     let before = pseudo_inverse(&point.prior);
     let (p, slopes) = base(x.as_slice());
@@ -323,7 +325,8 @@ mod tests {
         let case = case(40, 3.0);
         let (triangle, solution, deviations) = solved(&case);
         let found = find(&case);
-        let noise = (solution.residual_variance() * variance_inflation(&solution, &deviations)).sqrt();
+        let noise =
+            (solution.residual_variance() * variance_inflation(&solution, &deviations)).sqrt();
         let references: Vec<NominalBodyMatrix> = bodies()
             .iter()
             .map(|body| NominalBodyMatrix::new(body, &case.nominal).unwrap())
@@ -388,7 +391,10 @@ mod tests {
         }
         assert!(found.from_recording[..10].iter().all(|share| *share > 0.5));
         // Fourteen combinations of ten numbers tell each of them.
-        assert_eq!(found.individually_determined, [[true; 10], [false; 10]].concat());
+        assert_eq!(
+            found.individually_determined,
+            [[true; 10], [false; 10]].concat()
+        );
     }
 
     /// Of `x + y` and `z` only the last has a value of its own, whatever nominal values say beside.
@@ -400,7 +406,10 @@ mod tests {
             &[1e3, 1e3, 0.0, 0.0, 2e3, 2e3, 1e-3, 0.0, 0.0, 0.0, 1e-3, 0.0],
         );
         assert_eq!(individually_determined(&rows), [false, false, true, false]);
-        assert_eq!(individually_determined(&DMatrix::zeros(2, 2)), [false, false]);
+        assert_eq!(
+            individually_determined(&DMatrix::zeros(2, 2)),
+            [false, false]
+        );
         // Fourteen combinations of twenty numbers tell none of them.
         assert_eq!(find(&case(3, 0.05)).individually_determined, [false; 20]);
     }
@@ -422,12 +431,16 @@ mod tests {
             matrix: Box::new(|x: &[f64]| planar_pseudo_inertia(x[0], [x[1], 0.0], x[2])),
             copies: 2.0,
         };
-        let error = NominalBodyMatrix::new(&body, &[2.0, 1.0, 0.4]).err().unwrap();
+        let error = NominalBodyMatrix::new(&body, &[2.0, 1.0, 0.4])
+            .err()
+            .unwrap();
         assert!(
             error.to_string().contains("link") && error.to_string().contains("inertia"),
             "{error}"
         );
-        let error = NominalBodyMatrix::new(&body, &[0.0, 0.0, 0.4]).err().unwrap();
+        let error = NominalBodyMatrix::new(&body, &[0.0, 0.0, 0.4])
+            .err()
+            .unwrap();
         assert!(error.to_string().contains("mass"), "{error}");
     }
 }

@@ -95,7 +95,10 @@ pub fn solve_with_prior(
 }
 
 /// How much larger the variances are than for independent residuals: the median over the parameters, at least 1.
-pub(crate) fn variance_inflation(solution: &RegressionSolution, deviations: &ParameterUncertainty) -> f64 {
+pub(crate) fn variance_inflation(
+    solution: &RegressionSolution,
+    deviations: &ParameterUncertainty,
+) -> f64 {
     let mut ratios: Vec<f64> = deviations
         .std
         .iter()

@@ -18,7 +18,10 @@ pub(crate) struct HouseholderBlock<'a> {
 
 /// Folds a block into the row-major upper triangle of as many columns; the block is used up.
 pub(crate) fn fold_into_factor(triangle: &mut [f64], block: HouseholderBlock<'_>) {
-    Arch::new().dispatch(HouseholderFold { factor: triangle, block });
+    Arch::new().dispatch(HouseholderFold {
+        factor: triangle,
+        block,
+    });
 }
 
 struct HouseholderFold<'a> {

@@ -16,7 +16,7 @@ use crate::estimate::rows::RowVisitor;
 use crate::estimate::solution::RegressionSolution;
 use crate::estimate::triangle::RFactor;
 use crate::estimate::weighted_rows::{
-    WeightedRows, RowWeighting, outlier_share, reweight_rows, residual_scales, show_weighted,
+    RowWeighting, WeightedRows, outlier_share, residual_scales, reweight_rows, show_weighted,
 };
 
 /// Huber's bound for 95 % efficiency under normal residuals, in standard deviations.
@@ -165,7 +165,13 @@ mod tests {
     }
 
     /// Two channels with errors of different size, correlated in time by `memory`; a share of `spoilt` is far off.
-    fn rows(noise: &mut TestNoise, samples: i32, sizes: [f64; 2], memory: f64, spoilt: f64) -> Rows {
+    fn rows(
+        noise: &mut TestNoise,
+        samples: i32,
+        sizes: [f64; 2],
+        memory: f64,
+        spoilt: f64,
+    ) -> Rows {
         let (mut w, mut y, mut state) = (Vec::new(), Vec::new(), [0.0; 2]);
         for i in 0..samples {
             for channel in 0..2 {
@@ -385,7 +391,8 @@ mod tests {
             &beliefs,
         )
         .unwrap();
-        let inflation = crate::estimate::prior::variance_inflation(&found.solution, &found.uncertainty);
+        let inflation =
+            crate::estimate::prior::variance_inflation(&found.solution, &found.uncertainty);
         let variance = found.solution.residual_variance() * inflation;
         let w = DMatrix::from_row_slice(800, 3, &rows.w);
         let y = DVector::from_column_slice(&rows.y);

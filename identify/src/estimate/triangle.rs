@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::estimate::error::LeastSquaresError;
 use crate::estimate::least_squares::LeastSquares;
-use crate::estimate::solution::{RowCount, RegressionSolution, solve_r_factor};
+use crate::estimate::solution::{RegressionSolution, RowCount, solve_r_factor};
 
 /// The upper triangle `[R, Q'y; 0, +-|residual|]` of some rows: all that they say about the parameters.
 #[derive(Debug, Clone, PartialEq)]

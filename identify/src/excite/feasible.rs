@@ -1,7 +1,7 @@
 //! Limits kept at all times: a trajectory goes in; the same, shrunk as little as need be, comes out.
 
 use super::measure::{TrajectoryEvaluator, excess};
-use super::{ExcitationLimits, LimitMargin, ExcitationMotion, FourierSeries};
+use super::{ExcitationLimits, ExcitationMotion, FourierSeries, LimitMargin};
 
 /// Samples over a period at which limits of the plant are checked, for each that the search uses.
 const LIMIT_CHECK_REFINEMENT: usize = 16;
@@ -28,7 +28,10 @@ pub(super) fn max_scale_factor(limits: &ExcitationLimits, series: &FourierSeries
 
 /// Shrinks each series to the limits of its coordinate, and all together to those of the plant; the value of what is
 /// left. `None` if nothing worth having is left.
-pub(super) fn shrink_to_limits(measure: &TrajectoryEvaluator<'_>, series: &[FourierSeries]) -> Option<(f64, Vec<FourierSeries>)> {
+pub(super) fn shrink_to_limits(
+    measure: &TrajectoryEvaluator<'_>,
+    series: &[FourierSeries],
+) -> Option<(f64, Vec<FourierSeries>)> {
     let kept = shrink_to_coordinate_limits(measure, series, 1.0);
     // What the search left between the motion and its limits is mostly worth having.
     let filled = shrink_to_coordinate_limits(measure, series, f64::INFINITY);
@@ -38,7 +41,11 @@ pub(super) fn shrink_to_limits(measure: &TrajectoryEvaluator<'_>, series: &[Four
 }
 
 /// Each series within the limits of its coordinate.
-fn shrink_to_coordinate_limits(measure: &TrajectoryEvaluator<'_>, series: &[FourierSeries], most: f64) -> Vec<FourierSeries> {
+fn shrink_to_coordinate_limits(
+    measure: &TrajectoryEvaluator<'_>,
+    series: &[FourierSeries],
+    most: f64,
+) -> Vec<FourierSeries> {
     let pairs = series.iter().zip(measure.limits);
     pairs
         .map(|(one, limits)| fit_into_ranges(limits, one, most))
@@ -46,11 +53,15 @@ fn shrink_to_coordinate_limits(measure: &TrajectoryEvaluator<'_>, series: &[Four
 }
 
 /// Shrinks all series together to the limits of the plant.
-fn shrink_to_plant_limits(measure: &TrajectoryEvaluator<'_>, mut kept: Vec<FourierSeries>) -> Option<(f64, Vec<FourierSeries>)> {
+fn shrink_to_plant_limits(
+    measure: &TrajectoryEvaluator<'_>,
+    mut kept: Vec<FourierSeries>,
+) -> Option<(f64, Vec<FourierSeries>)> {
     let fine = LIMIT_CHECK_REFINEMENT * super::samples_per_period(measure.options);
     let mut factor = 1.0_f64;
     for _ in 0..60 {
-        let trial: Vec<FourierSeries> = kept.iter().map(|one| one.scale_amplitude(factor)).collect();
+        let trial: Vec<FourierSeries> =
+            kept.iter().map(|one| one.scale_amplitude(factor)).collect();
         match worst_plant_limit(measure, &trial, fine) {
             Some((_, excess)) if excess <= -LIMIT_CLEARANCE => {
                 kept = trial;
@@ -58,7 +69,9 @@ fn shrink_to_plant_limits(measure: &TrajectoryEvaluator<'_>, mut kept: Vec<Fouri
                 return value.is_finite().then_some((value, kept));
             }
             // Steps follow the excess, so that little is given away.
-            Some((_, excess)) => factor *= (1.0 - 0.5 * (excess + 2.0 * LIMIT_CLEARANCE)).clamp(0.8, 0.9999),
+            Some((_, excess)) => {
+                factor *= (1.0 - 0.5 * (excess + 2.0 * LIMIT_CLEARANCE)).clamp(0.8, 0.9999)
+            }
             None => factor *= 0.9,
         }
     }
@@ -92,7 +105,10 @@ pub(super) fn worst_plant_limit(
 ) -> Option<(usize, f64)> {
     let motion = ExcitationMotion::sample(series, samples);
     let all = measure.plant.excess(&motion)?;
-    let peaks = all.iter().map(|values| largest_between_samples(values)).enumerate();
+    let peaks = all
+        .iter()
+        .map(|values| largest_between_samples(values))
+        .enumerate();
     Some(
         peaks
             .max_by(|a, b| a.1.total_cmp(&b.1))
@@ -114,7 +130,10 @@ fn largest_between_samples(values: &[f64]) -> f64 {
 }
 
 /// How close a trajectory comes to each of its limits.
-pub(super) fn margins(measure: &TrajectoryEvaluator<'_>, series: &[FourierSeries]) -> Vec<LimitMargin> {
+pub(super) fn margins(
+    measure: &TrajectoryEvaluator<'_>,
+    series: &[FourierSeries],
+) -> Vec<LimitMargin> {
     let what = ["", "_d", "_dd"];
     let mut margins: Vec<LimitMargin> = measure
         .ranges()
@@ -128,12 +147,17 @@ pub(super) fn margins(measure: &TrajectoryEvaluator<'_>, series: &[FourierSeries
             }
         })
         .collect();
-    let fine = ExcitationMotion::sample(series, LIMIT_CHECK_REFINEMENT * super::samples_per_period(measure.options));
+    let fine = ExcitationMotion::sample(
+        series,
+        LIMIT_CHECK_REFINEMENT * super::samples_per_period(measure.options),
+    );
     let all = measure.plant.excess(&fine);
     for (k, name) in measure.plant.limits().into_iter().enumerate() {
         margins.push(LimitMargin {
             name,
-            excess: all.as_ref().map_or(f64::INFINITY, |all| largest_between_samples(&all[k])),
+            excess: all
+                .as_ref()
+                .map_or(f64::INFINITY, |all| largest_between_samples(&all[k])),
             proven: false,
         });
     }

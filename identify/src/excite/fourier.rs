@@ -170,7 +170,11 @@ mod tests {
         let step = 1e-5;
         for i in 0..20 {
             let t = 0.1 * f64::from(i);
-            let (before, now, after) = (series.at_time(t - step), series.at_time(t), series.at_time(t + step));
+            let (before, now, after) = (
+                series.at_time(t - step),
+                series.at_time(t),
+                series.at_time(t + step),
+            );
             for d in 0..2 {
                 let slope = (after[d] - before[d]) / (2.0 * step);
                 assert!((slope - now[d + 1]).abs() < 1e-6);

@@ -4,7 +4,10 @@ use std::cell::Cell;
 
 use nalgebra::DMatrix;
 
-use super::{ExcitationLimits, ExcitationCriterion, ExcitationMotion, Options, ExcitationPlant, FourierSeries, samples_per_period};
+use super::{
+    ExcitationCriterion, ExcitationLimits, ExcitationMotion, ExcitationPlant, FourierSeries,
+    Options, samples_per_period,
+};
 
 /// A plant with limits and options, counting evaluations.
 pub(super) struct TrajectoryEvaluator<'a> {

@@ -2,7 +2,7 @@
 
 use super::feasible::{max_scale_factor, worst_plant_limit};
 use super::measure::{TrajectoryEvaluator, half_width};
-use super::{ExcitationCriterion, ExciteError, SearchFlow, FourierSeries};
+use super::{ExcitationCriterion, ExciteError, FourierSeries, SearchFlow};
 
 /// Trajectories that kept the limits.
 pub(super) struct FeasibleStarts {
@@ -107,7 +107,11 @@ pub(super) fn draw_feasible(
 }
 
 /// A series of one coordinate that fills the tightest of its limits, around a mean value that leaves it room.
-fn draw_series(measure: &TrajectoryEvaluator<'_>, i: usize, draws: &mut TrajectoryRandom) -> FourierSeries {
+fn draw_series(
+    measure: &TrajectoryEvaluator<'_>,
+    i: usize,
+    draws: &mut TrajectoryRandom,
+) -> FourierSeries {
     let n = measure.options.harmonics;
     let omega = measure.omega();
     let [low, high] = measure.limits[i].position;

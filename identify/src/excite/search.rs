@@ -9,7 +9,7 @@ use std::cell::{Cell, RefCell};
 use slsqp::{StopTols, minimize};
 
 use super::measure::{TrajectoryEvaluator, excess, half_width};
-use super::{ExcitationCriterion, SearchFlow, ExcitationMotion, FourierSeries};
+use super::{ExcitationCriterion, ExcitationMotion, FourierSeries, SearchFlow};
 
 /// Sharpness of the smooth largest value, in the first round and in those that polish.
 const FIRST: f64 = 50.0;
@@ -75,7 +75,10 @@ fn optimise_round(
             }
             return 0.0;
         }
-        let is_known = known.borrow().as_ref().is_some_and(|known| known.point == x);
+        let is_known = known
+            .borrow()
+            .as_ref()
+            .is_some_and(|known| known.point == x);
         if !is_known {
             flow.set(progress(usize::from(k == 0)));
             *known.borrow_mut() = Some(linearise(measure, scales, x, sharpness));
@@ -118,7 +121,12 @@ fn optimise_round(
 }
 
 /// Values and central differences.
-fn linearise(measure: &TrajectoryEvaluator<'_>, scales: &CoefficientScales<'_, '_>, x: &[f64], sharpness: f64) -> ConstraintLinearisation {
+fn linearise(
+    measure: &TrajectoryEvaluator<'_>,
+    scales: &CoefficientScales<'_, '_>,
+    x: &[f64],
+    sharpness: f64,
+) -> ConstraintLinearisation {
     let at = x.to_vec();
     let step = match measure.options.criterion {
         ExcitationCriterion::Separation => SEPARATION_STEP,
@@ -146,10 +154,19 @@ fn linearise(measure: &TrajectoryEvaluator<'_>, scales: &CoefficientScales<'_, '
 }
 
 /// The objective, then all constraints.
-fn objective_and_constraints(measure: &TrajectoryEvaluator<'_>, scales: &CoefficientScales<'_, '_>, x: &[f64], sharpness: f64) -> Vec<f64> {
+fn objective_and_constraints(
+    measure: &TrajectoryEvaluator<'_>,
+    scales: &CoefficientScales<'_, '_>,
+    x: &[f64],
+    sharpness: f64,
+) -> Vec<f64> {
     let motion = measure.sample_motion(&scales.decode(x));
     let value = measure.criterion_value(&motion);
-    let mut values = vec![if value.is_finite() { value } else { INFEASIBLE_VALUE }];
+    let mut values = vec![if value.is_finite() {
+        value
+    } else {
+        INFEASIBLE_VALUE
+    }];
     for (i, derivative, range) in measure.ranges() {
         let ExcitationMotion { q, qd, qdd } = &motion;
         let column = [q, qd, qdd][derivative];
@@ -197,7 +214,9 @@ impl<'m, 'a> CoefficientScales<'m, 'a> {
                     let by_acceleration = limits
                         .acceleration
                         .map_or(f64::INFINITY, |r| half_width(r) / (w * w));
-                    half_width(limits.position).min(by_rate).min(by_acceleration)
+                    half_width(limits.position)
+                        .min(by_rate)
+                        .min(by_acceleration)
                 })
                 .collect()
         });

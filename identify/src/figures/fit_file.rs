@@ -325,7 +325,8 @@ impl FitFile {
                 let present: Vec<String> = self.parameters.iter().map(|p| p.name.clone()).collect();
                 return Err(fail(FitFault::MissingParameter {
                     name: (*name).to_owned(),
-                    nearest: nearest_name(name, present.iter().map(String::as_str)).map(str::to_owned),
+                    nearest: nearest_name(name, present.iter().map(String::as_str))
+                        .map(str::to_owned),
                     present,
                 }));
             };

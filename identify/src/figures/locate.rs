@@ -90,7 +90,9 @@ pub fn locate_errors(
         let mut found: Vec<ErrorRegion> = variables
             .iter()
             .filter(|(_, values)| values.len() == error.len())
-            .filter_map(|(name, values)| densest_region(channel, &squares, total, name, values, options))
+            .filter_map(|(name, values)| {
+                densest_region(channel, &squares, total, name, values, options)
+            })
             .collect();
         found.sort_by(|a, b| (b.share - b.samples).total_cmp(&(a.share - a.samples)));
         found.truncate(options.most);

@@ -18,10 +18,14 @@ use std::fmt;
 use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 
-pub use filtered::{BandError, FilteredFigures, FilteredChannelFigures, TRIMMED_PART, add_filtered_forces};
+pub use filtered::{
+    BandError, FilteredChannelFigures, FilteredFigures, TRIMMED_PART, add_filtered_forces,
+};
 pub use fit_error::{FitFault, FitFileError};
-pub use fit_file::{EstimatorOutput, FitFile, FitParameter, ParameterInfo, ParameterStatus, fit_parameters};
-pub use locate::{LocateOptions, ErrorRegion, TIME_COLUMN, locate_errors};
+pub use fit_file::{
+    EstimatorOutput, FitFile, FitParameter, ParameterInfo, ParameterStatus, fit_parameters,
+};
+pub use locate::{ErrorRegion, LocateOptions, TIME_COLUMN, locate_errors};
 
 /// Error figures of a comparison.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -320,14 +324,18 @@ mod tests {
         assert!((figures.rms.unwrap() - (2.25_f64 / 8.0).sqrt()).abs() < 1e-15);
         let json = serde_json::to_value(&figures).unwrap();
         assert!(json["channels"]["b"]["mean_relative"].is_number());
-        assert_eq!(serde_json::from_value::<ErrorFigures>(json).unwrap(), figures);
+        assert_eq!(
+            serde_json::from_value::<ErrorFigures>(json).unwrap(),
+            figures
+        );
     }
 
     /// Squares of newtons and of newton metres have no sum.
     #[test]
     fn different_units_have_no_total_and_some_samples_do_not_count() {
         let names = ["a".to_owned(), "b".to_owned()];
-        let mut comparison = ErrorAccumulator::new(names).with_units(["N".to_owned(), "N m".to_owned()]);
+        let mut comparison =
+            ErrorAccumulator::new(names).with_units(["N".to_owned(), "N m".to_owned()]);
         let (measured, model) = (
             [3.0, 1.0, 9e9, 1.0, 4.0, 1.0],
             [3.0, 1.5, 0.0, 1.0, 5.0, 1.0],

@@ -182,7 +182,11 @@ fn jacobian_at(system: &InterpretationProblem, equations: &[usize], at: &[f64]) 
 }
 
 /// Standard deviations of a solution of as many equations as unknowns: `J x' = p'` gives `cov x = J^-1 cov p J^-T`.
-fn standard_deviations(system: &InterpretationProblem, used: &[usize], at: &[f64]) -> Option<Vec<f64>> {
+fn standard_deviations(
+    system: &InterpretationProblem,
+    used: &[usize],
+    at: &[f64],
+) -> Option<Vec<f64>> {
     let covariance = system.covariance.as_ref()?;
     let mut jacobian = jacobian_at(system, used, at);
     // Units must not decide what counts as singular.
@@ -265,7 +269,11 @@ fn exact_rank(mut rows: Vec<Vec<BigRational>>) -> usize {
 }
 
 /// What is not determined, at the nominal values; these are moved a little where they hide something.
-fn find_undetermined(system: &InterpretationProblem, jacobian: &[Vec<Polynomial>], at_least: usize) -> PhysicalInterpretation {
+fn find_undetermined(
+    system: &InterpretationProblem,
+    jacobian: &[Vec<Polynomial>],
+    at_least: usize,
+) -> PhysicalInterpretation {
     let n = system.nominal.len();
     // A product of two unknowns, one of them nominally zero, says nothing there.
     let point: Vec<f64> = system

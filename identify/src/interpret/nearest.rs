@@ -7,7 +7,8 @@ use nalgebra::{DMatrix, DVector};
 
 use super::roots::{RealSolutions, solve};
 use super::{
-    PhysicalInterpretation, PhysicalSolution, InterpretationProblem, equation, jacobian_at, residuals, roots_of_diagonal, whiten_rows,
+    InterpretationProblem, PhysicalInterpretation, PhysicalSolution, equation, jacobian_at,
+    residuals, roots_of_diagonal, whiten_rows,
 };
 use modelmill_algebra::polynomial::Polynomial;
 
@@ -16,7 +17,10 @@ const MOST_SUBSETS: usize = 40;
 const MOST_STEPS: usize = 500;
 
 /// Solutions of least squares; `used` are the equations in which unknowns stand.
-pub(crate) fn solve_least_squares(system: &InterpretationProblem, used: &[usize]) -> PhysicalInterpretation {
+pub(crate) fn solve_least_squares(
+    system: &InterpretationProblem,
+    used: &[usize],
+) -> PhysicalInterpretation {
     let n = system.nominal.len();
     let (weights, is_weighted) = whiten_rows(system.covariance.as_ref(), used, &system.values);
     let is_linear = used.iter().all(|k| system.equations[*k].degree() <= 1);

@@ -14,7 +14,8 @@ use modelmill_algebra::groebner::{
 };
 use modelmill_algebra::polynomial::{Polynomial, TermExponents, nearest_f64, unknown_polynomial};
 use modelmill_algebra::real_roots::{
-    RationalInterval, UnivariatePolynomial, halve_interval, is_squarefree, isolate_roots, squarefree_part,
+    RationalInterval, UnivariatePolynomial, halve_interval, is_squarefree, isolate_roots,
+    squarefree_part,
 };
 
 /// Most complex solutions of a system.
@@ -34,7 +35,10 @@ pub(crate) enum RealSolutions {
 }
 
 /// Solves equations `polynomial = 0` in `n` unknowns.
-pub(crate) fn solve(equations: &[Polynomial], n: usize) -> Result<RealSolutions, GroebnerLimitExceeded> {
+pub(crate) fn solve(
+    equations: &[Polynomial],
+    n: usize,
+) -> Result<RealSolutions, GroebnerLimitExceeded> {
     let mut work = GroebnerWork::default();
     let mut basis = groebner_basis(equations, &mut work)?;
     let mut is_radical = false;
@@ -94,7 +98,11 @@ impl QuotientRing<'_> {
     }
 
     /// 1, form, form^2, ... up to one power more than there are dimensions.
-    fn powers(&self, form: &Polynomial, work: &mut GroebnerWork) -> Result<Vec<Vec<BigRational>>, GroebnerLimitExceeded> {
+    fn powers(
+        &self,
+        form: &Polynomial,
+        work: &mut GroebnerWork,
+    ) -> Result<Vec<Vec<BigRational>>, GroebnerLimitExceeded> {
         let n = form.n;
         let mut one = Polynomial::new(n);
         one.add(TermExponents::unit_term(n), &BigRational::one());
@@ -112,11 +120,16 @@ impl QuotientRing<'_> {
     }
 
     /// The least polynomial that vanishes for the form, modulo the equations.
-    fn minimal_polynomial(&self, form: &Polynomial, work: &mut GroebnerWork) -> Result<UnivariatePolynomial, GroebnerLimitExceeded> {
+    fn minimal_polynomial(
+        &self,
+        form: &Polynomial,
+        work: &mut GroebnerWork,
+    ) -> Result<UnivariatePolynomial, GroebnerLimitExceeded> {
         let powers = self.powers(form, work)?;
         for k in 1..powers.len() {
             if let Some(mut factors) = solve_combinations(&powers[..k], &[&powers[k]]) {
-                let mut minimal: UnivariatePolynomial = factors.remove(0).into_iter().map(|f| -f).collect();
+                let mut minimal: UnivariatePolynomial =
+                    factors.remove(0).into_iter().map(|f| -f).collect();
                 minimal.push(BigRational::one());
                 return Ok(minimal);
             }
@@ -125,7 +138,11 @@ impl QuotientRing<'_> {
     }
 
     /// The shape of the solutions for a linear form, if the form tells all of them apart.
-    fn solve_shape_lemma(&self, k: i64, work: &mut GroebnerWork) -> Result<Option<ShapeLemmaSolution>, GroebnerLimitExceeded> {
+    fn solve_shape_lemma(
+        &self,
+        k: i64,
+        work: &mut GroebnerWork,
+    ) -> Result<Option<ShapeLemmaSolution>, GroebnerLimitExceeded> {
         let n = self.basis[0].n;
         let mut form = Polynomial::new(n);
         let mut weight = 1_i64;

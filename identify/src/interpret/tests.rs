@@ -3,7 +3,12 @@ use super::*;
 /// `sum of factor * product of powers` for each equation.
 type Equations<'a> = &'a [&'a [(f64, &'a [(usize, u32)])]];
 
-fn system(n: usize, equations: Equations<'_>, values: &[f64], std: Option<f64>) -> InterpretationProblem {
+fn system(
+    n: usize,
+    equations: Equations<'_>,
+    values: &[f64],
+    std: Option<f64>,
+) -> InterpretationProblem {
     let polynomial = |terms: &&[(f64, &[(usize, u32)])]| {
         let mut p = Polynomial::new(n);
         for (factor, powers) in *terms {

@@ -43,7 +43,11 @@ pub(crate) struct DifferentiatedSignal<'a> {
 /// A low cut-off loses more samples at the ends, so the highest one is returned whose expected error is within a quarter
 /// of the smallest, or below 0.03 % of the acceleration; never above a fifth of the sampling rate, where central
 /// differences take more than the filter leaves.
-pub(crate) fn choose_cutoff(signals: &[DifferentiatedSignal<'_>], rate_hz: f64, order: usize) -> Option<f64> {
+pub(crate) fn choose_cutoff(
+    signals: &[DifferentiatedSignal<'_>],
+    rate_hz: f64,
+    order: usize,
+) -> Option<f64> {
     let samples = signals.first()?.values.len();
     if samples < 32 || !(rate_hz > 0.0 && rate_hz.is_finite()) {
         return None;
@@ -117,8 +121,9 @@ impl AccelerationSpectrum {
         let power = hann_power(&differences);
         let bins = power.len();
         let angle = |k: usize| PI * k as f64 / (bins - 1) as f64;
-        let shape =
-            |k: usize| (2.0 * rate_hz * (0.5 * angle(k)).sin()).powi(2 * i32::from(signal.derivative_order));
+        let shape = |k: usize| {
+            (2.0 * rate_hz * (0.5 * angle(k)).sin()).powi(2 * i32::from(signal.derivative_order))
+        };
         let upper: Vec<f64> = (bins * 3 / 4..bins - 1)
             .map(|k| power[k] / shape(k))
             .collect();
@@ -161,7 +166,13 @@ impl AccelerationSpectrum {
 
     /// Expected square error of the filtered acceleration, relative to the square of its size plus that error, where the
     /// filter passes `passed` of each frequency and noise of power 1 becomes one of power `noise`.
-    fn relative_error(&self, passed: &[f64], noise: f64, gains: &FilterGains, transient: f64) -> f64 {
+    fn relative_error(
+        &self,
+        passed: &[f64],
+        noise: f64,
+        gains: &FilterGains,
+        transient: f64,
+    ) -> f64 {
         let times = i32::from(self.derivative_order);
         let mut error = self.noise * noise;
         let mut size = 0.0;
@@ -227,7 +238,10 @@ mod tests {
     use crate::test_noise::TestNoise;
 
     fn twice(values: &[f64]) -> DifferentiatedSignal<'_> {
-        DifferentiatedSignal { values, derivative_order: 2 }
+        DifferentiatedSignal {
+            values,
+            derivative_order: 2,
+        }
     }
 
     /// The chosen cut-off gives nearly the smallest error that any cut-off could give.

@@ -136,7 +136,8 @@ impl<'a> CubicSpline<'a> {
             }
             let step = self.time[i + 1] - self.time[i];
             let [a, b] = [(self.time[i + 1] - t) / step, (t - self.time[i]) / step];
-            let bend = (a.powi(3) - a) * self.second_derivatives[i] + (b.powi(3) - b) * self.second_derivatives[i + 1];
+            let bend = (a.powi(3) - a) * self.second_derivatives[i]
+                + (b.powi(3) - b) * self.second_derivatives[i + 1];
             a * self.values[i] + b * self.values[i + 1] + bend * step * step / 6.0
         };
         times.iter().map(at).collect()

@@ -21,7 +21,11 @@ pub(crate) fn half_width(cutoff_hz: f64, rate_hz: f64) -> usize {
 }
 
 /// Smoothed positions with both derivatives from windows of `2 half_width + 1` samples; `None` if there are fewer.
-pub(crate) fn smooth_by_polynomials(time: &[f64], positions: &[f64], half_width: usize) -> Option<SmoothedCoordinate> {
+pub(crate) fn smooth_by_polynomials(
+    time: &[f64],
+    positions: &[f64],
+    half_width: usize,
+) -> Option<SmoothedCoordinate> {
     let n = time.len();
     let width = 2 * half_width + 1;
     if n < width || width <= TERMS {

@@ -23,7 +23,7 @@ pub use decimation::{
 pub(crate) use derivatives::mean_rate;
 pub use derivatives::{SmoothedCoordinate, differentiate, filter_and_differentiate};
 pub(crate) use even::{is_even, resample_evenly};
-pub use options::{DerivativeSource, StatePreparation, SmoothingMethod};
+pub use options::{DerivativeSource, SmoothingMethod, StatePreparation};
 pub use periods::RunRepeatability;
 pub use prepare::PreparationChoices;
 pub use prepared_as::PreparationRecord;

@@ -290,7 +290,8 @@ mod tests {
                 })
                 .collect();
             let size = (force.iter().map(|f| f * f).sum::<f64>() / force.len() as f64).sqrt();
-            let found = measure_repeatability(&time, PERIOD, &["a".to_owned()], &[force]).expect("ten periods");
+            let found = measure_repeatability(&time, PERIOD, &["a".to_owned()], &[force])
+                .expect("ten periods");
             assert_eq!(found.periods, 10);
             assert!(
                 (found.noise_floor * size / 0.3 - 1.0).abs() < 0.05,

@@ -1,15 +1,15 @@
 //! Which way of smoothing suits a recording, and states by it: columns go in, positions with both derivatives come out.
 
-use crate::motion::cutoff::{LONGEST_TRIM, DifferentiatedSignal, TRIMMED_PERIODS, choose_cutoff};
+use crate::motion::cutoff::{DifferentiatedSignal, LONGEST_TRIM, TRIMMED_PERIODS, choose_cutoff};
 use crate::motion::derivatives::mean_rate;
 use crate::motion::even::{is_even, resample_evenly};
-use crate::motion::options::{StatePreparation, SmoothingMethod};
+use crate::motion::options::{SmoothingMethod, StatePreparation};
 use crate::motion::prepared_as::PreparationRecord;
 use crate::motion::run::PreparedRun;
 use crate::motion::series::{self, PeriodicSeries};
 use crate::motion::smooth::{RecordedCoordinate, SmoothingFilter};
 use crate::motion::{local_polynomials, periods};
-use crate::recording::{RecordingFault, RecordingNote, SignalRecording, RecordingError};
+use crate::recording::{RecordingError, RecordingFault, RecordingNote, SignalRecording};
 use crate::signal::{LowPass, float_to_count};
 use crate::words::backquoted_list;
 
@@ -24,9 +24,13 @@ impl SignalRecording {
         prepared: &mut PreparationRecord,
         notes: &mut Vec<RecordingNote>,
     ) -> Result<Vec<[Vec<f64>; 3]>, RecordingError> {
-        let incomplete: Vec<&RecordedCoordinate<'_>> = columns.iter().filter(|c| !c.is_complete()).collect();
+        let incomplete: Vec<&RecordedCoordinate<'_>> =
+            columns.iter().filter(|c| !c.is_complete()).collect();
         if incomplete.is_empty() {
-            return Ok(columns.iter().filter_map(RecordedCoordinate::recorded_states).collect());
+            return Ok(columns
+                .iter()
+                .filter_map(RecordedCoordinate::recorded_states)
+                .collect());
         }
         prepared.coordinates = incomplete.iter().map(|c| c.name.clone()).collect();
         let order = preparation.order;
@@ -76,7 +80,9 @@ impl SignalRecording {
                 period: found.period,
                 harmonics: found.harmonics,
             },
-            (SmoothingMethod::Automatic | SmoothingMethod::Butterworth, None) => SmoothingFilter::Butterworth { order },
+            (SmoothingMethod::Automatic | SmoothingMethod::Butterworth, None) => {
+                SmoothingFilter::Butterworth { order }
+            }
             (SmoothingMethod::SavitzkyGolay, None) => SmoothingFilter::Polynomials {
                 half_width: local_polynomials::half_width(cutoff, rate),
             },
@@ -101,13 +107,16 @@ impl SignalRecording {
         prepared.cutoff_chosen = preparation.cutoff_hz.is_none() || preparation.chosen;
         // A series has no transients at its ends.
         if !matches!(way, SmoothingFilter::Series { .. }) {
-            prepared.trimmed = self.transient_samples(rate / cutoff, time.len(), preparation, notes);
+            prepared.trimmed =
+                self.transient_samples(rate / cutoff, time.len(), preparation, notes);
         }
         if let SmoothingFilter::Series { period, .. } = way {
             prepared.period = Some(period);
         }
         if let Some(found) = &found {
-            notes.push(RecordingNote::info(self.describe_series(found, &incomplete)));
+            notes.push(RecordingNote::info(
+                self.describe_series(found, &incomplete),
+            ));
         } else {
             notes.push(RecordingNote::info(format!(
                 "Derivatives of {} in {} are prepared: {}.",
@@ -176,9 +185,16 @@ impl SignalRecording {
 }
 
 /// The cut-off that suits what is to be differentiated, on even times.
-fn choose_cutoff_for(time: &[f64], columns: &[&RecordedCoordinate<'_>], order: usize) -> Option<f64> {
+fn choose_cutoff_for(
+    time: &[f64],
+    columns: &[&RecordedCoordinate<'_>],
+    order: usize,
+) -> Option<f64> {
     let rate = mean_rate(time);
-    let sources: Vec<DifferentiatedSignal<'_>> = columns.iter().map(|c| c.signal_to_differentiate()).collect();
+    let sources: Vec<DifferentiatedSignal<'_>> = columns
+        .iter()
+        .map(|c| c.signal_to_differentiate())
+        .collect();
     if is_even(time) {
         return choose_cutoff(&sources, rate, order);
     }
@@ -274,6 +290,8 @@ pub(crate) fn find_motion_series(
         return None;
     }
     let incomplete = columns.iter().filter(|column| !column.is_complete());
-    let signals: Vec<&[f64]> = incomplete.map(|column| column.signal_to_differentiate().values).collect();
+    let signals: Vec<&[f64]> = incomplete
+        .map(|column| column.signal_to_differentiate().values)
+        .collect();
     series::find_series(time, &signals)
 }

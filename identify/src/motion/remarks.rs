@@ -11,7 +11,7 @@ use crate::motion::run::PreparedRun;
 use crate::motion::series::PeriodicSeries;
 use crate::motion::smooth::RecordedCoordinate;
 use crate::recording::{RecordingNote, SignalRecording};
-use crate::words::{count_of, backquoted_list, seven_digits, with_digits};
+use crate::words::{backquoted_list, count_of, seven_digits, with_digits};
 
 /// A series that leaves more of a motion than this part is not its series.
 const MAX_SERIES_RESIDUAL: f64 = 1e-2;
@@ -45,7 +45,12 @@ fn encoder_step(q: &[f64]) -> Option<f64> {
 
 impl SignalRecording {
     /// Looks for a period, unless that of the motion's series is known; the spread of the forces over it is the noise floor.
-    pub(crate) fn note_repeatability(&self, columns: &[RecordedCoordinate<'_>], drives: &[String], run: &mut PreparedRun) {
+    pub(crate) fn note_repeatability(
+        &self,
+        columns: &[RecordedCoordinate<'_>],
+        drives: &[String],
+        run: &mut PreparedRun,
+    ) {
         let positions: Vec<&[f64]> = columns.iter().map(|column| column.q).collect();
         let Some(forces) = &run.force else { return };
         let known = run.prepared.period;
@@ -65,7 +70,11 @@ impl SignalRecording {
     }
 
     /// Says that the motion is taken for a series, and what that leaves of it.
-    pub(crate) fn describe_series(&self, found: &PeriodicSeries, columns: &[&RecordedCoordinate<'_>]) -> Message {
+    pub(crate) fn describe_series(
+        &self,
+        found: &PeriodicSeries,
+        columns: &[&RecordedCoordinate<'_>],
+    ) -> Message {
         let names: Vec<String> = columns.iter().map(|column| column.name.clone()).collect();
         let left = columns.iter().zip(&found.noise).map(|(column, noise)| {
             let derivative = if column.qd.is_some() { "_d" } else { "" };
@@ -107,7 +116,11 @@ impl SignalRecording {
     }
 
     /// Says which encoders have steps so coarse that they are a part of the accelerations.
-    pub(crate) fn note_encoder_steps(&self, columns: &[RecordedCoordinate<'_>], run: &mut PreparedRun) {
+    pub(crate) fn note_encoder_steps(
+        &self,
+        columns: &[RecordedCoordinate<'_>],
+        run: &mut PreparedRun,
+    ) {
         let Some(cutoff) = run.prepared.cutoff_hz else {
             return;
         };

@@ -10,14 +10,17 @@ use modelmill_boundary::text::{OptionName, Remedy};
 
 use crate::motion::band;
 use crate::motion::even;
-use crate::motion::options::{DerivativeSource, StatePreparation, SmoothingMethod};
+use crate::motion::options::{DerivativeSource, SmoothingMethod, StatePreparation};
 use crate::motion::periods::RunRepeatability;
 use crate::motion::prepare::find_motion_series;
 use crate::motion::prepared_as::PreparationRecord;
 use crate::motion::smooth::RecordedCoordinate;
-use crate::recording::{RecordingFault, GAP, RecordingNote, SignalRecording, RecordingError, NoteSeverity, sample_place_word};
+use crate::recording::{
+    GAP, NoteSeverity, RecordingError, RecordingFault, RecordingNote, SignalRecording,
+    sample_place_word,
+};
 use crate::signal::median;
-use crate::words::{count_of, backquoted_list};
+use crate::words::{backquoted_list, count_of};
 
 /// A gap of this part of a period of the highest frequency at which forces follow a motion is bridged by the spline.
 const BRIDGED_GAP_PART: f64 = 0.5;
@@ -60,7 +63,11 @@ pub struct PreparedRun {
 impl SignalRecording {
     /// States of the given coordinates and forces of the given drives, with the default
     /// [`Preparation`]: columns `t`, `NAME`, `NAME_d`, `NAME_dd` and the drive's name.
-    pub fn states(&self, coordinates: &[String], drives: &[String]) -> Result<PreparedRun, RecordingError> {
+    pub fn states(
+        &self,
+        coordinates: &[String],
+        drives: &[String],
+    ) -> Result<PreparedRun, RecordingError> {
         self.states_with(coordinates, drives, &StatePreparation::default())
     }
 
@@ -79,7 +86,10 @@ impl SignalRecording {
             .chain(coordinates.iter().cloned())
             .collect();
         self.check_columns(&needed, &wanted)?;
-        self.check_time(self.column_without_suggesting("t", &wanted)?, &mut Vec::new())?;
+        self.check_time(
+            self.column_without_suggesting("t", &wanted)?,
+            &mut Vec::new(),
+        )?;
         let columns: Result<Vec<RecordedCoordinate<'_>>, _> = coordinates
             .iter()
             .map(|name| self.recorded_coordinate(name, preparation.source, &wanted))
@@ -166,7 +176,8 @@ impl SignalRecording {
         notes.push(RecordingNote::warning(says));
         for (i, run) in runs.iter_mut().enumerate() {
             if i > 0 {
-                run.notes.retain(|note| note.severity == NoteSeverity::Warning);
+                run.notes
+                    .retain(|note| note.severity == NoteSeverity::Warning);
             }
         }
         if let Some(run) = runs.first_mut() {
@@ -238,7 +249,10 @@ impl SignalRecording {
             qdd: Vec::new(),
             force,
             missing_force,
-            left_out: if drives.iter().any(|drive| self.lost_samples(drive).is_some()) {
+            left_out: if drives
+                .iter()
+                .any(|drive| self.lost_samples(drive).is_some())
+            {
                 let lost = |drive: &String| {
                     let lost = self.lost_samples(drive).map(<[bool]>::to_vec);
                     lost.unwrap_or_else(|| vec![false; time.len()])
@@ -286,7 +300,11 @@ impl SignalRecording {
     }
 
     /// Time must increase; uneven steps and gaps are worth a note.
-    fn check_time(&self, time: &[f64], notes: &mut Vec<RecordingNote>) -> Result<(), RecordingError> {
+    fn check_time(
+        &self,
+        time: &[f64],
+        notes: &mut Vec<RecordingNote>,
+    ) -> Result<(), RecordingError> {
         if let Some(i) = time.windows(2).position(|w| w[1] <= w[0]) {
             let line = self.line(i + 1).unwrap_or(0);
             return Err(self.fault(RecordingFault::TimeNotIncreasing {
@@ -308,8 +326,8 @@ impl SignalRecording {
         // Where times only jitter, short steps are many and as many as long ones, and none is longer than the shortest lets expect.
         let many = |is: &dyn Fn(f64) -> bool| steps.iter().filter(|step| is(**step)).count();
         let short = many(&|step| step < 0.5 * median);
-        let jitters =
-            2 * short > many(&|step| step > MISSING_SAMPLE_STEP * median) && JITTERS * short > steps.len();
+        let jitters = 2 * short > many(&|step| step > MISSING_SAMPLE_STEP * median)
+            && JITTERS * short > steps.len();
         let longer = if jitters {
             (1.05 * (2.0 * median - shortest)).max(MISSING_SAMPLE_STEP * median)
         } else {

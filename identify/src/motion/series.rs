@@ -269,7 +269,12 @@ fn is_closed(values: &[f64]) -> bool {
 }
 
 /// The period near the one given, and as many harmonics as stand out, if they leave nothing but noise.
-fn refine_series(time: &[f64], signals: &[&[f64]], mut period: f64, longest: f64) -> Option<(f64, usize)> {
+fn refine_series(
+    time: &[f64],
+    signals: &[&[f64]],
+    mut period: f64,
+    longest: f64,
+) -> Option<(f64, usize)> {
     let n = time.len();
     let step = (time[n - 1] - time[0]) / (n - 1) as f64;
     let most = float_to_count(0.2 * period / step).min(MOST_HARMONICS);
@@ -280,7 +285,8 @@ fn refine_series(time: &[f64], signals: &[&[f64]], mut period: f64, longest: f64
         let signals: Vec<&[f64]> = signals.iter().map(|values| &values[..samples]).collect();
         let mut period = period;
         for _ in 0..4 {
-            let change = FourierBasis::new(&time[..samples], period, harmonics)?.period_step(&signals)?;
+            let change =
+                FourierBasis::new(&time[..samples], period, harmonics)?.period_step(&signals)?;
             period = (period + change.clamp(-step, step)).clamp(2.0 * step, longest);
             if change.abs() < CONVERGENCE_TOLERANCE * step {
                 break;
@@ -313,7 +319,12 @@ fn refine_series(time: &[f64], signals: &[&[f64]], mut period: f64, longest: f64
 
 /// The last harmonic that stands above the noise in any signal; `None` if what all harmonics leave is no white noise, or
 /// none stands out.
-fn last_significant_harmonic(time: &[f64], signals: &[&[f64]], period: f64, most: usize) -> Option<usize> {
+fn last_significant_harmonic(
+    time: &[f64],
+    signals: &[&[f64]],
+    period: f64,
+    most: usize,
+) -> Option<usize> {
     let step = (time[time.len() - 1] - time[0]) / (time.len() - 1) as f64;
     let basis = FourierBasis::new(time, period, most)?;
     let mut harmonics = 0;
@@ -325,8 +336,9 @@ fn last_significant_harmonic(time: &[f64], signals: &[&[f64]], period: f64, most
         let variance = variance * time.len() as f64 / (time.len() - 2 * most - 1) as f64;
         // The square of a line's amplitude that white noise gives on the average.
         let average = 4.0 * variance / time.len() as f64;
-        let stands_out =
-            |k: &usize| series[2 * k - 1].powi(2) + series[2 * k].powi(2) > MIN_LINE_POWER_RATIO * average;
+        let stands_out = |k: &usize| {
+            series[2 * k - 1].powi(2) + series[2 * k].powi(2) > MIN_LINE_POWER_RATIO * average
+        };
         harmonics = harmonics.max((1..=most).rev().find(stands_out).unwrap_or(0));
     }
     (harmonics > 0).then_some(harmonics)

@@ -2,7 +2,7 @@
 
 use crate::motion::cutoff::DifferentiatedSignal;
 use crate::motion::derivatives::{SmoothedCoordinate, filter_and_differentiate};
-use crate::motion::even::{CubicSpline, SampleSpacing, even_times, spread_times, sample_spacing};
+use crate::motion::even::{CubicSpline, SampleSpacing, even_times, sample_spacing, spread_times};
 use crate::motion::{local_polynomials, series};
 use crate::words::{count_of, seven_digits};
 
@@ -26,7 +26,10 @@ impl RecordedCoordinate<'_> {
     /// What is differentiated where something is missing: the rates if they are recorded, else the positions.
     pub(crate) fn signal_to_differentiate(&self) -> DifferentiatedSignal<'_> {
         match self.qd {
-            Some(values) => DifferentiatedSignal { values, derivative_order: 1 },
+            Some(values) => DifferentiatedSignal {
+                values,
+                derivative_order: 1,
+            },
             None => DifferentiatedSignal {
                 values: self.q,
                 derivative_order: 2,
@@ -58,10 +61,12 @@ impl RecordedCoordinate<'_> {
             ]));
         }
         let smooth = |values: &[f64]| match way {
-            SmoothingFilter::Butterworth { order } => smooth_at_true_times(time, values, cutoff, order).map(Some),
-            SmoothingFilter::Polynomials { half_width } => {
-                Ok(local_polynomials::smooth_by_polynomials(time, values, half_width))
+            SmoothingFilter::Butterworth { order } => {
+                smooth_at_true_times(time, values, cutoff, order).map(Some)
             }
+            SmoothingFilter::Polynomials { half_width } => Ok(
+                local_polynomials::smooth_by_polynomials(time, values, half_width),
+            ),
             SmoothingFilter::Series { period, harmonics } => {
                 Ok(series::project_on_series(time, values, period, harmonics))
             }

@@ -7,7 +7,7 @@ use modelmill_boundary::text::{Message, OptionName, OptionSetting, Remedy};
 
 use crate::recording::read::sample_place_word;
 use crate::signal::FilterError;
-use crate::words::{count_of, backquoted_list};
+use crate::words::{backquoted_list, count_of};
 
 /// A fault of a recording. Its `Display` names the file, the line and the column where they are
 /// known, and ends with what to do.
@@ -217,7 +217,7 @@ impl RecordingError {
         let file = &self.file;
         let says = self.fault.message();
         match self.fault.line() {
-            Some(line) => message!("{file}, {} {line}: {}", place_word(file), says),
+            Some(line) => message!("{file}, {} {line}: {}", sample_place_word(file), says),
             None => message!("{file}: {}", says),
         }
     }
@@ -397,7 +397,7 @@ impl RecordingFault {
                     "correct or remove it"
                 };
                 message!(
-                    "column `{column}` holds `{text}` where a number is expected{others}; {what}"
+                    "column `{column}` holds `{text}` where a number is expected{write_other_count}; {what}"
                 )
             }
             Self::NotFinite {
@@ -480,7 +480,7 @@ impl RecordingFault {
     }
 }
 
-impl fmt::Display for Fault {
+impl fmt::Display for RecordingFault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.message().in_library_words())
     }
@@ -488,7 +488,7 @@ impl fmt::Display for Fault {
 
 /// Names the columns that are there.
 fn columns_there(present: &[String]) -> String {
-    let mut says = format!(" The columns are: {}.", list(present));
+    let mut says = format!(" The columns are: {}.", backquoted_list(present));
     if present.first().is_some_and(|first| first.starts_with('#')) {
         says.push_str(
             " The first line must name the columns: comment lines are not read, delete them.",

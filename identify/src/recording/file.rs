@@ -8,8 +8,10 @@ use std::sync::Arc;
 
 use modelmill_boundary::files::{FileSource, OpenFile};
 
-use crate::recording::error::{RecordingFault, RecordingError};
-use crate::recording::formats::{RecordingFormat, RecordingInput, LONGEST_STREAM, SIGNATURE_BYTES, format_of};
+use crate::recording::error::{RecordingError, RecordingFault};
+use crate::recording::formats::{
+    LONGEST_STREAM, RecordingFormat, RecordingInput, SIGNATURE_BYTES, format_of,
+};
 use crate::recording::table::{self, MemoryTable};
 use crate::recording::{ReadOptions, SignalRecording, TableInfo, display_name_of_bytes};
 
@@ -54,7 +56,10 @@ impl RecordingFile {
     }
 
     /// A table of columns in memory; `name` is what messages call it. Fails when columns differ in length.
-    pub fn from_table(name: &str, columns: Vec<(String, Vec<f64>)>) -> Result<Self, RecordingError> {
+    pub fn from_table(
+        name: &str,
+        columns: Vec<(String, Vec<f64>)>,
+    ) -> Result<Self, RecordingError> {
         let name = format!("{name}{}", table::SUFFIX);
         match MemoryTable::new(columns) {
             Ok(table) => Ok(Self {
@@ -102,7 +107,9 @@ impl RecordingFile {
     ) -> Result<T, RecordingError> {
         let answer = match &self.source {
             RecordingSource::Table(table) => of_table(table),
-            RecordingSource::Memory(format, bytes) => of_format(*format, RecordingInput::Bytes(bytes)),
+            RecordingSource::Memory(format, bytes) => {
+                of_format(*format, RecordingInput::Bytes(bytes))
+            }
             RecordingSource::File(format, file) => {
                 let rewound = file.try_clone().and_then(|mut file| {
                     file.rewind()?;

@@ -4,7 +4,7 @@
 use indexmap::IndexMap;
 
 use crate::recording::SignalRecording;
-use crate::recording::column::{SignalColumn, ColumnDefect, SampleField, missing_column_fault};
+use crate::recording::column::{ColumnDefect, SampleField, SignalColumn, missing_column_fault};
 use crate::recording::error::RecordingFault;
 use crate::recording::notes::RecordingNote;
 use crate::recording::options::{ComputedColumn, NonFinitePolicy, ReadOptions};
@@ -41,7 +41,10 @@ pub(crate) struct SampleIntake<'a> {
 impl<'a> SampleIntake<'a> {
     /// Ready for samples of columns that the file calls `theirs`.
     /// Fails when names are missing or double, or a renaming or computed column asks for one that is not there.
-    pub(crate) fn new(theirs: Vec<String>, options: &'a ReadOptions) -> Result<Self, RecordingFault> {
+    pub(crate) fn new(
+        theirs: Vec<String>,
+        options: &'a ReadOptions,
+    ) -> Result<Self, RecordingFault> {
         check_names(&theirs)?;
         let place = |name: &String| {
             let place = theirs.iter().position(|other| other == name);
@@ -94,7 +97,11 @@ impl<'a> SampleIntake<'a> {
                 None => match names.iter().position(|name| name == "t") {
                     Some(place) => Some((vec![(place, 1.0)], 0.0)),
                     None => {
-                        return Err(missing_column_fault("t", names.iter().map(String::as_str), false));
+                        return Err(missing_column_fault(
+                            "t",
+                            names.iter().map(String::as_str),
+                            false,
+                        ));
                     }
                 },
             },
@@ -228,7 +235,10 @@ impl<'a> SampleIntake<'a> {
         }
         let mut computed = IndexMap::new();
         for one in &self.options.computed {
-            computed.insert(one.name.clone(), compute_column(one, &self.theirs, &self.columns));
+            computed.insert(
+                one.name.clone(),
+                compute_column(one, &self.theirs, &self.columns),
+            );
         }
         let wanted = self.options.wanted.as_ref();
         let mut columns = IndexMap::new();
@@ -269,7 +279,11 @@ fn is_time_place(time: Option<&(Vec<(usize, f64)>, f64)>, place: usize) -> bool 
 }
 
 /// The sum of columns; what is wrong with any of them is wrong with the sum.
-fn compute_column(computed: &ComputedColumn, theirs: &[String], columns: &[SignalColumn]) -> SignalColumn {
+fn compute_column(
+    computed: &ComputedColumn,
+    theirs: &[String],
+    columns: &[SignalColumn],
+) -> SignalColumn {
     let mut sum = SignalColumn::default();
     for (name, factor) in &computed.terms {
         let Some(place) = theirs.iter().position(|other| other == name) else {
@@ -322,7 +336,13 @@ fn rename(names: &[String], renames: &[(String, String)]) -> Result<Vec<String>,
         }
         match names.iter().position(|name| name == theirs) {
             Some(place) => renamed[place].clone_from(ours),
-            None => return Err(missing_column_fault(theirs, names.iter().map(String::as_str), true)),
+            None => {
+                return Err(missing_column_fault(
+                    theirs,
+                    names.iter().map(String::as_str),
+                    true,
+                ));
+            }
         }
     }
     Ok(renamed)

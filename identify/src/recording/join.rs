@@ -8,7 +8,7 @@ use crate::recording::error::RecordingFault;
 use crate::recording::gaps::GAP;
 use crate::recording::notes::RecordingNote;
 use crate::signal::median;
-use crate::words::{count_of, backquoted_list};
+use crate::words::{backquoted_list, count_of};
 
 /// Columns with the same times.
 #[derive(Debug)]

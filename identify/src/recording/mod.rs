@@ -22,15 +22,15 @@ mod together;
 use indexmap::IndexMap;
 
 use crate::words::nearest_name;
-pub use error::{RecordingFault, RecordingError};
+pub use error::{RecordingError, RecordingFault};
 pub use file::RecordingFile;
-pub use notes::{RecordingNote, NoteSeverity};
+pub use notes::{NoteSeverity, RecordingNote};
 pub use options::{ComputedColumn, NonFinitePolicy, ReadOptions};
-pub use read::{has_recording_extension, display_name_of_bytes, sample_place_word};
+pub use read::{display_name_of_bytes, has_recording_extension, sample_place_word};
 pub use tables::{ColumnInfo, TableInfo};
 pub use together::RecordingFiles;
 
-use column::{SignalColumn, ColumnDefect, missing_column_fault};
+use column::{ColumnDefect, SignalColumn, missing_column_fault};
 pub(crate) use gaps::GAP;
 
 /// A recording in memory: columns of equal length by name, in the file's order.
@@ -134,7 +134,10 @@ impl SignalRecording {
         needed: &[String],
         wanted: &[String],
     ) -> Result<(), RecordingError> {
-        let missing: Vec<&String> = needed.iter().filter(|name| !self.has_column(name)).collect();
+        let missing: Vec<&String> = needed
+            .iter()
+            .filter(|name| !self.has_column(name))
+            .collect();
         if missing.len() < 2 {
             return Ok(());
         }

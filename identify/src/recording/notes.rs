@@ -26,7 +26,7 @@ pub struct RecordingNote {
 /// A remark as it stands in JSON, in the words of whoever reads it.
 #[derive(Serialize, Deserialize)]
 struct SpelledNote {
-    severity: Severity,
+    severity: NoteSeverity,
     says: String,
 }
 
@@ -54,7 +54,7 @@ impl RecordingNote {
 }
 
 /// Writes remarks in the words of the library, which is how a fit keeps them that no front end has printed.
-pub(crate) fn serialize<S: Serializer>(notes: &[Note], serializer: S) -> Result<S::Ok, S::Error> {
+pub(crate) fn serialize<S: Serializer>(notes: &[RecordingNote], serializer: S) -> Result<S::Ok, S::Error> {
     serializer.collect_seq(notes.iter().map(|note| SpelledNote {
         severity: note.severity,
         says: note.says.in_library_words(),
@@ -64,9 +64,9 @@ pub(crate) fn serialize<S: Serializer>(notes: &[Note], serializer: S) -> Result<
 /// Reads remarks, whose words are plain text then.
 pub(crate) fn deserialize<'de, D: Deserializer<'de>>(
     deserializer: D,
-) -> Result<Vec<Note>, D::Error> {
+) -> Result<Vec<RecordingNote>, D::Error> {
     let notes = Vec::<SpelledNote>::deserialize(deserializer)?.into_iter();
-    let note = |one: SpelledNote| Note {
+    let note = |one: SpelledNote| RecordingNote {
         severity: one.severity,
         says: one.says.into(),
     };

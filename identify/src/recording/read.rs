@@ -95,7 +95,9 @@ pub fn display_name_of_bytes(name: &str, bytes: &[u8]) -> String {
 
 /// Whether a file's name ends as names of recordings do.
 pub fn has_recording_extension(path: &Path) -> bool {
-    let mut endings = FORMATS.into_iter().flat_map(<dyn RecordingFormat>::extensions);
+    let mut endings = FORMATS
+        .into_iter()
+        .flat_map(<dyn RecordingFormat>::extensions);
     path.extension()
         .is_some_and(|extension| endings.any(|ending| extension.eq_ignore_ascii_case(ending)))
 }

@@ -169,7 +169,9 @@ impl SignalRecording {
 impl SignalColumn {
     /// Puts straight lines between the nearest values that were measured in place of those that were not.
     fn interpolate_lost(&mut self) {
-        let sound: Vec<usize> = (0..self.values.len()).filter(|i| !self.interpolated[*i]).collect();
+        let sound: Vec<usize> = (0..self.values.len())
+            .filter(|i| !self.interpolated[*i])
+            .collect();
         let (Some(first), Some(last)) = (sound.first().copied(), sound.last().copied()) else {
             return;
         };
@@ -198,7 +200,9 @@ fn find_spikes(force: &[f64], is_made: &dyn Fn(usize) -> bool) -> Option<(Vec<bo
     if n < 8 * NEIGHBOURS {
         return None;
     }
-    let off: Vec<f64> = (0..n).map(|i| force[i] - neighbour_median(force, i)).collect();
+    let off: Vec<f64> = (0..n)
+        .map(|i| force[i] - neighbour_median(force, i))
+        .collect();
     let noise = 1.4826 * median(off.iter().map(|x| x.abs()).collect());
     let mut sorted = force.to_vec();
     sorted.sort_unstable_by(f64::total_cmp);
@@ -263,7 +267,9 @@ fn rate_neighbours(gaps: &[usize], k: usize, n: usize) -> Option<(usize, usize)>
     if gaps.get(next) == Some(&k) {
         return None;
     }
-    let before = next.checked_sub(1).map_or(NEIGHBOURS, |at| k - gaps[at] - 1);
+    let before = next
+        .checked_sub(1)
+        .map_or(NEIGHBOURS, |at| k - gaps[at] - 1);
     let behind = gaps.get(next).map_or(NEIGHBOURS, |gap| gap - k - 1);
     let reach = before.min(behind).min(NEIGHBOURS);
     (reach >= FEWEST).then(|| (k.saturating_sub(reach), (k + reach + 1).min(n)))
@@ -415,7 +421,8 @@ mod tests {
             let t = f64::from(i) * 0.002;
             let _ = writeln!(text, "{t},{},{}", (3.0 * t).sin(), (7.0 * t).cos());
         }
-        let read = SignalRecording::from_reader(text.as_bytes(), "run.csv", &ReadOptions::default());
+        let read =
+            SignalRecording::from_reader(text.as_bytes(), "run.csv", &ReadOptions::default());
         let mut recording = read.unwrap();
         let before = recording.column("q").unwrap().to_vec();
         let (coordinates, drives) = (["q".to_owned()], ["motor".to_owned()]);

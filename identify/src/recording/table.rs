@@ -35,7 +35,11 @@ impl MemoryTable {
     }
 
     /// Reads it; fails as [`Recording::read`] does.
-    pub(crate) fn read(&self, file: &str, options: &ReadOptions) -> Result<SignalRecording, RecordingFault> {
+    pub(crate) fn read(
+        &self,
+        file: &str,
+        options: &ReadOptions,
+    ) -> Result<SignalRecording, RecordingFault> {
         let mut intake = SampleIntake::new(self.names(), options)?;
         let samples = self.0.first().map_or(0, |(_, values)| values.len());
         let mut fields = vec![SampleField::NotFinite; self.0.len()];
@@ -60,7 +64,9 @@ impl MemoryTable {
     pub(crate) fn table_info(&self) -> TableInfo {
         let names = self.names();
         TableInfo {
-            time: find_time_range(&names, |name| self.read("", &ReadOptions::single_column(name)).ok()),
+            time: find_time_range(&names, |name| {
+                self.read("", &ReadOptions::single_column(name)).ok()
+            }),
             columns: names
                 .into_iter()
                 .map(|name| ColumnInfo {

@@ -5,10 +5,10 @@ use std::path::Path;
 use modelmill_boundary::files::FileSource;
 
 use crate::recording::column::SignalColumn;
-use crate::recording::error::{RecordingFault, RecordingError};
+use crate::recording::error::{RecordingError, RecordingFault};
 use crate::recording::join::{JoinPart, join_parts};
 use crate::recording::notes::RecordingNote;
-use crate::recording::{ReadOptions, SignalRecording, RecordingFile};
+use crate::recording::{ReadOptions, RecordingFile, SignalRecording};
 use crate::words::backquoted_list;
 
 /// Files of one run, whose columns are joined on time; most often there is one.
@@ -38,7 +38,10 @@ impl RecordingFiles {
     }
 
     /// A table of columns in memory; `name` is what messages call it. Fails when columns differ in length.
-    pub fn from_table(name: &str, columns: Vec<(String, Vec<f64>)>) -> Result<Self, RecordingError> {
+    pub fn from_table(
+        name: &str,
+        columns: Vec<(String, Vec<f64>)>,
+    ) -> Result<Self, RecordingError> {
         let file = RecordingFile::from_table(name, columns)?;
         Ok(Self {
             name: file.name().to_owned(),
@@ -137,7 +140,11 @@ impl RecordingFiles {
     }
 
     /// Fails when it is not clear from which file something comes.
-    fn check_unique_sources(&self, names: &[Vec<String>], options: &ReadOptions) -> Result<(), RecordingError> {
+    fn check_unique_sources(
+        &self,
+        names: &[Vec<String>],
+        options: &ReadOptions,
+    ) -> Result<(), RecordingError> {
         let time: Vec<&str> = time_names(options);
         for (k, of_file) in names.iter().enumerate() {
             for name in of_file {

@@ -4,8 +4,9 @@
 use std::f64::consts::TAU;
 
 use modelmill_identify::diagnose::{
-    CandidateEffect, ColumnChoice, ForceColumn, ModelDiagnosis, LocatedEffect, EffectParameter, SampleLayout, CandidateNature, NoColumnProvider,
-    DiagnosisProblem, SignConstraint, ColumnSource, SampleSegment, DiagnosisVerdict, diagnose, white_noise,
+    CandidateEffect, CandidateNature, ColumnChoice, ColumnSource, DiagnosisProblem,
+    DiagnosisVerdict, EffectParameter, ForceColumn, LocatedEffect, ModelDiagnosis,
+    NoColumnProvider, SampleLayout, SampleSegment, SignConstraint, diagnose, white_noise,
 };
 
 /// Samples of the fit, and as many of the check.
@@ -103,13 +104,18 @@ fn candidate(kind: &str, columns: &[&[f64]], sign: SignConstraint) -> CandidateE
 fn crowd(random: &mut Random, count: usize) -> (Vec<Vec<f64>>, Vec<CandidateEffect>) {
     let columns: Vec<Vec<f64>> = (0..count).map(|_| random.smooth()).collect();
     let made = columns.iter().enumerate();
-    let candidates = made.map(|(k, values)| candidate(&format!("c{k}"), &[values], SignConstraint::Any));
+    let candidates =
+        made.map(|(k, values)| candidate(&format!("c{k}"), &[values], SignConstraint::Any));
     let candidates = candidates.collect();
     (columns, candidates)
 }
 
 /// A model of three columns, a recording for the fit and one for the check, of which `hidden` is what the model lacks.
-fn problem(random: &mut Random, hidden: &[f64], candidates: Vec<CandidateEffect>) -> DiagnosisProblem {
+fn problem(
+    random: &mut Random,
+    hidden: &[f64],
+    candidates: Vec<CandidateEffect>,
+) -> DiagnosisProblem {
     let base: Vec<Vec<f64>> = (0..3).map(|_| random.smooth()).collect();
     let mut measured = hidden.to_vec();
     for (values, factor) in base.iter().zip([3.0, -2.0, 1.5]) {
@@ -186,7 +192,11 @@ fn one_hidden_column_is_found_among_twenty() {
         let problem = problem(&mut random, &hidden, candidates);
         let diagnosis = answer(&problem);
         assert_eq!(found(&diagnosis), ["c7"], "seed {seed}");
-        assert_eq!(diagnosis.verdict, DiagnosisVerdict::MissingEffect, "seed {seed}");
+        assert_eq!(
+            diagnosis.verdict,
+            DiagnosisVerdict::MissingEffect,
+            "seed {seed}"
+        );
         let estimate = diagnosis.effects[0].estimates[0];
         // Three deviations of a factor are 3 * 0.1 / sqrt(1500 * 1) with a column of size 1; some are smaller.
         assert!((estimate - 0.5).abs() < 0.03, "seed {seed}: {estimate}");
@@ -294,7 +304,10 @@ fn different_columns_are_told_apart() {
 
 #[test]
 fn an_impossible_sign_is_refused() {
-    for (sign, factor) in [(SignConstraint::Positive, -0.5), (SignConstraint::Negative, 0.5)] {
+    for (sign, factor) in [
+        (SignConstraint::Positive, -0.5),
+        (SignConstraint::Negative, 0.5),
+    ] {
         let mut random = Random::new(500);
         let law = random.smooth();
         let hidden = sum(&[(factor, &law), (1.0, &random.white())]);
@@ -345,7 +358,11 @@ fn what_no_candidate_has_is_unexplained() {
         let law: Vec<f64> = q.iter().zip(rate).map(|(q, v)| 0.4 * q * v * v).collect();
         problem.measured.add(1.0, &column(&law));
         let diagnosis = answer(&problem);
-        assert_eq!(diagnosis.verdict, DiagnosisVerdict::Unexplained, "seed {seed}");
+        assert_eq!(
+            diagnosis.verdict,
+            DiagnosisVerdict::Unexplained,
+            "seed {seed}"
+        );
         assert_eq!(diagnosis.unexplained, [0], "seed {seed}");
         again.push(diagnosis.repeatable_share[0]);
         if !diagnosis.effects.is_empty() {

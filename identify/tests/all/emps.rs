@@ -8,8 +8,8 @@ use std::path::PathBuf;
 
 use modelmill_identify::estimate::uncertainty_with_autocorrelation;
 use modelmill_identify::{
-    LeastSquares, LeastSquaresError, LocateOptions, StatePreparation, SignalRecording, PreparedRun, compare_forces,
-    decimate_table, decimate_time, locate_errors,
+    LeastSquares, LeastSquaresError, LocateOptions, PreparedRun, SignalRecording, StatePreparation,
+    compare_forces, decimate_table, decimate_time, locate_errors,
 };
 
 fn data() -> Option<PathBuf> {

@@ -4,7 +4,10 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use modelmill_identify::{ComputedColumn, RecordingFault, NonFinitePolicy, ReadOptions, SignalRecording, display_name_of_bytes};
+use modelmill_identify::{
+    ComputedColumn, NonFinitePolicy, ReadOptions, RecordingFault, SignalRecording,
+    display_name_of_bytes,
+};
 use parquet::basic::Compression;
 use parquet::data_type::{DoubleType, FloatType, Int64Type};
 use parquet::file::properties::WriterProperties;
@@ -263,7 +266,8 @@ fn broken_files_get_an_answer() {
 #[test]
 fn matlab_files_give_vectors_and_columns_of_matrices() {
     for name in ["run-v7.mat", "run-v6.mat"] {
-        let recording = SignalRecording::read(fixture(name), &[("q1", "q_1"), ("motor", "F")]).unwrap();
+        let recording =
+            SignalRecording::read(fixture(name), &[("q1", "q_1"), ("motor", "F")]).unwrap();
         assert_eq!(recording.samples(), 50, "{name}");
         for k in [0, 1, 49] {
             let t = k as f64 * 0.01;

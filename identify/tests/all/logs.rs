@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use modelmill_boundary::files::DiskFiles;
-use modelmill_identify::{ReadOptions, SignalRecording, RecordingFile, TableInfo};
+use modelmill_identify::{ReadOptions, RecordingFile, SignalRecording, TableInfo};
 
 fn fixtures() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures")
@@ -101,7 +101,8 @@ fn same_in(folder: &Path) {
         let rate = table.rate().unwrap();
         assert!((rate - 250.0).abs() < 1e-6, "{file}: {rate}");
         // A file that lost its end is no recording.
-        let cut = SignalRecording::from_bytes(&bytes[..bytes.len() * 2 / 3], file, &options(&theirs));
+        let cut =
+            SignalRecording::from_bytes(&bytes[..bytes.len() * 2 / 3], file, &options(&theirs));
         assert!(cut.is_err(), "{file}");
     }
 }

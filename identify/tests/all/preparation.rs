@@ -3,7 +3,9 @@
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
 
-use modelmill_identify::{StatePreparation, ReadOptions, SignalRecording, PreparedRun, SmoothingMethod};
+use modelmill_identify::{
+    PreparedRun, ReadOptions, SignalRecording, SmoothingMethod, StatePreparation,
+};
 
 const RATE: f64 = 250.0;
 const PERIOD: f64 = 7.29;

@@ -4,8 +4,8 @@
 use std::fmt::Write as _;
 
 use modelmill_identify::{
-    DerivativeSource, RecordingFault, NonFinitePolicy, StatePreparation, ReadOptions, SignalRecording, RecordingError,
-    NoteSeverity,
+    DerivativeSource, NonFinitePolicy, NoteSeverity, ReadOptions, RecordingError, RecordingFault,
+    SignalRecording, StatePreparation,
 };
 
 fn read(text: &str) -> Result<SignalRecording, RecordingError> {
@@ -56,8 +56,8 @@ fn files_that_are_no_recordings() {
         .chain("t,q\n0,1\n".encode_utf16())
         .flat_map(u16::to_le_bytes)
         .collect();
-    let error =
-        SignalRecording::from_reader(utf16.as_slice(), "run.csv", &ReadOptions::default()).unwrap_err();
+    let error = SignalRecording::from_reader(utf16.as_slice(), "run.csv", &ReadOptions::default())
+        .unwrap_err();
     assert_eq!(
         error.fault,
         RecordingFault::NotCsv {
@@ -112,7 +112,11 @@ fn faults_of_header_and_lines() {
 fn a_quote_left_open_is_named_where_it_opens() {
     let check = |text: &str, line: u64| {
         let error = read(text).expect_err("the recording is faulty");
-        assert_eq!(error.fault, RecordingFault::OpenQuote { line }, "{text:?}: {error}");
+        assert_eq!(
+            error.fault,
+            RecordingFault::OpenQuote { line },
+            "{text:?}: {error}"
+        );
         assert!(
             error.to_string().starts_with(&format!(
                 "run.csv, line {line}: a quote opens here, but the field that it begins does not end in the same line;"

@@ -5,7 +5,8 @@ use std::ops::ControlFlow;
 
 use modelmill_identify::excite::separate::{SeparationProblem, measure_separation};
 use modelmill_identify::excite::{
-    ExcitationLimits, ExcitationCriterion, ExciteError, ExcitationMotion, Options, ExcitationPlant, excite,
+    ExcitationCriterion, ExcitationLimits, ExcitationMotion, ExcitationPlant, ExciteError, Options,
+    excite,
 };
 use nalgebra::DMatrix;
 

@@ -9,8 +9,8 @@ use std::fmt::Write as _;
 
 use modelmill_identify::estimate::uncertainty_with_autocorrelation;
 use modelmill_identify::{
-    ErrorAccumulator, FitFile, LeastSquares, LeastSquaresError, ParameterInfo, StatePreparation, ReadOptions,
-    SignalRecording, PreparedRun, fit_parameters,
+    ErrorAccumulator, FitFile, LeastSquares, LeastSquaresError, ParameterInfo, PreparedRun,
+    ReadOptions, SignalRecording, StatePreparation, fit_parameters,
 };
 
 const GRAVITY: f64 = 9.81;

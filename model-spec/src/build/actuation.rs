@@ -4,13 +4,13 @@ use std::collections::BTreeMap;
 
 use crate::build::MechanismSpans;
 use crate::build::bodies::check_unique;
-use crate::build::frames::{PointTable, FrameTree, duplicate_name};
+use crate::build::frames::{FrameTree, PointTable, duplicate_name};
 use crate::build::free;
 use crate::build::symbols::SymbolTable;
 use crate::column;
 use crate::diagnostic::{Diagnostic, DiagnosticLog, SourceSpan};
 use crate::exact::{CoordinateIdx, ExactExpression, ModelSymbol};
-use crate::mechanism::{ModelDrive, DriveKind, KinematicLoop};
+use crate::mechanism::{DriveKind, KinematicLoop, ModelDrive};
 use crate::schema::ModelEntry;
 use crate::scope::SymbolSort;
 use crate::suggest;
@@ -234,7 +234,11 @@ fn check_drive_count(
     );
 }
 
-fn coordinate(name: &SpannedName, symbols: &SymbolTable, log: &mut DiagnosticLog) -> Option<CoordinateIdx> {
+fn coordinate(
+    name: &SpannedName,
+    symbols: &SymbolTable,
+    log: &mut DiagnosticLog,
+) -> Option<CoordinateIdx> {
     let meaning = symbols
         .scope
         .look_up(&name.text, name.span, &[SymbolSort::Coordinate], log)?;
@@ -299,7 +303,11 @@ pub(super) fn check_place_names(model: &ModelEntry, log: &mut DiagnosticLog) {
 }
 
 /// Reads what columns of drives measure: by what they are multiplied to be what acts at the joint.
-pub(super) fn torque(model: &ModelEntry, drives: &DriveRows, log: &mut DiagnosticLog) -> Vec<(String, f64)> {
+pub(super) fn torque(
+    model: &ModelEntry,
+    drives: &DriveRows,
+    log: &mut DiagnosticLog,
+) -> Vec<(String, f64)> {
     let drives: Vec<&ModelDrive> = drives.rows.iter().chain(&drives.shared).collect();
     let recording = model.recording.as_ref();
     let torque = recording.and_then(|entry| entry.torque.as_ref());

@@ -4,17 +4,17 @@ use num_rational::BigRational;
 use num_traits::One;
 
 use crate::angle::rational_value;
-use crate::build::frames::{PointTable, FrameTree, duplicate_name};
+use crate::build::frames::{FrameTree, PointTable, duplicate_name};
 use crate::build::symbols::{LINEAR, SymbolTable, explicit_entry, shorthand, vector};
 use crate::diagnostic::{Diagnostic, DiagnosticLog, SourceSpan};
 use crate::exact::{ExactExpression, ModelSymbol};
 use crate::formula::SourceFormula;
-use crate::mechanism::{FrameIdx, PartInertia, LumpedMass, Mechanism, ModelPart};
+use crate::mechanism::{FrameIdx, LumpedMass, Mechanism, ModelPart, PartInertia};
 use crate::schema::{LinearEntry, LumpedMassEntry, ModelEntry, PartEntry};
-use crate::scope::{SymbolSort, FormulaRequirement};
+use crate::scope::{FormulaRequirement, SymbolSort};
 use crate::unit::UnitDimension;
 use crate::values::SpannedName;
-use crate::values::{LumpedMassPlace, FormulaVector};
+use crate::values::{FormulaVector, LumpedMassPlace};
 
 const SORTS: [SymbolSort; 2] = [SymbolSort::Constant, SymbolSort::Parameter];
 
@@ -48,7 +48,11 @@ pub(super) fn parts(
 }
 
 /// Reports names that occur twice in a list.
-pub(super) fn check_unique<'a>(what: &str, names: impl Iterator<Item = &'a SpannedName>, log: &mut DiagnosticLog) {
+pub(super) fn check_unique<'a>(
+    what: &str,
+    names: impl Iterator<Item = &'a SpannedName>,
+    log: &mut DiagnosticLog,
+) {
     let mut seen = std::collections::BTreeMap::new();
     for name in names {
         if let Some(first) = seen.insert(&name.text, name.span) {
@@ -98,7 +102,11 @@ fn inertial(entry: &PartEntry, symbols: &SymbolTable, log: &mut DiagnosticLog) -
     }
 }
 
-fn linear_inertial(linear: &LinearEntry, symbols: &SymbolTable, log: &mut DiagnosticLog) -> PartInertia {
+fn linear_inertial(
+    linear: &LinearEntry,
+    symbols: &SymbolTable,
+    log: &mut DiagnosticLog,
+) -> PartInertia {
     if let (Some(_), Some(planar)) = (&linear.all, &linear.planar) {
         log.push(
             Diagnostic::error(
@@ -191,10 +199,14 @@ fn check_polynomial(exact: &ExactExpression, span: SourceSpan, log: &mut Diagnos
 }
 
 fn is_polynomial(exact: &ExactExpression) -> bool {
-    let free = |exact: &ExactExpression| !exact.mentions(&|symbol| matches!(symbol, ModelSymbol::Parameter(_)));
+    let free = |exact: &ExactExpression| {
+        !exact.mentions(&|symbol| matches!(symbol, ModelSymbol::Parameter(_)))
+    };
     match exact {
         ExactExpression::Rational(_) | ExactExpression::Pi | ExactExpression::Symbol(_) => true,
-        ExactExpression::Sum(inner) | ExactExpression::Product(inner) => inner.iter().all(is_polynomial),
+        ExactExpression::Sum(inner) | ExactExpression::Product(inner) => {
+            inner.iter().all(is_polynomial)
+        }
         ExactExpression::Negative(inner) => is_polynomial(inner),
         ExactExpression::Quotient(above, below) => is_polynomial(above) && free(below),
         ExactExpression::Power(base, exponent) => {
@@ -303,7 +315,8 @@ pub(super) fn warn_of_negative(model: &ModelEntry, mechanism: &Mechanism, log: &
             );
         }
     };
-    let place = |formula: Option<&SourceFormula>, or: SourceSpan| formula.map_or(or, |f| f.ast.span);
+    let place =
+        |formula: Option<&SourceFormula>, or: SourceSpan| formula.map_or(or, |f| f.ast.span);
     let parts = model.part.iter().flat_map(|list| &list.entries);
     for (entry, part) in parts.zip(&mechanism.parts) {
         let (mass, inertia, formulas, or) = match (&part.inertial, &entry.linear) {
@@ -369,7 +382,9 @@ fn lumped_mass_position(
         return nowhere();
     };
     match spot {
-        LumpedMassPlace::Vector(vector) => position(Some(vector), symbols, "the place of a lumped mass", log),
+        LumpedMassPlace::Vector(vector) => {
+            position(Some(vector), symbols, "the place of a lumped mass", log)
+        }
         LumpedMassPlace::Point(name) => {
             let Some(idx) = points.find(name, log) else {
                 return nowhere();

@@ -9,7 +9,7 @@ use crate::exact::{CoordinateIdx, ExactExpression, ModelSymbol};
 use crate::formula::SourceFormula;
 use crate::mechanism::CoordinateCoupling;
 use crate::schema::{CoordinateEntry, ModelEntry};
-use crate::scope::{SymbolSort, FormulaRequirement};
+use crate::scope::{FormulaRequirement, SymbolSort};
 
 /// Reads the couplings and gives what follows its nominal value.
 pub(super) fn couplings(
@@ -108,7 +108,12 @@ fn coupling(
 }
 
 /// Puts what follows at its nominal value; what follows itself is reported.
-fn set_nominal(found: &[(CoordinateCoupling, SourceSpan)], symbols: &mut SymbolTable, places: &MechanismSpans, log: &mut DiagnosticLog) {
+fn set_nominal(
+    found: &[(CoordinateCoupling, SourceSpan)],
+    symbols: &mut SymbolTable,
+    places: &MechanismSpans,
+    log: &mut DiagnosticLog,
+) {
     let mut left: Vec<&(CoordinateCoupling, SourceSpan)> = found.iter().collect();
     while !left.is_empty() {
         let waits = |coupling: &CoordinateCoupling| {
@@ -181,10 +186,13 @@ fn coordinate_sum(exact: &ExactExpression) -> Option<CoordinateSum> {
             terms: BTreeMap::from([(*i, ExactExpression::unity())]),
             offset: ExactExpression::zero(),
         }),
-        ExactExpression::Negative(inner) => Some(coordinate_sum(inner)?.map(|x| ExactExpression::Negative(Box::new(x)))),
+        ExactExpression::Negative(inner) => {
+            Some(coordinate_sum(inner)?.map(|x| ExactExpression::Negative(Box::new(x))))
+        }
         ExactExpression::Quotient(above, below) => {
             let fixed = coordinate_sum(below).filter(|below| below.terms.is_empty())?;
-            let divided = |x| ExactExpression::Quotient(Box::new(x), Box::new(fixed.offset.clone()));
+            let divided =
+                |x| ExactExpression::Quotient(Box::new(x), Box::new(fixed.offset.clone()));
             Some(coordinate_sum(above)?.map(divided))
         }
         ExactExpression::Product(factors) => {

@@ -5,8 +5,10 @@ use crate::build::symbols::SymbolTable;
 use crate::diagnostic::{Diagnostic, DiagnosticLog};
 use crate::exact::CoordinateIdx;
 use crate::kind_terms::symbols_without_unit;
-use crate::kinds::{ActsOn, PlaceLoad, OtherMotion, n_places};
-use crate::mechanism::{ModelDrive, DriveIdx, DriveKind, LumpedMass, ModelPart, PartIdx, EffectPlace};
+use crate::kinds::{ActsOn, OtherMotion, PlaceLoad, n_places};
+use crate::mechanism::{
+    DriveIdx, DriveKind, EffectPlace, LumpedMass, ModelDrive, ModelPart, PartIdx,
+};
 use crate::record::OneOrMany;
 use crate::schema::EffectKindEntry;
 use crate::suggest;
@@ -219,12 +221,17 @@ fn has_motion(
     let carries = match place {
         EffectPlace::Drive(idx) => Some(carried(drives[idx.0].kind)),
         EffectPlace::Coordinate(idx) => Some(carried(DriveKind::Joint(idx))),
-        EffectPlace::Point(_) | EffectPlace::Part(_) | EffectPlace::Base | EffectPlace::Force => None,
+        EffectPlace::Point(_) | EffectPlace::Part(_) | EffectPlace::Base | EffectPlace::Force => {
+            None
+        }
     };
     if carries == Some(motion.place_load()) {
         return true;
     }
-    let expected = format!("expected a drive or coordinate that {}", motion.description());
+    let expected = format!(
+        "expected a drive or coordinate that {}",
+        motion.description()
+    );
     log.push(
         Diagnostic::error(
             name.span,

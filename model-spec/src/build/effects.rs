@@ -14,11 +14,11 @@ use crate::formula::FormulaAstKind;
 use crate::kind_terms::{factors, unit_at};
 use crate::kinds::{ActsOn, PlaceLoad, Sign, check_kind, library_entries, n_places};
 use crate::mechanics::Mechanics;
-use crate::mechanism::{EffectBodies, ModelEffect, EffectTerm, DynamicParameter, EffectPlace};
+use crate::mechanism::{DynamicParameter, EffectBodies, EffectPlace, EffectTerm, ModelEffect};
 use crate::schema::{EffectEntry, EffectKindEntry, KindParameterEntry, ModelEntry};
-use crate::scope::{SymbolSort, FormulaRequirement};
+use crate::scope::{FormulaRequirement, SymbolSort};
 use crate::suggest;
-use crate::unit::{UnitDimension, ModelUnit};
+use crate::unit::{ModelUnit, UnitDimension};
 use crate::values::SpannedName;
 
 /// Reads the effects; their parameters join those of the file.
@@ -268,7 +268,10 @@ fn effect(
         terms.push(EffectTerm {
             symbol: key.name.clone(),
             parameter: term_parameter(entry, key, parameter, unit, &places_name, symbols, log)?,
-            expression: shapes.get(i).cloned().unwrap_or_else(ExactExpression::unity),
+            expression: shapes
+                .get(i)
+                .cloned()
+                .unwrap_or_else(ExactExpression::unity),
         });
     }
     let mut bodies = EffectBodies::default();
@@ -355,7 +358,12 @@ fn term_parameter(
 }
 
 /// Warns of a nominal value whose sign makes no physical sense.
-fn warn_of_sign(parameter: &DynamicParameter, sign: Option<Sign>, span: SourceSpan, log: &mut DiagnosticLog) {
+fn warn_of_sign(
+    parameter: &DynamicParameter,
+    sign: Option<Sign>,
+    span: SourceSpan,
+    log: &mut DiagnosticLog,
+) {
     let value = parameter.nominal;
     let expected = match sign {
         Some(Sign::Positive) if value < 0.0 => "positive",
@@ -423,8 +431,8 @@ fn constants(
             );
             continue;
         };
-        let dimension =
-            unit_at(constant.unit.as_ref(), carries).map_or(UnitDimension::ONE, |unit| unit.dimension);
+        let dimension = unit_at(constant.unit.as_ref(), carries)
+            .map_or(UnitDimension::ONE, |unit| unit.dimension);
         let what = format!("`{}`", key.name);
         let wanted = FormulaRequirement {
             sorts: &[SymbolSort::Constant],

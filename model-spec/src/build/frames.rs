@@ -9,9 +9,11 @@ use crate::build::symbols::{SymbolTable, vector};
 use crate::diagnostic::{Diagnostic, DiagnosticLog, SourceSpan};
 use crate::exact::{ExactAngle, ExactExpression, ExactLength};
 use crate::formula::SourceFormula;
-use crate::mechanism::{FrameAxis, FrameConvention, ModelFrame, FrameIdx, FramePoint, PointIdx, FrameStep};
+use crate::mechanism::{
+    FrameAxis, FrameConvention, FrameIdx, FramePoint, FrameStep, ModelFrame, PointIdx,
+};
 use crate::schema::{DhEntry, FrameEntry, ModelEntry, TransformEntry};
-use crate::scope::{FormulaScope, SymbolSort, FormulaRequirement};
+use crate::scope::{FormulaRequirement, FormulaScope, SymbolSort};
 use crate::suggest;
 use crate::unit::UnitDimension;
 use crate::values::SpannedName;
@@ -154,7 +156,9 @@ fn parents_first(
                     log.push(
                         Diagnostic::error(on.span, format!("unknown frame `{}`", on.text))
                             .label("expected the name of a frame, or `base`")
-                            .with_removal_or(removal, || suggest::advice(&on.text, "frames", known)),
+                            .with_removal_or(removal, || {
+                                suggest::advice(&on.text, "frames", known)
+                            }),
                     );
                 }
                 break;
@@ -205,7 +209,11 @@ fn report_cycle(entries: &[&FrameEntry], path: &[usize], at: usize, log: &mut Di
 }
 
 /// The steps of a frame from its parent.
-fn placement(entry: &FrameEntry, symbols: &SymbolTable, log: &mut DiagnosticLog) -> (Vec<FrameStep>, FrameConvention) {
+fn placement(
+    entry: &FrameEntry,
+    symbols: &SymbolTable,
+    log: &mut DiagnosticLog,
+) -> (Vec<FrameStep>, FrameConvention) {
     let name_span = entry.name.as_ref().map_or(entry.span, |name| name.span);
     let n_ways = usize::from(entry.modified_dh.is_some())
         + usize::from(entry.standard_dh.is_some())
@@ -251,7 +259,10 @@ fn placement(entry: &FrameEntry, symbols: &SymbolTable, log: &mut DiagnosticLog)
         if let Some(joint) = &entry.joint {
             joints::steps(joint, symbols, &mut steps, &mut text, log);
         }
-        (without_zeros(steps), FrameConvention::Transform(text.join(" ")))
+        (
+            without_zeros(steps),
+            FrameConvention::Transform(text.join(" ")),
+        )
     }
 }
 
@@ -292,7 +303,11 @@ pub(super) fn length_or_zero(
         })
 }
 
-pub(super) fn angle_or_zero(formula: Option<&SourceFormula>, symbols: &SymbolTable, log: &mut DiagnosticLog) -> ExactAngle {
+pub(super) fn angle_or_zero(
+    formula: Option<&SourceFormula>,
+    symbols: &SymbolTable,
+    log: &mut DiagnosticLog,
+) -> ExactAngle {
     formula
         .and_then(|formula| angle(formula, &symbols.scope, log))
         .unwrap_or_else(ExactAngle::zero)
@@ -322,7 +337,10 @@ fn transform_steps(
     if transform.rpy.is_some() {
         text.push(format!("rpy({})", shown(&transform.rpy)));
     }
-    for (i, axis) in [FrameAxis::X, FrameAxis::Y, FrameAxis::Z].into_iter().enumerate() {
+    for (i, axis) in [FrameAxis::X, FrameAxis::Y, FrameAxis::Z]
+        .into_iter()
+        .enumerate()
+    {
         let along = entry(&transform.xyz, i);
         let along = length_or_zero(along.as_ref(), symbols, "the position of a frame", log);
         if let Some(formula) = entry(&transform.xyz, i).filter(|_| !along.coordinates.is_empty()) {

@@ -5,11 +5,13 @@ use std::collections::BTreeMap;
 
 use crate::build::MechanismSpans;
 use crate::build::actuation::DriveRows;
-use crate::build::frames::{PointTable, FrameTree};
+use crate::build::frames::{FrameTree, PointTable};
 use crate::build::symbols::SymbolTable;
 use crate::diagnostic::{Diagnostic, DiagnosticLog, SourceSpan};
 use crate::exact::{CoordinateIdx, ModelSymbol};
-use crate::mechanism::{ModelDrive, DriveKind, FrameIdx, FreeBody, KinematicLoop, PointIdx, FrameStep};
+use crate::mechanism::{
+    DriveKind, FrameIdx, FrameStep, FreeBody, KinematicLoop, ModelDrive, PointIdx,
+};
 use crate::schema::ModelEntry;
 
 /// The free bodies with the frames that they carry.
@@ -300,7 +302,10 @@ fn free_body_crossing(span: SourceSpan, what: &str) -> Diagnostic {
 fn free_body_finder(tree: &FrameTree) -> impl Fn(&PointTable, PointIdx) -> Option<usize> {
     let mut of_frame: BTreeMap<usize, usize> = BTreeMap::new();
     for (i, frame) in tree.frames.iter().enumerate() {
-        let is_free = frame.steps.iter().any(|step| matches!(step, FrameStep::Free(_)));
+        let is_free = frame
+            .steps
+            .iter()
+            .any(|step| matches!(step, FrameStep::Free(_)));
         let root = if is_free {
             Some(i)
         } else {

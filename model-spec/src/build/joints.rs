@@ -8,7 +8,7 @@ use crate::diagnostic::{Diagnostic, DiagnosticLog};
 use crate::exact::{CoordinateIdx, ExactExpression, ModelSymbol};
 use crate::formula::{FormulaAstKind, SourceFormula};
 use crate::joint_motion::CoordinateMotion;
-use crate::mechanism::{FrameAxis, FreeBody, FrameStep, TwistAxes};
+use crate::mechanism::{FrameAxis, FrameStep, FreeBody, TwistAxes};
 use crate::record::EntryList;
 use crate::schema::JointEntry;
 use crate::scope::SymbolSort;

@@ -2,7 +2,9 @@
 
 use crate::diagnostic::{Diagnostic, DiagnosticLog, SourceSpan};
 use crate::exact::CoordinateIdx;
-use crate::mechanism::{JointCoordinate, CoordinateBounds, ModelDrive, DriveIdx, MotionLimits, FramePoint, PointIdx};
+use crate::mechanism::{
+    CoordinateBounds, DriveIdx, FramePoint, JointCoordinate, ModelDrive, MotionLimits, PointIdx,
+};
 use crate::range::ValueRange;
 use crate::schema::ModelEntry;
 use crate::suggest;

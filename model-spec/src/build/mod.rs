@@ -70,7 +70,8 @@ pub(crate) fn build(
         lumped_masses: &lumped_masses,
     };
     let effects = effects::effects(model, &own_kinds, &mut symbols, &scene, log);
-    let (gravity, force_delay) = mechanics::gravity_and_delay(&effects, gravity, &symbols.constants);
+    let (gravity, force_delay) =
+        mechanics::gravity_and_delay(&effects, gravity, &symbols.constants);
     let retain = retain::retain(model, &symbols, log);
     let limits = limits::limits(
         model,

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use crate::build::symbols::SymbolTable;
 use crate::diagnostic::{Diagnostic, DiagnosticLog};
-use crate::exact::{ExactExpression, ParameterIdx, ModelSymbol};
+use crate::exact::{ExactExpression, ModelSymbol, ParameterIdx};
 use crate::formula::{FormulaAst, FormulaAstKind};
 use crate::schema::ModelEntry;
 use crate::scope::SymbolSort;
@@ -39,9 +39,10 @@ fn product(
                 .scope
                 .get(name)
                 .is_some_and(|meaning| meaning.used.get());
-            let Some(meaning) = symbols
-                .scope
-                .look_up(name, ast.span, &[SymbolSort::Parameter], log)
+            let Some(meaning) =
+                symbols
+                    .scope
+                    .look_up(name, ast.span, &[SymbolSort::Parameter], log)
             else {
                 return false;
             };

@@ -4,12 +4,12 @@ use std::cell::Cell;
 
 use crate::build::MechanismSpans;
 use crate::diagnostic::{Diagnostic, DiagnosticLog, SourceSpan};
-use crate::exact::{ConstantIdx, CoordinateIdx, ExactExpression, ParameterIdx, ModelSymbol};
+use crate::exact::{ConstantIdx, CoordinateIdx, ExactExpression, ModelSymbol, ParameterIdx};
 use crate::formula::{FormulaAst, FormulaAstKind, SourceFormula};
 use crate::joint_motion::CoordinateMotion;
-use crate::mechanism::{ModelConstant, JointCoordinate, DynamicParameter};
+use crate::mechanism::{DynamicParameter, JointCoordinate, ModelConstant};
 use crate::schema::{LinearEntry, LinearNominalEntry, ModelEntry};
-use crate::scope::{SymbolMeaning, FormulaScope, SymbolSort, FormulaRequirement, symbol_meaning};
+use crate::scope::{FormulaRequirement, FormulaScope, SymbolMeaning, SymbolSort, symbol_meaning};
 use crate::unit::UnitDimension;
 use crate::values::FormulaVector;
 
@@ -57,7 +57,11 @@ pub(super) const LINEAR: [(&str, UnitDimension); 10] = [
 const PLANAR: [&str; 4] = ["ZZ", "MX", "MY", "M"];
 
 /// Declares all names of a file.
-pub(super) fn declare(model: &ModelEntry, places: &mut MechanismSpans, log: &mut DiagnosticLog) -> SymbolTable {
+pub(super) fn declare(
+    model: &ModelEntry,
+    places: &mut MechanismSpans,
+    log: &mut DiagnosticLog,
+) -> SymbolTable {
     let mut symbols = SymbolTable {
         scope: FormulaScope::default(),
         constants: Vec::new(),
@@ -73,7 +77,13 @@ pub(super) fn declare(model: &ModelEntry, places: &mut MechanismSpans, log: &mut
         let dimension = unit.map(|unit| unit.dimension);
         let meaning = SymbolMeaning {
             value: entry.value.map(|number| number.value),
-            ..symbol_meaning(SymbolSort::Constant, symbol, dimension, unit_text, Some(key.span))
+            ..symbol_meaning(
+                SymbolSort::Constant,
+                symbol,
+                dimension,
+                unit_text,
+                Some(key.span),
+            )
         };
         if symbols.scope.declare(&key.name, meaning, log) {
             symbols.constants.push(ModelConstant {
@@ -317,7 +327,10 @@ pub(super) fn shorthand(
 }
 
 /// The entry that a body gives for one of the linear parameters.
-pub(super) fn explicit_entry<'a>(linear: &'a LinearEntry, symbol: &str) -> Option<&'a SourceFormula> {
+pub(super) fn explicit_entry<'a>(
+    linear: &'a LinearEntry,
+    symbol: &str,
+) -> Option<&'a SourceFormula> {
     match symbol {
         "XX" => linear.xx.as_ref(),
         "XY" => linear.xy.as_ref(),
@@ -482,16 +495,22 @@ fn find_name(ast: &FormulaAst, name: &str) -> Option<SourceSpan> {
         FormulaAstKind::Sum(inner) | FormulaAstKind::Product(inner) => {
             inner.iter().find_map(|one| find_name(one, name))
         }
-        FormulaAstKind::Quotient(above, below) => find_name(above, name).or_else(|| find_name(below, name)),
-        FormulaAstKind::Negative(inner) | FormulaAstKind::Power(inner, _) | FormulaAstKind::Apply(_, inner) => {
-            find_name(inner, name)
+        FormulaAstKind::Quotient(above, below) => {
+            find_name(above, name).or_else(|| find_name(below, name))
         }
+        FormulaAstKind::Negative(inner)
+        | FormulaAstKind::Power(inner, _)
+        | FormulaAstKind::Apply(_, inner) => find_name(inner, name),
         FormulaAstKind::Rational(_) | FormulaAstKind::Pi => None,
     }
 }
 
 /// Gravity in the base frame; zero if the file gives none.
-pub(super) fn gravity(model: &ModelEntry, scope: &FormulaScope, log: &mut DiagnosticLog) -> [ExactExpression; 3] {
+pub(super) fn gravity(
+    model: &ModelEntry,
+    scope: &FormulaScope,
+    log: &mut DiagnosticLog,
+) -> [ExactExpression; 3] {
     model.gravity.as_ref().map_or_else(
         || std::array::from_fn(|_| ExactExpression::zero()),
         |gravity| {

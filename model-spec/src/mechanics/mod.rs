@@ -15,7 +15,10 @@ use crate::build::symbols::SymbolTable as Names;
 use crate::diagnostic::DiagnosticLog;
 use crate::exact::ExactExpression;
 use crate::kinds::ActsOn;
-use crate::mechanism::{EffectBodies, ModelConstant, ModelEffect, EffectTerm, Mechanism, ModelPart, EffectPlace, PointIdx};
+use crate::mechanism::{
+    EffectBodies, EffectPlace, EffectTerm, Mechanism, ModelConstant, ModelEffect, ModelPart,
+    PointIdx,
+};
 use crate::schema::EffectEntry;
 use crate::unit::UnitDimension;
 use crate::values::SpannedName;
@@ -83,7 +86,11 @@ impl Mechanics {
     }
 
     /// The symbols of the parameters that it has at a place, if these depend on the place.
-    pub fn parameters_at(self, mechanism: &Mechanism, place: EffectPlace) -> Option<Vec<&'static str>> {
+    pub fn parameters_at(
+        self,
+        mechanism: &Mechanism,
+        place: EffectPlace,
+    ) -> Option<Vec<&'static str>> {
         self.entry().parameters_at(place, &mechanism.parts)
     }
 
@@ -138,14 +145,31 @@ pub(crate) trait MechanicsEntry: Sync {
     }
 
     /// Reports a place of an effect where there is nothing to act on.
-    fn check_place(&self, _name: &SpannedName, _place: EffectPlace, _scene: &EffectTargets<'_>, _log: &mut DiagnosticLog) {}
+    fn check_place(
+        &self,
+        _name: &SpannedName,
+        _place: EffectPlace,
+        _scene: &EffectTargets<'_>,
+        _log: &mut DiagnosticLog,
+    ) {
+    }
 
     /// Reports places of an effect that do not go together.
-    fn check_places(&self, _names: &[SpannedName], _places: &[EffectPlace], _scene: &EffectTargets<'_>, _log: &mut DiagnosticLog) {
+    fn check_places(
+        &self,
+        _names: &[SpannedName],
+        _places: &[EffectPlace],
+        _scene: &EffectTargets<'_>,
+        _log: &mut DiagnosticLog,
+    ) {
     }
 
     /// See [`Mechanics::parameters_at`].
-    fn parameters_at(&self, _place: EffectPlace, _parts: &[ModelPart]) -> Option<Vec<&'static str>> {
+    fn parameters_at(
+        &self,
+        _place: EffectPlace,
+        _parts: &[ModelPart],
+    ) -> Option<Vec<&'static str>> {
         None
     }
 
@@ -172,12 +196,21 @@ pub(crate) trait MechanicsEntry: Sync {
     }
 
     /// Bodies of an effect.
-    fn bodies(&self, _terms: &[EffectTerm], _places: &[EffectPlace], _scene: &EffectTargets<'_>) -> EffectBodies {
+    fn bodies(
+        &self,
+        _terms: &[EffectTerm],
+        _places: &[EffectPlace],
+        _scene: &EffectTargets<'_>,
+    ) -> EffectBodies {
         EffectBodies::default()
     }
 
     /// Gravity of the mechanism with an effect, for that without it.
-    fn gravity(&self, _effect: &ModelEffect, gravity: [ExactExpression; 3]) -> [ExactExpression; 3] {
+    fn gravity(
+        &self,
+        _effect: &ModelEffect,
+        gravity: [ExactExpression; 3],
+    ) -> [ExactExpression; 3] {
         gravity
     }
 

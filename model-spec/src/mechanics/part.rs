@@ -5,7 +5,7 @@ use crate::diagnostic::{Diagnostic, DiagnosticLog};
 use crate::exact::{ExactExpression, ModelSymbol};
 use crate::kinds::ActsOn;
 use crate::mechanics::{MechanicsEntry, MechanicsSymbols};
-use crate::mechanism::{EffectBodies, EffectTerm, PartInertia, Mechanism, ModelPart, EffectPlace};
+use crate::mechanism::{EffectBodies, EffectPlace, EffectTerm, Mechanism, ModelPart, PartInertia};
 use crate::schema::EffectEntry;
 use crate::unit::UnitDimension;
 use crate::values::SpannedName;
@@ -43,8 +43,16 @@ impl MechanicsEntry for PartMechanics {
         DIFFERENCES
     }
 
-    fn check_place(&self, name: &SpannedName, place: EffectPlace, scene: &EffectTargets<'_>, log: &mut DiagnosticLog) {
-        let EffectPlace::Part(part) = place else { return };
+    fn check_place(
+        &self,
+        name: &SpannedName,
+        place: EffectPlace,
+        scene: &EffectTargets<'_>,
+        log: &mut DiagnosticLog,
+    ) {
+        let EffectPlace::Part(part) = place else {
+            return;
+        };
         if !is_only_one(scene.parts, part.0) {
             log.push(
                 Diagnostic::error(
@@ -69,7 +77,13 @@ impl MechanicsEntry for PartMechanics {
         Some(components(&parts[part.0].inertial))
     }
 
-    fn refuse_parameter(&self, entry: &EffectEntry, symbol: &str, those: &[&str], log: &mut DiagnosticLog) {
+    fn refuse_parameter(
+        &self,
+        entry: &EffectEntry,
+        symbol: &str,
+        those: &[&str],
+        log: &mut DiagnosticLog,
+    ) {
         let named = entry.parameters.iter().flat_map(|table| &table.entries);
         if let Some((key, _)) = named.into_iter().find(|(key, _)| key.name == symbol) {
             log.push(
@@ -81,7 +95,12 @@ impl MechanicsEntry for PartMechanics {
     }
 
     /// The differences of each part as a further part of its frame.
-    fn bodies(&self, terms: &[EffectTerm], places: &[EffectPlace], scene: &EffectTargets<'_>) -> EffectBodies {
+    fn bodies(
+        &self,
+        terms: &[EffectTerm],
+        places: &[EffectPlace],
+        scene: &EffectTargets<'_>,
+    ) -> EffectBodies {
         let value = |i: usize| {
             let term = terms.iter().find(|term| term.symbol == DIFFERENCES[i].0);
             term.map_or_else(ExactExpression::zero, |term| {
@@ -156,8 +175,8 @@ fn components(inertial: &PartInertia) -> Vec<&'static str> {
 
 /// The parameters of mass and inertia that another part may have too.
 fn shared_parameters(inertial: &PartInertia) -> Vec<crate::ParameterIdx> {
-    let (PartInertia::AboutCentre { mass, inertia, .. } | PartInertia::Linear { mass, inertia, .. }) =
-        inertial;
+    let (PartInertia::AboutCentre { mass, inertia, .. }
+    | PartInertia::Linear { mass, inertia, .. }) = inertial;
     let mut found = Vec::new();
     for exact in std::iter::once(mass).chain(inertia) {
         exact.for_each_symbol(&mut |symbol| {

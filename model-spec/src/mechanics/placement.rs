@@ -5,7 +5,7 @@ use crate::diagnostic::{Diagnostic, DiagnosticLog};
 use crate::exact::{ExactExpression, ModelSymbol};
 use crate::kinds::ActsOn;
 use crate::mechanics::{MechanicsEntry, MechanicsSymbols};
-use crate::mechanism::{EffectBodies, EffectTerm, LumpedMass, Mechanism, EffectPlace, FramePoint};
+use crate::mechanism::{EffectBodies, EffectPlace, EffectTerm, FramePoint, LumpedMass, Mechanism};
 use crate::unit::UnitDimension;
 use crate::values::SpannedName;
 
@@ -32,7 +32,13 @@ impl MechanicsEntry for PlacementMechanics {
         None
     }
 
-    fn check_place(&self, name: &SpannedName, place: EffectPlace, scene: &EffectTargets<'_>, log: &mut DiagnosticLog) {
+    fn check_place(
+        &self,
+        name: &SpannedName,
+        place: EffectPlace,
+        scene: &EffectTargets<'_>,
+        log: &mut DiagnosticLog,
+    ) {
         if displaced_masses(place, &scene.points.points, scene.lumped_masses).is_empty() {
             log.push(
                 Diagnostic::error(
@@ -46,13 +52,18 @@ impl MechanicsEntry for PlacementMechanics {
     }
 
     /// Masses where forces are taken, less such whose moments are taken elsewhere: what is left are moments.
-    fn bodies(&self, terms: &[EffectTerm], places: &[EffectPlace], scene: &EffectTargets<'_>) -> EffectBodies {
+    fn bodies(
+        &self,
+        terms: &[EffectTerm],
+        places: &[EffectPlace],
+        scene: &EffectTargets<'_>,
+    ) -> EffectBodies {
         let mut bodies = EffectBodies::default();
         for term in terms {
             let mass = ExactExpression::Symbol(ModelSymbol::Parameter(term.parameter));
-            let all = places
-                .iter()
-                .flat_map(|place| displaced_masses(*place, &scene.points.points, scene.lumped_masses));
+            let all = places.iter().flat_map(|place| {
+                displaced_masses(*place, &scene.points.points, scene.lumped_masses)
+            });
             for lump in all {
                 bodies.lumped_masses.push(LumpedMass {
                     mass: mass.clone(),
@@ -89,7 +100,11 @@ impl MechanicsEntry for PlacementMechanics {
 }
 
 /// Lumped masses whose forces are taken at a point, but whose moments elsewhere.
-fn displaced_masses<'a>(place: EffectPlace, points: &[FramePoint], all: &'a [LumpedMass]) -> Vec<&'a LumpedMass> {
+fn displaced_masses<'a>(
+    place: EffectPlace,
+    points: &[FramePoint],
+    all: &'a [LumpedMass],
+) -> Vec<&'a LumpedMass> {
     let EffectPlace::Point(point) = place else {
         return Vec::new();
     };

@@ -4,7 +4,7 @@ use crate::build::effect_places::EffectTargets;
 use crate::diagnostic::{Diagnostic, DiagnosticLog};
 use crate::kinds::ActsOn;
 use crate::mechanics::{MechanicsEntry, MechanicsSymbols};
-use crate::mechanism::{ModelDrive, DriveKind, Mechanism, EffectPlace};
+use crate::mechanism::{DriveKind, EffectPlace, Mechanism, ModelDrive};
 use crate::unit::UnitDimension;
 use crate::values::SpannedName;
 
@@ -37,7 +37,13 @@ impl MechanicsEntry for RodMechanics {
         None
     }
 
-    fn check_place(&self, name: &SpannedName, place: EffectPlace, scene: &EffectTargets<'_>, log: &mut DiagnosticLog) {
+    fn check_place(
+        &self,
+        name: &SpannedName,
+        place: EffectPlace,
+        scene: &EffectTargets<'_>,
+        log: &mut DiagnosticLog,
+    ) {
         if !is_line(scene.drives, place) {
             log.push(
                 Diagnostic::error(name.span, "a rod cannot act here")

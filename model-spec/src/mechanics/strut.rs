@@ -4,7 +4,7 @@ use crate::build::effect_places::EffectTargets;
 use crate::diagnostic::{Diagnostic, DiagnosticLog};
 use crate::kinds::ActsOn;
 use crate::mechanics::{MechanicsEntry, MechanicsSymbols};
-use crate::mechanism::{ModelDrive, DriveKind, KinematicLoop, Mechanism, EffectPlace, PointIdx};
+use crate::mechanism::{DriveKind, EffectPlace, KinematicLoop, Mechanism, ModelDrive, PointIdx};
 use crate::unit::UnitDimension;
 use crate::values::SpannedName;
 
@@ -36,7 +36,13 @@ impl MechanicsEntry for StrutMechanics {
         Some(2)
     }
 
-    fn check_places(&self, names: &[SpannedName], places: &[EffectPlace], scene: &EffectTargets<'_>, log: &mut DiagnosticLog) {
+    fn check_places(
+        &self,
+        names: &[SpannedName],
+        places: &[EffectPlace],
+        scene: &EffectTargets<'_>,
+        log: &mut DiagnosticLog,
+    ) {
         let frame = |place: &EffectPlace| match place {
             EffectPlace::Point(point) => Some(scene.points.points[point.0].frame),
             _ => None,
@@ -60,8 +66,9 @@ impl MechanicsEntry for StrutMechanics {
     /// Pairs of points on which nothing else stands: whoever declares such says that something may be attached there.
     fn pairs(&self, mechanism: &Mechanism) -> Option<Vec<[PointIdx; 2]>> {
         let points = &mechanism.points;
-        let is_free =
-            |p: &PointIdx| !is_loop_end(&mechanism.loops, *p) && !is_drive_end(&mechanism.drives, *p);
+        let is_free = |p: &PointIdx| {
+            !is_loop_end(&mechanism.loops, *p) && !is_drive_end(&mechanism.drives, *p)
+        };
         let free: Vec<PointIdx> = (0..points.len()).map(PointIdx).filter(is_free).collect();
         let mut pairs = Vec::new();
         for (i, one) in free.iter().enumerate() {

@@ -87,7 +87,11 @@ impl MechanicsEntry for TiltMechanics {
     }
 
     /// The transposed rotations, the outermost first.
-    fn gravity(&self, effect: &ModelEffect, mut gravity: [ExactExpression; 3]) -> [ExactExpression; 3] {
+    fn gravity(
+        &self,
+        effect: &ModelEffect,
+        mut gravity: [ExactExpression; 3],
+    ) -> [ExactExpression; 3] {
         for (symbol, [from, to]) in [("tz", [0, 1]), ("ty", [2, 0]), ("tx", [1, 2])] {
             let Some((_, angle)) = effect.constants.iter().find(|(name, _)| name == symbol) else {
                 continue;

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use modelmill_boundary::files::DiskFiles;
-use modelmill_spec::{AddedEffect, ModelConstant, ConstantValue, LoadedModel, load, load_file};
+use modelmill_spec::{AddedEffect, ConstantValue, LoadedModel, ModelConstant, load, load_file};
 
 const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/models");
 

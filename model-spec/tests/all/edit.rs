@@ -26,9 +26,15 @@ fn effect(kind: &str, at: &[&str]) -> NewEffect {
 /// Adds an effect to a text that stands beside the bundled models.
 fn add(text: &str, effect: &NewEffect) -> Result<(String, LoadedModel), String> {
     let path = folder("models/here.toml");
-    add_to_model(&path.to_string_lossy(), text, effect, &[], &DiskFiles::default())
-        .map(|edited| (edited.text, edited.loaded))
-        .map_err(|failure| failure.to_string())
+    add_to_model(
+        &path.to_string_lossy(),
+        text,
+        effect,
+        &[],
+        &DiskFiles::default(),
+    )
+    .map(|edited| (edited.text, edited.loaded))
+    .map_err(|failure| failure.to_string())
 }
 
 /// Whether `new` is `old` with something put in at one place.

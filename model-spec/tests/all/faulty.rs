@@ -5,7 +5,7 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use modelmill_boundary::files::{DiskFiles, FileSource, MemoryFiles};
-use modelmill_spec::{LoadFailure, DiagnosticSeverity, load};
+use modelmill_spec::{DiagnosticSeverity, LoadFailure, load};
 
 /// Reads a fixture under the path that messages should show.
 fn render(name: &str) -> String {

@@ -1,7 +1,7 @@
 //! Forces that were read later than they act, or earlier: all drives together where their clock is another, some of them where
 //! theirs is.
 
-use modelmill_identify::{DelayEstimate, DelayAudit, ForceDelays, RecordingNote};
+use modelmill_identify::{DelayAudit, DelayEstimate, ForceDelays, RecordingNote};
 
 use super::rows::AuditRows;
 use crate::model::Model;
@@ -96,8 +96,9 @@ impl ForceDelayAudit {
         let agree = (alone.iter().enumerate())
             .all(|(d, one)| !alone[..d].iter().any(|other| differ(one, other)));
         // Two drives at least must tell of themselves.
-        let telling =
-            |one: &&DelayEstimate| one.seconds.abs() > one.half_width && one.seconds * all.seconds > 0.0;
+        let telling = |one: &&DelayEstimate| {
+            one.seconds.abs() > one.half_width && one.seconds * all.seconds > 0.0
+        };
         let agree = agree && alone.iter().filter(telling).count() >= alone.len().min(2);
         let is_there = self.is_clear(all, CLEAR, LEAST) && self.gain(1) > GAIN;
         (agree && is_there).then_some(all)
@@ -105,7 +106,11 @@ impl ForceDelayAudit {
 
     /// Drives whose forces are late where others tell that they are not.
     fn delayed_drives(&self) -> Vec<usize> {
-        let ForceDelays { by_channel: alone, residuals: left, .. } = &self.delays;
+        let ForceDelays {
+            by_channel: alone,
+            residuals: left,
+            ..
+        } = &self.delays;
         let late: Vec<usize> = (0..alone.len())
             .filter(|d| self.is_clear(alone[*d], CLEAR_ALONE, LEAST_ALONE))
             .filter(|d| left[2][*d] < (1.0 - GAIN_ALONE) * left[0][*d])
@@ -177,13 +182,16 @@ impl ForceDelayAudit {
         let amount = self.delay_text(all);
         let mut each = String::new();
         if names.len() > 1 {
-            let of = names.iter().zip(&self.delays.by_channel).map(|(name, one)| {
-                format!(
-                    "`{name}` {} +- {}",
-                    rounded_text(one.seconds / self.step),
-                    significant(one.half_width / self.step, 2)
-                )
-            });
+            let of = names
+                .iter()
+                .zip(&self.delays.by_channel)
+                .map(|(name, one)| {
+                    format!(
+                        "`{name}` {} +- {}",
+                        rounded_text(one.seconds / self.step),
+                        significant(one.half_width / self.step, 2)
+                    )
+                });
             let of: Vec<String> = of.collect();
             each = format!(" Each drive by itself, in samples: {}.", of.join(", "));
         }
@@ -220,7 +228,8 @@ impl ForceDelayAudit {
 
     /// What taking a delay out gains.
     fn gain_text(&self, with: usize) -> String {
-        let [before, after] = [0, with].map(|which| percent(Some(geometric_mean(&self.delays.residuals[which]))));
+        let [before, after] =
+            [0, with].map(|which| percent(Some(geometric_mean(&self.delays.residuals[which]))));
         format!(
             " With that the best fit is off by {after} rather than {before} (geometric mean over the drives, away from reversals)."
         )

@@ -53,7 +53,11 @@ pub(crate) struct ContactEvent {
 }
 
 /// Remarks on the events of a stretch; their forces count no more where they are to be left out.
-pub(super) fn event_notes(model: &Model, data: &mut RecordingSegment, leave_out: bool) -> Vec<RecordingNote> {
+pub(super) fn event_notes(
+    model: &Model,
+    data: &mut RecordingSegment,
+    leave_out: bool,
+) -> Vec<RecordingNote> {
     let events = events(model, data).unwrap_or_default();
     let names = model.drives();
     let mut notes = Vec::new();
@@ -91,7 +95,9 @@ pub(super) fn event_notes(model: &Model, data: &mut RecordingSegment, leave_out:
             kind: "contact_event".to_owned(),
             at: drives.clone().map(|(d, _, _)| names[*d].clone()).collect(),
             estimates: drives
-                .map(|(d, largest, _)| EstimatedQuantity::new("largest", *largest, model.force_unit(*d)))
+                .map(|(d, largest, _)| {
+                    EstimatedQuantity::new("largest", *largest, model.force_unit(*d))
+                })
                 .collect(),
             recordings: vec![data.run.file.clone()],
             interval: Some([event.from, event.to]),
@@ -203,7 +209,12 @@ struct ResidualLevel {
 }
 
 impl UnexplainedForces {
-    fn new(model: &Model, data: &RecordingSegment, forces: &[Vec<f64>], samples: &[usize]) -> Option<Self> {
+    fn new(
+        model: &Model,
+        data: &RecordingSegment,
+        forces: &[Vec<f64>],
+        samples: &[usize],
+    ) -> Option<Self> {
         let drives = forces.len();
         let rows = AuditRows::new(model, data, samples)?;
         let of_samples = samples
@@ -221,7 +232,11 @@ impl UnexplainedForces {
             .collect();
         let some_count: Vec<bool> = some.iter().map(|row| counts[*row]).collect();
         let some_measured = measured.select_rows(&some);
-        let fit = robust_fit(&rows.regressor.subsample(every), &some_measured, &some_count)?;
+        let fit = robust_fit(
+            &rows.regressor.subsample(every),
+            &some_measured,
+            &some_count,
+        )?;
         let mut rest = &measured - rows.regressor.multiply(fit.values.as_slice());
         for (rest, _) in rest.iter_mut().zip(&counts).filter(|(_, counts)| !**counts) {
             *rest = 0.0;

@@ -6,7 +6,7 @@ use modelmill_identify::ForceAudit;
 use nalgebra::DVector;
 
 use super::rows::AuditRows;
-use super::{BETTER, AuditFinding, GRAVITY};
+use super::{AuditFinding, BETTER, GRAVITY};
 use crate::model::Model;
 use crate::stretch::RecordingSegment;
 use crate::text::table::percent;

@@ -155,7 +155,9 @@ fn findings(model: &Model, data: &RecordingSegment) -> Vec<AuditFinding> {
     }
     // A change of the motion may look like it.
     if notes.is_empty() {
-        notes.extend(gravity::reversed_gravity_finding(model, data, &samples, &measured));
+        notes.extend(gravity::reversed_gravity_finding(
+            model, data, &samples, &measured,
+        ));
     }
     if notes.is_empty() {
         notes = beside;
@@ -168,7 +170,11 @@ fn findings(model: &Model, data: &RecordingSegment) -> Vec<AuditFinding> {
 }
 
 /// Signs and units of the forces, held against those that the nominal values give.
-fn nominal_force_findings(model: &Model, data: &RecordingSegment, samples: &[usize]) -> Vec<AuditFinding> {
+fn nominal_force_findings(
+    model: &Model,
+    data: &RecordingSegment,
+    samples: &[usize],
+) -> Vec<AuditFinding> {
     let Some(regressor) = regressor(model, data, samples, &|_| {}) else {
         return Vec::new();
     };
@@ -372,5 +378,7 @@ fn regressor(
         qdd: states[2].iter().map(Vec::as_slice).collect(),
         load: load.iter().map(Vec::as_slice).collect(),
     };
-    ModelEvaluator::new(&model.derivation).regressor(&states).ok()
+    ModelEvaluator::new(&model.derivation)
+        .regressor(&states)
+        .ok()
 }

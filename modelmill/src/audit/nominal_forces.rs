@@ -5,7 +5,7 @@
 use modelmill_boundary::message;
 use modelmill_boundary::text::{Message, OptionName, OptionSetting, Remedy};
 use modelmill_identify::RecordingNote;
-use modelmill_spec::{ModelDrive, Mechanism};
+use modelmill_spec::{Mechanism, ModelDrive};
 
 use super::{AuditFinding, UNITS, WRONG_SIGN};
 
@@ -73,22 +73,27 @@ pub(crate) fn oddities(
     upside_down: Option<&[Vec<f64>]>,
     file: &str,
 ) -> Vec<AuditFinding> {
-    let found: Vec<(&ModelDrive, ForceOddity)> = (mechanism.drives.iter().zip(measured).zip(nominal))
-        .filter_map(|((drive, measured), nominal)| Some((drive, oddity(measured, nominal)?)))
-        .collect();
-    let mut told: Vec<AuditFinding> = [ForceMisreading::Turned, ForceMisreading::TooSmall, ForceMisreading::TooLarge]
-        .into_iter()
-        .filter_map(|which| {
-            let drives: Vec<&ModelDrive> = found
-                .iter()
-                .filter(|(_, oddity)| *oddity == ForceOddity::Misread(which))
-                .map(|(drive, _)| *drive)
-                .collect();
-            let may_hang = which == ForceMisreading::Turned
-                && upside_down.is_some_and(|forces| is_sign_explained(forces, measured));
-            (!drives.is_empty()).then(|| misreading_finding(mechanism, &drives, which, may_hang, file))
-        })
-        .collect();
+    let found: Vec<(&ModelDrive, ForceOddity)> =
+        (mechanism.drives.iter().zip(measured).zip(nominal))
+            .filter_map(|((drive, measured), nominal)| Some((drive, oddity(measured, nominal)?)))
+            .collect();
+    let mut told: Vec<AuditFinding> = [
+        ForceMisreading::Turned,
+        ForceMisreading::TooSmall,
+        ForceMisreading::TooLarge,
+    ]
+    .into_iter()
+    .filter_map(|which| {
+        let drives: Vec<&ModelDrive> = found
+            .iter()
+            .filter(|(_, oddity)| *oddity == ForceOddity::Misread(which))
+            .map(|(drive, _)| *drive)
+            .collect();
+        let may_hang = which == ForceMisreading::Turned
+            && upside_down.is_some_and(|forces| is_sign_explained(forces, measured));
+        (!drives.is_empty()).then(|| misreading_finding(mechanism, &drives, which, may_hang, file))
+    })
+    .collect();
     let before_gears = found.iter().filter_map(|(drive, oddity)| match oddity {
         ForceOddity::BeforeGear(factor) => Some((*drive, *factor)),
         ForceOddity::Misread(_) => None,
@@ -150,7 +155,7 @@ fn misreading_finding(
                 let unit = drive.kind.force_unit(&mechanism.coordinates);
                 format!("{name}={name} [k{unit}]")
             }
-            Misread::TooLarge => format!("{name}={name}/1000"),
+            ForceMisreading::TooLarge => format!("{name}={name}/1000"),
         };
         OptionSetting::new(OptionName::Columns, column)
     });
@@ -213,9 +218,18 @@ mod tests {
             oddity(&measured, &nominal)
         };
         assert_eq!(of(1.3, 0.1), None);
-        assert_eq!(of(-0.8, 0.1), Some(ForceOddity::Misread(ForceMisreading::Turned)));
-        assert_eq!(of(1.4e-3, 0.1), Some(ForceOddity::Misread(ForceMisreading::TooSmall)));
-        assert_eq!(of(-7e2, 0.1), Some(ForceOddity::Misread(ForceMisreading::TooLarge)));
+        assert_eq!(
+            of(-0.8, 0.1),
+            Some(ForceOddity::Misread(ForceMisreading::Turned))
+        );
+        assert_eq!(
+            of(1.4e-3, 0.1),
+            Some(ForceOddity::Misread(ForceMisreading::TooSmall))
+        );
+        assert_eq!(
+            of(-7e2, 0.1),
+            Some(ForceOddity::Misread(ForceMisreading::TooLarge))
+        );
         let Some(ForceOddity::BeforeGear(ratio)) = of(-1.0 / 101.0, 0.1) else {
             panic!("a gear");
         };

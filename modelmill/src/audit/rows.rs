@@ -58,7 +58,11 @@ impl AuditRows {
     }
 
     /// The slope in time of the regressor and the further columns, per s.
-    pub(super) fn slope(model: &Model, data: &RecordingSegment, samples: &[usize]) -> Option<ChannelRegressor> {
+    pub(super) fn slope(
+        model: &Model,
+        data: &RecordingSegment,
+        samples: &[usize],
+    ) -> Option<ChannelRegressor> {
         let around = DriveStencil::new(model, data, samples)?;
         let n = around.rates[1].len();
         let [earlier, _, later] = &around.samples;
@@ -100,7 +104,8 @@ impl DriveStencil {
         let mut drives = Vec::new();
         for samples in &samples {
             let evaluator = ModelEvaluator::new(&model.derivation);
-            let found = SampledStates::new(data, samples).with_states(|states| evaluator.drive_motion(states));
+            let found = SampledStates::new(data, samples)
+                .with_states(|states| evaluator.drive_motion(states));
             // Positions come first, rates behind them, the Jacobian last.
             let mut positions = found.ok()?;
             positions.truncate(2 * n);
@@ -151,7 +156,11 @@ impl DriveStencil {
     }
 
     /// Puts what is chosen of the further columns behind those of the model.
-    fn add_extra_columns(&self, rows: &mut DMatrix<f64>, chosen: impl Fn(ExtraDriveColumns) -> [f64; MORE]) {
+    fn add_extra_columns(
+        &self,
+        rows: &mut DMatrix<f64>,
+        chosen: impl Fn(ExtraDriveColumns) -> [f64; MORE],
+    ) {
         let (n, width) = (self.rates[1].len(), rows.ncols());
         let owned = std::mem::replace(rows, DMatrix::zeros(0, 0));
         *rows = owned.resize_horizontally(width + MORE * n, 0.0);
@@ -196,7 +205,9 @@ pub(super) fn regressor_with_reversed_gravity(
 ) -> Option<DMatrix<f64>> {
     let evaluator = ModelEvaluator::new(&model.derivation);
     let at_rest = SampledStates::new(data, samples).at_standstill();
-    let at_rest = at_rest.with_states(|states| evaluator.regressor(states)).ok()?;
+    let at_rest = at_rest
+        .with_states(|states| evaluator.regressor(states))
+        .ok()?;
     Some(regressor(model, data, samples)? - 2.0 * at_rest)
 }
 
@@ -209,7 +220,8 @@ struct SampledStates {
 impl SampledStates {
     fn new(data: &RecordingSegment, samples: &[usize]) -> Self {
         Self {
-            motion: [&data.run.q, &data.run.qd, &data.run.qdd].map(|all| select_samples(all, samples)),
+            motion: [&data.run.q, &data.run.qd, &data.run.qdd]
+                .map(|all| select_samples(all, samples)),
             load: select_samples(data.run.force.as_deref().unwrap_or(&[]), samples),
         }
     }

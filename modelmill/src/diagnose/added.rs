@@ -102,7 +102,9 @@ fn entry(found: &IdentifiedEffect, kind: &EffectKind, answer: &DiagnosisSolution
                     .push((constant.to_owned(), round_significant(value / of)));
             }
         } else if kind.constants.iter().any(|c| c.symbol == symbol) {
-            effect.constants.push((symbol.to_owned(), round_significant(*value)));
+            effect
+                .constants
+                .push((symbol.to_owned(), round_significant(*value)));
         } else if kind.parameters.iter().any(|p| p.symbol == symbol) {
             effect.parameters.push(NewParameter {
                 symbol: symbol.to_owned(),

@@ -1,16 +1,16 @@
 //! Every effect that may be missing, as the entry that `add` would write, in variants of the model: their derivation gives
 //! the columns of all.
 
-use modelmill_codegen::{Derivation, PoseGuard, ParameterMonomial};
+use modelmill_codegen::{Derivation, ParameterMonomial, PoseGuard};
 use modelmill_spec::{
-    AddedEffect, ModelConstant, ConstantValue, ModelEffect, EffectKind, Mechanics, Mechanism, Scale, ConstantSearch,
-    Sign,
+    AddedEffect, ConstantSearch, ConstantValue, EffectKind, Mechanics, Mechanism, ModelConstant,
+    ModelEffect, Scale, Sign,
 };
 
 use crate::error::{Error, Outcome};
 use crate::model::Model;
 
-use super::places::{CandidatePlace, is_applicable, place_sets, candidate_places};
+use super::places::{CandidatePlace, candidate_places, is_applicable, place_sets};
 
 /// Values of a constant that are tried where the search has no scale of its own.
 const TRIED: usize = 15;
@@ -35,7 +35,8 @@ pub(crate) struct SingleCandidate {
 impl SingleCandidate {
     /// The symbol of the constant whose value is tried.
     pub(crate) fn range(&self) -> Option<&str> {
-        let is_range = |c: &&(String, String, ConstantSearch)| matches!(c.2, ConstantSearch::Range { .. });
+        let is_range =
+            |c: &&(String, String, ConstantSearch)| matches!(c.2, ConstantSearch::Range { .. });
         let found = self.constants.iter().find(is_range);
         found.map(|(symbol, _, _)| symbol.as_str())
     }
@@ -156,8 +157,9 @@ pub(crate) fn candidates(model: &Model) -> Outcome<DerivedCandidates> {
 /// Whether the model has the effect at all of some places already.
 fn has_effect(mechanism: &Mechanism, kind: &EffectKind, spots: &[&CandidatePlace]) -> bool {
     let holds = |effect: &ModelEffect| {
-        let has =
-            |spot: &&CandidatePlace| effect.places.contains(&spot.place) || effect.other == Some(spot.place);
+        let has = |spot: &&CandidatePlace| {
+            effect.places.contains(&spot.place) || effect.other == Some(spot.place)
+        };
         spots.iter().all(has)
     };
     let mut effects = mechanism.effects.iter();
@@ -260,7 +262,9 @@ impl CandidateVariant {
         own: usize,
         singles: &mut [SingleCandidate],
     ) -> Outcome<Derivation> {
-        let mechanism = &model.loaded.with_additions(&self.constants, &self.effects)?;
+        let mechanism = &model
+            .loaded
+            .with_additions(&self.constants, &self.effects)?;
         let mut wanted = Vec::new();
         for (number, effect) in self.singles.iter().zip(&mechanism.effects[own..]) {
             let terms = effect.terms.iter();
@@ -269,8 +273,9 @@ impl CandidateVariant {
                 .collect();
             wanted.extend(effect.terms.iter().map(|term| term.parameter.0));
         }
-        let is_wanted =
-            |product: &ParameterMonomial| product.0.iter().any(|(p, n)| *n == 1 && wanted.contains(p));
+        let is_wanted = |product: &ParameterMonomial| {
+            product.0.iter().any(|(p, n)| *n == 1 && wanted.contains(p))
+        };
         let mut derivation = modelmill_codegen::derive_columns(mechanism, &is_wanted)
             .map_err(|error| Error::derivation(&model.path, error))?;
         // One candidate without a finite value somewhere must not stop the others: who looks at the columns leaves it out.

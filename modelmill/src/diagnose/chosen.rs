@@ -1,15 +1,22 @@
 //! An effect that the user names, derived like a candidate, with its columns along recordings.
 
 use modelmill_codegen::ModelEvaluator;
-use modelmill_identify::diagnose::{CandidateEffect, ColumnChoice, ForceColumn, LocatedEffect, ColumnSource};
+use modelmill_identify::diagnose::{
+    CandidateEffect, ColumnChoice, ColumnSource, ForceColumn, LocatedEffect,
+};
 use modelmill_spec::edit::NewEffect;
-use modelmill_spec::{ActsOn, DriveKind, EffectKind, Mechanics, Mechanism, EffectPlace, ConstantSearch};
+use modelmill_spec::{
+    ActsOn, ConstantSearch, DriveKind, EffectKind, EffectPlace, Mechanics, Mechanism,
+};
 
 use crate::error::{Error, Outcome};
 use crate::model::Model;
 
-use super::candidates::{DerivedCandidates, ChangeCandidate, CandidateEntry, CandidateVariant, single_candidate, derive_tilt, is_load_dependent};
-use super::columns::{load_dependent_columns, candidate_columns};
+use super::candidates::{
+    CandidateEntry, CandidateVariant, ChangeCandidate, DerivedCandidates, derive_tilt,
+    is_load_dependent, single_candidate,
+};
+use super::columns::{candidate_columns, load_dependent_columns};
 use super::places::{CandidatePlace, candidate_places};
 use crate::regressors::{SegmentList, regressor};
 
@@ -91,7 +98,11 @@ pub(crate) struct ChosenEffect {
 /// Derives a named effect.
 ///
 /// Fails, as `add` would, if kind, place or value is unknown or the model has the effect already.
-pub(crate) fn derive_effect(model: &Model, named: &NamedEffect, constants: ConstantPolicy) -> Outcome<ChosenEffect> {
+pub(crate) fn derive_effect(
+    model: &Model,
+    named: &NamedEffect,
+    constants: ConstantPolicy,
+) -> Outcome<ChosenEffect> {
     let loaded = &model.loaded;
     check_effect(model, named)?;
     let mechanism = &loaded.mechanism;
@@ -201,7 +212,12 @@ fn check_effect(model: &Model, named: &NamedEffect) -> Outcome {
 }
 
 /// The place of a kind by its name.
-fn find_place(mechanism: &Mechanism, kind: &EffectKind, all: &[CandidatePlace], name: &str) -> Outcome<CandidatePlace> {
+fn find_place(
+    mechanism: &Mechanism,
+    kind: &EffectKind,
+    all: &[CandidatePlace],
+    name: &str,
+) -> Outcome<CandidatePlace> {
     let suits = |spot: &&CandidatePlace| spot.name == name && kind.on.contains(&spot.sort);
     if let Some(spot) = all.iter().find(suits) {
         return Ok(spot.clone());
@@ -226,7 +242,11 @@ fn find_place(mechanism: &Mechanism, kind: &EffectKind, all: &[CandidatePlace], 
 
 /// Constants with a value: those that are given and, where nothing is searched for, the usual ones. The position of rest
 /// of a spring and its like are found with the parameters in any case.
-fn fixed_constants(kind: &EffectKind, named: &NamedEffect, constants: ConstantPolicy) -> Outcome<Vec<(String, f64)>> {
+fn fixed_constants(
+    kind: &EffectKind,
+    named: &NamedEffect,
+    constants: ConstantPolicy,
+) -> Outcome<Vec<(String, f64)>> {
     let mut given = Vec::new();
     for constant in &kind.constants {
         if constant.search == Some(ConstantSearch::Linear) {
@@ -292,7 +312,8 @@ impl ChosenEffect {
             ColumnSource::Columns(choices) => choices.clone(),
             ColumnSource::LoadDependent => {
                 let tried = |single: usize| grids[single].clone();
-                let made = load_dependent_columns(&self.candidates, model, all, load, None, &tried)?;
+                let made =
+                    load_dependent_columns(&self.candidates, model, all, load, None, &tried)?;
                 made.into_iter()
                     .next()
                     .map_or_else(Vec::new, |(_, choices)| choices)
@@ -310,7 +331,9 @@ impl ChosenEffect {
                 };
                 only(tilt.directions(&level).into_iter().map(sum).collect())
             }
-            ColumnSource::ReadingFault(_) | ColumnSource::Body(_) | ColumnSource::Constant(_) => Vec::new(),
+            ColumnSource::ReadingFault(_) | ColumnSource::Body(_) | ColumnSource::Constant(_) => {
+                Vec::new()
+            }
         };
         Ok(Some((candidate, choices)))
     }
@@ -322,7 +345,10 @@ impl ChosenEffect {
 }
 
 /// Columns of the base that are to be found, what the bodies of the nominal model carry, and the force of what is known.
-pub(crate) fn base_columns(model: &Model, all: &SegmentList<'_>) -> Outcome<(Vec<ForceColumn>, ForceColumn, ForceColumn)> {
+pub(crate) fn base_columns(
+    model: &Model,
+    all: &SegmentList<'_>,
+) -> Outcome<(Vec<ForceColumn>, ForceColumn, ForceColumn)> {
     let every = regressor(all, &ModelEvaluator::new(&model.derivation), model)?;
     let none = ForceColumn(vec![None; model.drives().len()]);
     let (mut load, mut known) = (none.clone(), none);

@@ -2,16 +2,20 @@
 
 use modelmill_codegen::ModelEvaluator;
 use modelmill_identify::diagnose::{
-    CandidateEffect, ColumnChoice, ForceColumn, LocatedEffect, EffectParameter, ReadingFaultKind, CandidateNature, ForceReadingFault, SignConstraint, ColumnSource,
+    CandidateEffect, CandidateNature, ColumnChoice, ColumnSource, EffectParameter, ForceColumn,
+    ForceReadingFault, LocatedEffect, ReadingFaultKind, SignConstraint,
 };
-use modelmill_spec::{ActsOn, EffectKind, Mechanics, ConstantSearch};
+use modelmill_spec::{ActsOn, ConstantSearch, EffectKind, Mechanics};
 use rayon::prelude::*;
 
 use crate::error::Outcome;
 use crate::model::Model;
 use crate::stretch::RecordingSegment;
 
-use super::candidates::{DerivedCandidates, ChangeCandidate, CandidateEntry, SingleCandidate, EvaluationFrequency, grid, sign};
+use super::candidates::{
+    CandidateEntry, ChangeCandidate, DerivedCandidates, EvaluationFrequency, SingleCandidate, grid,
+    sign,
+};
 use super::numbers::PlaceMotions;
 use super::places::CandidatePlace;
 use super::tilt::{TILTS, tilt};
@@ -21,8 +25,17 @@ use crate::regressors::{SegmentList, regressor_of};
 const CONSTANT: &str = "force_offset";
 
 /// Candidates with their columns; where each comes from is said in the same order.
-pub(crate) fn candidate_columns(candidates: &DerivedCandidates, model: &Model, all: &SegmentList<'_>) -> Outcome<CandidateColumns> {
-    let is_linear = |single: &SingleCandidate| single.constants.iter().any(|c| c.2 == ConstantSearch::Linear);
+pub(crate) fn candidate_columns(
+    candidates: &DerivedCandidates,
+    model: &Model,
+    all: &SegmentList<'_>,
+) -> Outcome<CandidateColumns> {
+    let is_linear = |single: &SingleCandidate| {
+        single
+            .constants
+            .iter()
+            .any(|c| c.2 == ConstantSearch::Linear)
+    };
     let grids = grids(candidates, model, all)?;
     // Nothing changes in a second round where no constant does.
     let of_known = if candidates.singles.iter().any(is_linear) {
@@ -86,7 +99,12 @@ pub(crate) fn candidate_columns(candidates: &DerivedCandidates, model: &Model, a
                 sign: SignConstraint::Any,
             };
             let parameters = tilt.axes.iter().map(angle).collect();
-            made.push(change_candidate(candidates, change, parameters, ColumnSource::Tilt(tilt)));
+            made.push(change_candidate(
+                candidates,
+                change,
+                parameters,
+                ColumnSource::Tilt(tilt),
+            ));
             origins.push(None);
         }
     }
@@ -116,7 +134,11 @@ pub(crate) fn candidate_columns(candidates: &DerivedCandidates, model: &Model, a
 }
 
 /// Values that are tried for the constant of each single candidate; one where it has none.
-fn grids(candidates: &DerivedCandidates, model: &Model, all: &SegmentList<'_>) -> Outcome<Vec<Vec<f64>>> {
+fn grids(
+    candidates: &DerivedCandidates,
+    model: &Model,
+    all: &SegmentList<'_>,
+) -> Outcome<Vec<Vec<f64>>> {
     let is_known = |single: &SingleCandidate| single.constants.is_empty();
     if candidates.singles.iter().all(is_known) {
         return Ok(vec![vec![1.0]; candidates.singles.len()]);
@@ -268,7 +290,14 @@ pub(crate) fn unit_forces(
         candidates.kinds[single.kind].name == CONSTANT && single.spots.len() == 1
     };
     let which: Vec<usize> = (0..candidates.singles.len()).filter(is_constant).collect();
-    let made = single_columns(candidates, &which, model, all, EvaluationFrequency::Known, &|_, _| 1.0)?;
+    let made = single_columns(
+        candidates,
+        &which,
+        model,
+        all,
+        EvaluationFrequency::Known,
+        &|_, _| 1.0,
+    )?;
     let of = |(k, columns): (&usize, Vec<ForceColumn>)| {
         let column = columns.into_iter().next()?;
         Some((candidates.singles[*k].spots[0].clone(), column))
@@ -336,7 +365,10 @@ fn candidate(
             columns: sum(0),
         }],
     };
-    let linear = first.constants.iter().find(|c| c.2 == ConstantSearch::Linear);
+    let linear = first
+        .constants
+        .iter()
+        .find(|c| c.2 == ConstantSearch::Linear);
     if let (None, Some((symbol, _, _))) = (searched, linear) {
         let mut shifts = sum(1);
         for (shift, column) in shifts.iter_mut().zip(&choices[0].columns) {
@@ -398,7 +430,9 @@ pub(crate) fn load_dependent_columns(
 ) -> Outcome<Vec<(usize, Vec<ColumnChoice>)>> {
     let is_wanted = |k: &usize| only.is_none_or(|e| candidates.entries[e].singles.contains(k));
     let which: Vec<usize> = (0..candidates.singles.len())
-        .filter(|k| candidates.singles[*k].sort == EvaluationFrequency::LoadDependent && is_wanted(k))
+        .filter(|k| {
+            candidates.singles[*k].sort == EvaluationFrequency::LoadDependent && is_wanted(k)
+        })
         .collect();
     if which.is_empty() {
         return Ok(Vec::new());
@@ -420,7 +454,8 @@ pub(crate) fn load_dependent_columns(
         loaded.push((one, *is_check));
         start += kept;
     }
-    let all: Vec<(&RecordingSegment, bool)> = loaded.iter().map(|(one, check)| (one, *check)).collect();
+    let all: Vec<(&RecordingSegment, bool)> =
+        loaded.iter().map(|(one, check)| (one, *check)).collect();
     let tried: Vec<Vec<f64>> = which.iter().map(|k| tried(*k)).collect();
     let place = |single: usize| which.iter().position(|w| *w == single);
     // `found[single][round]`.

@@ -3,7 +3,8 @@
 
 use modelmill_codegen::ModelEvaluator;
 use modelmill_identify::diagnose::{
-    CandidateEffect, ForceColumn, ConstantCorrection, LocatedEffect, EffectParameter, CandidateNature, ForceSensitivity, SignConstraint, ColumnSource,
+    CandidateEffect, CandidateNature, ColumnSource, ConstantCorrection, EffectParameter,
+    ForceColumn, ForceSensitivity, LocatedEffect, SignConstraint,
 };
 
 use crate::model::Model;
@@ -29,7 +30,11 @@ pub(crate) fn constants(
     let along = |k: usize, step: f64| {
         let mut moved = usual.clone();
         moved[k] += step;
-        regressor(all, &ModelEvaluator::with_constants(derivation, moved), model)
+        regressor(
+            all,
+            &ModelEvaluator::with_constants(derivation, moved),
+            model,
+        )
     };
     let mut middle = None;
     let mut candidates = Vec::new();
@@ -93,7 +98,10 @@ pub(crate) fn constants(
             refines: None,
             nature: CandidateNature::Effect,
             is_per_run: false,
-            source: ColumnSource::Constant(ConstantCorrection { first_derivative: slope, second_derivative: bend }),
+            source: ColumnSource::Constant(ConstantCorrection {
+                first_derivative: slope,
+                second_derivative: bend,
+            }),
         });
     }
     candidates

@@ -5,7 +5,8 @@
 
 use modelmill_identify::changes::NormalEquations;
 use modelmill_identify::diagnose::{
-    CandidateEffect, ColumnChoice, ForceColumn, LocatedEffect, EffectParameter, CandidateNature, DiagnosisProblem, SignConstraint, ColumnSource,
+    CandidateEffect, CandidateNature, ColumnChoice, ColumnSource, DiagnosisProblem,
+    EffectParameter, ForceColumn, LocatedEffect, SignConstraint,
 };
 
 use crate::along;

@@ -2,12 +2,14 @@
 //! of the machine does not share. All of it is told, and none of it is left to be taken for an effect.
 
 use modelmill_identify::changes::NormalEquations;
-use modelmill_identify::diagnose::{Disturbance, DiagnosisProblem, EstimatedQuantity, quantisation_step};
+use modelmill_identify::diagnose::{
+    DiagnosisProblem, Disturbance, EstimatedQuantity, quantisation_step,
+};
 
 use crate::error::Outcome;
 use crate::model::Model;
 use crate::recording::PreparedRecording;
-use crate::runs::{RecordingDifference, PhysicalChange, differences};
+use crate::runs::{PhysicalChange, RecordingDifference, differences};
 
 use crate::regressors::SegmentList;
 
@@ -23,7 +25,10 @@ const FEWEST_BEYOND: usize = 10;
 const COMES_AGAIN: f64 = 0.5;
 
 /// What later recordings do not share with the first one; nothing where that cannot be said.
-pub(crate) fn run_differences(model: &Model, recordings: &[&PreparedRecording]) -> Vec<RecordingDifference> {
+pub(crate) fn run_differences(
+    model: &Model,
+    recordings: &[&PreparedRecording],
+) -> Vec<RecordingDifference> {
     if recordings.len() < 2 {
         return Vec::new();
     }
@@ -61,7 +66,8 @@ pub(crate) fn subtract_known(
             continue;
         }
         let is_same = |told: &&mut Disturbance| {
-            told.description.is_some() && (&told.kind, &told.description) == (&one.kind, &one.description)
+            told.description.is_some()
+                && (&told.kind, &told.description) == (&one.kind, &one.description)
         };
         match problem.disturbances.iter_mut().find(is_same) {
             Some(told) => {
@@ -86,12 +92,14 @@ fn difference_disturbance(one: &RecordingDifference) -> Disturbance {
         PhysicalChange::Clock { .. } => "time_base",
         _ => "different_runs",
     };
-    let estimates = values.into_iter().map(|(name, value, unit)| EstimatedQuantity {
-        name: name.to_owned(),
-        value: value.value,
-        standard_deviation: Some(value.deviation),
-        unit: unit.to_owned(),
-    });
+    let estimates = values
+        .into_iter()
+        .map(|(name, value, unit)| EstimatedQuantity {
+            name: name.to_owned(),
+            value: value.value,
+            standard_deviation: Some(value.deviation),
+            unit: unit.to_owned(),
+        });
     Disturbance {
         kind: kind.to_owned(),
         at: at.into_iter().map(str::to_owned).collect(),
@@ -117,7 +125,11 @@ fn difference_disturbance(one: &RecordingDifference) -> Disturbance {
 }
 
 /// Forces that are read in steps coarser than their noise: half a step either way is their noise.
-fn add_quantisation_noise(problem: &mut DiagnosisProblem, model: &Model, all: &SegmentList<'_>) -> Outcome<()> {
+fn add_quantisation_noise(
+    problem: &mut DiagnosisProblem,
+    model: &Model,
+    all: &SegmentList<'_>,
+) -> Outcome<()> {
     for (d, drive) in model.drives().iter().enumerate() {
         let mut recorded = Vec::new();
         for (one, _) in all {

@@ -3,8 +3,10 @@
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{CommandName, Message, OptionName, Remedy};
-use modelmill_identify::diagnose::{ModelDiagnosis, LocatedEffect, EffectParameter, IdentifiedEffect, DiagnosisVerdict};
-use modelmill_identify::{FitParameter, RecordingNote, ErrorRegion, ParameterStatus};
+use modelmill_identify::diagnose::{
+    DiagnosisVerdict, EffectParameter, IdentifiedEffect, LocatedEffect, ModelDiagnosis,
+};
+use modelmill_identify::{ErrorRegion, FitParameter, ParameterStatus, RecordingNote};
 use modelmill_spec::Mechanics;
 use modelmill_spec::edit::NewEffect;
 
@@ -23,7 +25,7 @@ use super::faults;
 use super::laws::{self, LawHypothesis};
 use super::long;
 use super::off_nominal::{OffNominalParameter, off_nominal_parameters, reversed_sign_note};
-use super::problem::{self, DiagnosisSolution, DiagnosisQuery, FixedParameters};
+use super::problem::{self, DiagnosisQuery, DiagnosisSolution, FixedParameters};
 use super::versions::ModelVersion;
 use super::words::{self, ValidationMethod};
 
@@ -270,7 +272,11 @@ impl Model {
         let [fit_data, check_data] = data;
         let before = ModelVersion::new(self.clone(), fit_data, check_data, held)?;
         let places = judged_error_locations(&before)?;
-        let left = after.as_ref().ok().map(self::judged_error_locations).transpose()?;
+        let left = after
+            .as_ref()
+            .ok()
+            .map(self::judged_error_locations)
+            .transpose()?;
         let variables = variables(&before)?;
         let mut findings = DiagnosisFindings {
             diagnosis: answer.diagnosis.clone(),
@@ -300,7 +306,10 @@ impl Model {
             findings.notes.push(note);
         }
         findings.regions = regions(&findings);
-        if question.repeat_with_nominal && held != FixedParameters::All && !findings.off_nominal.is_empty() {
+        if question.repeat_with_nominal
+            && held != FixedParameters::All
+            && !findings.off_nominal.is_empty()
+        {
             findings.with_nominal = Some(nominal_diagnosis(&findings, &between)?);
         }
         Ok(findings)
@@ -353,7 +362,10 @@ fn version_with_effects(
 }
 
 /// The same question with all parameters held at their nominal values.
-fn nominal_diagnosis(findings: &DiagnosisFindings, between: &[RecordingDifference]) -> Outcome<NominalDiagnosis> {
+fn nominal_diagnosis(
+    findings: &DiagnosisFindings,
+    between: &[RecordingDifference],
+) -> Outcome<NominalDiagnosis> {
     let version = &findings.before;
     let of = |is_check: bool| -> Vec<RecordingSegment> {
         let runs = version.data.iter().zip(&version.runs);
@@ -407,7 +419,12 @@ fn undecided_effects(findings: &DiagnosisFindings) -> Vec<UndecidedEffect> {
             separating_experiment: format!("{known} {more}").trim().to_owned(),
         }
     };
-    findings.diagnosis.undetermined_effects.iter().map(of).collect()
+    findings
+        .diagnosis
+        .undetermined_effects
+        .iter()
+        .map(of)
+        .collect()
 }
 
 /// Unit of a constant of a found effect at its places.
@@ -425,7 +442,10 @@ fn unit_of_constant(findings: &DiagnosisFindings, found: &IdentifiedEffect, name
 }
 
 /// Estimates as the search has them.
-fn search_estimates(parameters: &[EffectParameter], found: &IdentifiedEffect) -> Vec<EffectEstimate> {
+fn search_estimates(
+    parameters: &[EffectParameter],
+    found: &IdentifiedEffect,
+) -> Vec<EffectEstimate> {
     let values = found.estimates.iter().zip(&found.standard_deviations);
     let of = |(p, (value, std)): (&EffectParameter, (&f64, &Option<f64>))| EffectEstimate {
         name: p.symbol.clone(),
@@ -513,7 +533,10 @@ fn separating_experiment(findings: &DiagnosisFindings, found: &IdentifiedEffect)
 }
 
 /// What a motion would have to decide. What only moves forces in time has no force of its own to be made large.
-fn separation(findings: &DiagnosisFindings, found: &IdentifiedEffect) -> Option<SeparationProposal> {
+fn separation(
+    findings: &DiagnosisFindings,
+    found: &IdentifiedEffect,
+) -> Option<SeparationProposal> {
     let is_force = |effect: &&LocatedEffect| {
         let kinds = findings.answer.candidates.kinds.iter();
         let mut kind = kinds.filter(|kind| kind.name == effect.kind);
@@ -556,7 +579,10 @@ fn regions(findings: &DiagnosisFindings) -> Vec<ErrorRegion> {
         return findings.places.regions.clone();
     }
     let channels = &findings.answer.problem.layout.channels;
-    let left = findings.residual_locations.as_ref().unwrap_or(&findings.places);
+    let left = findings
+        .residual_locations
+        .as_ref()
+        .unwrap_or(&findings.places);
     let mut regions = Vec::new();
     for d in &diagnosis.unexplained {
         let of_channel = left.regions.iter().filter(|r| r.channel == channels[*d]);

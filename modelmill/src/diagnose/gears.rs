@@ -4,7 +4,8 @@
 //! between flanks do not show in this.
 
 use modelmill_identify::diagnose::{
-    CandidateEffect, ColumnChoice, ForceColumn, LocatedEffect, EffectParameter, CandidateNature, SignConstraint, ColumnSource,
+    CandidateEffect, CandidateNature, ColumnChoice, ColumnSource, EffectParameter, ForceColumn,
+    LocatedEffect, SignConstraint,
 };
 use modelmill_spec::DriveKind;
 

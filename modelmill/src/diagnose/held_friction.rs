@@ -2,9 +2,10 @@
 //! lack it.
 
 use modelmill_identify::diagnose::{
-    CandidateEffect, ColumnChoice, ForceColumn, LocatedEffect, EffectParameter, CandidateNature, SignConstraint, ColumnSource,
+    CandidateEffect, CandidateNature, ColumnChoice, ColumnSource, EffectParameter, ForceColumn,
+    LocatedEffect, SignConstraint,
 };
-use modelmill_spec::{EffectTerm, EffectPlace};
+use modelmill_spec::{EffectPlace, EffectTerm};
 
 use crate::model::Model;
 

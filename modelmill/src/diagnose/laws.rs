@@ -5,11 +5,11 @@ use std::fmt::Write as _;
 
 use modelmill_codegen::ModelEvaluator;
 use modelmill_identify::diagnose::{
-    ForceColumn, ModelDiagnosis, LocatedEffect, LawFactor, SiteLaw as Proposed, LawProduct, LawProposal, LawShape, LawSite, LawTerm,
-    LawVariable,
+    ForceColumn, LawFactor, LawProduct, LawProposal, LawShape, LawSite, LawTerm, LawVariable,
+    LocatedEffect, ModelDiagnosis, SiteLaw as Proposed,
 };
 use modelmill_spec::edit::{NewEffect, NewParameter};
-use modelmill_spec::{ActsOn, PlaceLoad, DriveKind, EffectPlace};
+use modelmill_spec::{ActsOn, DriveKind, EffectPlace, PlaceLoad};
 
 use crate::along;
 use crate::error::Outcome;
@@ -24,7 +24,11 @@ use super::findings::EffectEstimate;
 use super::places::{CandidatePlace, candidate_places};
 
 /// Places on which laws may act, along all recordings: drives, and joints without a drive of their own.
-pub(crate) fn sites(candidates: &DerivedCandidates, model: &Model, all: &SegmentList<'_>) -> Outcome<Vec<LawSite>> {
+pub(crate) fn sites(
+    candidates: &DerivedCandidates,
+    model: &Model,
+    all: &SegmentList<'_>,
+) -> Outcome<Vec<LawSite>> {
     let mechanism = &model.loaded.mechanism;
     let forces = unit_forces(candidates, model, all)?;
     let mut sites: Vec<LawSite> = Vec::new();
@@ -70,7 +74,11 @@ fn drive_column(model: &Model, all: &SegmentList<'_>, drive: usize) -> ForceColu
 }
 
 /// Position, rate and acceleration of places along a recording, of the samples that are kept.
-fn motions(model: &Model, one: &RecordingSegment, places: &[CandidatePlace]) -> Outcome<Vec<[Vec<f64>; 3]>> {
+fn motions(
+    model: &Model,
+    one: &RecordingSegment,
+    places: &[CandidatePlace],
+) -> Outcome<Vec<[Vec<f64>; 3]>> {
     let evaluator = ModelEvaluator::new(&model.derivation);
     let mechanism = &model.derivation.mechanism;
     let (active, passive) = model.derivation.coordinates();
@@ -239,7 +247,11 @@ fn variable_word(variable: LawVariable) -> &'static str {
 }
 
 /// The table of a library, and the effect that a model has by it.
-fn library_entry(sites: &[LawSite], law: &Proposed, parameters: &[EffectEstimate]) -> Option<LawEntry> {
+fn library_entry(
+    sites: &[LawSite],
+    law: &Proposed,
+    parameters: &[EffectEstimate],
+) -> Option<LawEntry> {
     let mut products = law.terms.iter().map(|term| &term.product);
     if products.any(LawProduct::has_memory) {
         return None;
@@ -333,7 +345,11 @@ impl LawFormula {
         }
     }
 
-    fn text(&mut self, law: &Proposed, name: &dyn Fn(LawVariable, Option<usize>) -> String) -> String {
+    fn text(
+        &mut self,
+        law: &Proposed,
+        name: &dyn Fn(LawVariable, Option<usize>) -> String,
+    ) -> String {
         let mut symbols = self.parameters.clone().into_iter();
         let mut terms = Vec::new();
         for term in &law.terms {
@@ -431,7 +447,10 @@ impl LawFormula {
                     .to_vec();
             }
             LawShape::Bump { centre, width } => {
-                format!("exp(-({})^2)", self.scaled_distance(z, centre, width, factor))
+                format!(
+                    "exp(-({})^2)",
+                    self.scaled_distance(z, centre, width, factor)
+                )
             }
             LawShape::Detent { centre, width } => {
                 let near = self.scaled_distance(z, centre, width, factor);

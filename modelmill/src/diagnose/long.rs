@@ -4,7 +4,7 @@
 //! States that were smoothed change little between samples; after a first step as many are left for every one that is kept in
 //! the end as the parallel filter needs to filter regressor and forces alike.
 
-use modelmill_identify::{LowPass, RecordingNote, DECIMATION_PASSBAND, decimate_time};
+use modelmill_identify::{DECIMATION_PASSBAND, LowPass, RecordingNote, decimate_time};
 
 use crate::error::{Error, Outcome};
 use crate::model::Model;

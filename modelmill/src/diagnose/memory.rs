@@ -3,7 +3,8 @@
 
 use modelmill_codegen::ModelEvaluator;
 use modelmill_identify::diagnose::{
-    CandidateEffect, ColumnChoice, ForceColumn, LocatedEffect, EffectParameter, CandidateNature, SignConstraint, ColumnSource,
+    CandidateEffect, CandidateNature, ColumnChoice, ColumnSource, EffectParameter, ForceColumn,
+    LocatedEffect, SignConstraint,
 };
 
 use crate::along;
@@ -20,7 +21,10 @@ const LENGTHS: [f64; 12] = [
 ];
 
 /// Dahl friction of every drive.
-pub(crate) fn dahl_candidates(model: &Model, all: &SegmentList<'_>) -> Outcome<Vec<CandidateEffect>> {
+pub(crate) fn dahl_candidates(
+    model: &Model,
+    all: &SegmentList<'_>,
+) -> Outcome<Vec<CandidateEffect>> {
     let evaluator = ModelEvaluator::new(&model.derivation);
     let drives = model.drives();
     let mut candidates = Vec::new();
@@ -45,7 +49,9 @@ pub(crate) fn dahl_candidates(model: &Model, all: &SegmentList<'_>) -> Outcome<V
         let lengths = LENGTHS.map(|part| part * travel);
         let of_lengths = stack(all, |one| {
             let position = &positions(one)?[d];
-            Ok(lengths.map(|length| bristle_states(position, length)).to_vec())
+            Ok(lengths
+                .map(|length| bristle_states(position, length))
+                .to_vec())
         })?;
         let choice = |(length, states): (f64, Vec<f64>)| {
             let mut column = ForceColumn(vec![None; drives.len()]);

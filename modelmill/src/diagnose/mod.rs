@@ -33,10 +33,14 @@ pub mod words;
 pub(crate) use candidates::sign;
 pub use chosen::NamedEffect;
 pub(crate) use chosen::{ChosenEffect, ConstantPolicy, base_columns, derive_effect};
-pub use findings::{EffectEstimate, DiagnosisFindings, MissingEffect, DiagnosisOptions, SeparationProposal, UndecidedEffect, NominalDiagnosis};
-pub use laws::{LawHypothesis, ProposedLaw, LawEntry};
+pub use findings::{
+    DiagnosisFindings, DiagnosisOptions, EffectEstimate, MissingEffect, NominalDiagnosis,
+    SeparationProposal, UndecidedEffect,
+};
+pub use laws::{LawEntry, LawHypothesis, ProposedLaw};
 pub use modelmill_identify::diagnose::{
-    ResidualBudget, ModelDiagnosis, Disturbance, LocatedEffect, EstimatedQuantity, SelectionStep, DiagnosisVerdict,
+    DiagnosisVerdict, Disturbance, EstimatedQuantity, LocatedEffect, ModelDiagnosis,
+    ResidualBudget, SelectionStep,
 };
 pub use off_nominal::OffNominalParameter;
 pub use problem::FixedParameters;

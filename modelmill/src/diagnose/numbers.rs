@@ -99,7 +99,9 @@ impl PlaceMotions {
             stack_states(all, model, |states| evaluator.passive_motion(states))?
         };
         let motion = |order: usize, i: usize| -> Vec<f64> {
-            let one = |(data, _): &(&RecordingSegment, bool)| [&data.run.q, &data.run.qd][order][i].clone();
+            let one = |(data, _): &(&RecordingSegment, bool)| {
+                [&data.run.q, &data.run.qd][order][i].clone()
+            };
             all.iter().flat_map(one).collect()
         };
         Ok(Self {

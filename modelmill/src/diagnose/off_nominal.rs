@@ -2,7 +2,7 @@
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{CommandName, OptionName, Remedy};
-use modelmill_identify::{FitParameter, RecordingNote, ParameterStatus};
+use modelmill_identify::{FitParameter, ParameterStatus, RecordingNote};
 use modelmill_runtime::Random;
 use modelmill_spec::Sign;
 
@@ -53,7 +53,10 @@ pub(super) fn off_nominal_parameters(version: &ModelVersion) -> Vec<OffNominalPa
 
 /// What base parameters say whose sign no bodies near those of the file have: not the bodies are wrong, but what turns their
 /// forces.
-pub(super) fn reversed_sign_note(version: &ModelVersion, off: &[OffNominalParameter]) -> Option<RecordingNote> {
+pub(super) fn reversed_sign_note(
+    version: &ModelVersion,
+    off: &[OffNominalParameter],
+) -> Option<RecordingNote> {
     let model = &version.model;
     let has_turned = |off: &&OffNominalParameter| {
         let p = &off.parameter;

@@ -3,7 +3,8 @@
 
 use modelmill_codegen::ModelEvaluator;
 use modelmill_identify::diagnose::{
-    AttachedBody, CandidateEffect, ForceColumn, LocatedEffect, EffectParameter, CandidateNature, SignConstraint, ColumnSource,
+    AttachedBody, CandidateEffect, CandidateNature, ColumnSource, EffectParameter, ForceColumn,
+    LocatedEffect, SignConstraint,
 };
 use modelmill_spec::{Kinematics, Mechanism};
 
@@ -39,7 +40,10 @@ pub(crate) fn payloads(model: &Model, all: &SegmentList<'_>) -> Outcome<Vec<Cand
         let of = |k: &Option<usize>| -> ForceColumn {
             let column = k.map(|k| &columns[k]);
             let column = column.filter(|column| size(column) > NEGLIGIBLE * largest);
-            column.map_or_else(|| ForceColumn(vec![None; model.drives().len()]), Clone::clone)
+            column.map_or_else(
+                || ForceColumn(vec![None; model.drives().len()]),
+                Clone::clone,
+            )
         };
         let ten: [ForceColumn; TEN] = which.each_ref().map(of);
         let is_felt = |k: &usize| match *k {
@@ -53,7 +57,10 @@ pub(crate) fn payloads(model: &Model, all: &SegmentList<'_>) -> Outcome<Vec<Cand
         if !(0..POINT_MASS_PARAMETERS).any(|k| is_felt(&k)) {
             continue;
         }
-        for (most, refines) in [(POINT_MASS_PARAMETERS, "point_mass"), (PARAMETERS.len(), "payload")] {
+        for (most, refines) in [
+            (POINT_MASS_PARAMETERS, "point_mass"),
+            (PARAMETERS.len(), "payload"),
+        ] {
             let free: Vec<usize> = (0..most).filter(is_felt).collect();
             let parameter = |k: &usize| {
                 let (symbol, unit, sign) = PARAMETERS[*k];

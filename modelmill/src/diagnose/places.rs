@@ -1,7 +1,7 @@
 //! Places at which effects of a kind may act, alone, in pairs, and alike at several.
 
 use modelmill_spec::{
-    ActsOn, PlaceLoad, DriveIdx, DriveKind, EffectKind, Mechanics, Mechanism, PartIdx, EffectPlace,
+    ActsOn, DriveIdx, DriveKind, EffectKind, EffectPlace, Mechanics, Mechanism, PartIdx, PlaceLoad,
     PointIdx,
 };
 
@@ -55,7 +55,12 @@ pub(crate) fn candidate_places(mechanism: &Mechanism) -> Vec<CandidatePlace> {
         let place = EffectPlace::Part(PartIdx(i));
         spots.push(spot(&part.name, PlaceLoad::Elsewhere, ActsOn::Part, place));
     }
-    spots.push(spot("base", PlaceLoad::Elsewhere, ActsOn::Base, EffectPlace::Base));
+    spots.push(spot(
+        "base",
+        PlaceLoad::Elsewhere,
+        ActsOn::Base,
+        EffectPlace::Base,
+    ));
     spots.push(spot(
         "force",
         PlaceLoad::Elsewhere,
@@ -75,7 +80,11 @@ pub(crate) fn is_free(mechanism: &Mechanism, coordinate: usize) -> bool {
 }
 
 /// Whether a kind may act at a place and could say something there.
-pub(crate) fn is_applicable(mechanism: &Mechanism, kind: &EffectKind, spot: &CandidatePlace) -> bool {
+pub(crate) fn is_applicable(
+    mechanism: &Mechanism,
+    kind: &EffectKind,
+    spot: &CandidatePlace,
+) -> bool {
     let has_unit = |units: &[(PlaceLoad, String)]| units.iter().any(|(c, _)| *c == spot.carries);
     let has_units = kind.parameters.iter().all(|p| has_unit(&p.units));
     if !kind.on.contains(&spot.sort) {
@@ -106,7 +115,7 @@ pub(crate) fn is_applicable(mechanism: &Mechanism, kind: &EffectKind, spot: &Can
 
 /// Whether a kind repeats itself along the travel of its place, several times at least where it is shortest.
 pub(crate) fn is_wave(kind: &EffectKind) -> bool {
-    use modelmill_spec::{Scale, ConstantSearch};
+    use modelmill_spec::{ConstantSearch, Scale};
     const SEVERAL: f64 = 0.5;
     kind.constants.iter().any(|c| match c.search {
         Some(ConstantSearch::Range { from, of, .. }) => of == Scale::Travel && from < SEVERAL,
@@ -141,7 +150,11 @@ pub(crate) fn place_sets<'a>(
         return (pairs, sets);
     }
     if let Some(joined) = kind.mechanics.and_then(|one| one.pairs(mechanism)) {
-        let at = |point: PointIdx| spots.iter().find(|spot| spot.place == EffectPlace::Point(point));
+        let at = |point: PointIdx| {
+            spots
+                .iter()
+                .find(|spot| spot.place == EffectPlace::Point(point))
+        };
         let pair = |[one, other]: [PointIdx; 2]| Some(vec![*at(one)?, *at(other)?]);
         let pairs: Vec<Vec<&CandidatePlace>> = joined.into_iter().filter_map(pair).collect();
         let sets = (0..pairs.len()).map(|k| vec![k]).collect();

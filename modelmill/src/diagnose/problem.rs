@@ -2,8 +2,9 @@
 
 use modelmill_codegen::ModelEvaluator;
 use modelmill_identify::diagnose::{
-    LoadDependentQuery, ColumnChoice, ForceColumn, CandidateOutcome, ModelDiagnosis, Disturbance, DiagnosisProblem, ROUNDING, LawSite, ColumnSource,
-    ColumnProvider, diagnose, drift_candidates, reading_fault_candidates, white_noise,
+    CandidateOutcome, ColumnChoice, ColumnProvider, ColumnSource, DiagnosisProblem, Disturbance,
+    ForceColumn, LawSite, LoadDependentQuery, ModelDiagnosis, ROUNDING, diagnose, drift_candidates,
+    reading_fault_candidates, white_noise,
 };
 
 use crate::along::drive_rates;
@@ -186,7 +187,11 @@ impl ColumnProvider for ColumnSupply<'_> {
         sites(self.candidates, self.model, self.all).unwrap_or_default()
     }
 
-    fn load_dependent_columns(&self, load: &ForceColumn, which: LoadDependentQuery) -> Vec<(usize, ColumnChoice)> {
+    fn load_dependent_columns(
+        &self,
+        load: &ForceColumn,
+        which: LoadDependentQuery,
+    ) -> Vec<(usize, ColumnChoice)> {
         let only = match which {
             LoadDependentQuery::All => None,
             LoadDependentQuery::One(candidate, _) => {
@@ -198,13 +203,17 @@ impl ColumnProvider for ColumnSupply<'_> {
         };
         let tried = |single: usize| match which {
             LoadDependentQuery::One(_, Some(value)) => vec![value],
-            LoadDependentQuery::All | LoadDependentQuery::One(_, None) => grid_middle(&self.grids[single]),
+            LoadDependentQuery::All | LoadDependentQuery::One(_, None) => {
+                grid_middle(&self.grids[single])
+            }
         };
         // Poses without answer were reported when the recordings were evaluated for the first time.
-        let made = load_dependent_columns(self.candidates, self.model, self.all, load, only, &tried);
+        let made =
+            load_dependent_columns(self.candidates, self.model, self.all, load, only, &tried);
         let made = made.unwrap_or_default();
         let place = |entry: usize| {
-            let is_its = |origin: &CandidateOrigin| origin.as_ref().is_some_and(|(k, _)| *k == entry);
+            let is_its =
+                |origin: &CandidateOrigin| origin.as_ref().is_some_and(|(k, _)| *k == entry);
             self.origins.iter().position(is_its)
         };
         made.into_iter()

@@ -14,7 +14,11 @@ pub(crate) const TILTS: [&str; 3] = ["tx", "ty", "tz"];
 
 /// What each base column changes by with gravity along each axis of the base, those of known parameters included, and the
 /// axes about which a tilt is felt. Gravity is turned into each axis, both ways: forces are linear in it.
-pub(crate) fn tilt(derivation: &Derivation, model: &Model, all: &SegmentList<'_>) -> Outcome<TiltCandidate> {
+pub(crate) fn tilt(
+    derivation: &Derivation,
+    model: &Model,
+    all: &SegmentList<'_>,
+) -> Outcome<TiltCandidate> {
     let mechanism = &derivation.mechanism;
     let usual: Vec<f64> = mechanism.constants.iter().map(|c| c.value).collect();
     let gravity = model.gravity();

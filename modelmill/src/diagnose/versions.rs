@@ -4,7 +4,7 @@ use crate::along;
 use crate::diagnose::FixedParameters;
 use crate::error::Outcome;
 use crate::identify::{self, Identification};
-use crate::identify::{EstimatorOptions, EquationWeights};
+use crate::identify::{EquationWeights, EstimatorOptions};
 use crate::model::Model;
 use crate::stretch::RecordingSegment;
 
@@ -45,7 +45,12 @@ impl ForceComparison {
 impl ModelVersion {
     /// Identifies a model from the recordings of the fit, as the diagnosis does: drives of different size count alike. With
     /// held parameters the nominal values are taken.
-    pub fn new(model: Model, fit: Vec<RecordingSegment>, check: Vec<RecordingSegment>, held: FixedParameters) -> Outcome<Self> {
+    pub fn new(
+        model: Model,
+        fit: Vec<RecordingSegment>,
+        check: Vec<RecordingSegment>,
+        held: FixedParameters,
+    ) -> Outcome<Self> {
         let identified = match held {
             FixedParameters::All => None,
             FixedParameters::Known => {

@@ -1,6 +1,8 @@
 //! What was found, in sentences.
 
-use modelmill_identify::diagnose::{ModelDiagnosis, Disturbance, LocatedEffect, SelectionStep, DiagnosisVerdict};
+use modelmill_identify::diagnose::{
+    DiagnosisVerdict, Disturbance, LocatedEffect, ModelDiagnosis, SelectionStep,
+};
 
 use crate::audit::SUSPICIONS;
 use crate::text::table::{number, percent, significant};
@@ -78,7 +80,11 @@ pub fn noise_floor_text(diagnosis: &ModelDiagnosis) -> String {
 }
 
 /// The verdict with figures, what may be wrong with the input first of all, then success first: what was found, what is left and of which kind, what the recordings have besides.
-pub fn verdict(diagnosis: &ModelDiagnosis, channels: &[String], judged: ValidationMethod) -> String {
+pub fn verdict(
+    diagnosis: &ModelDiagnosis,
+    channels: &[String],
+    judged: ValidationMethod,
+) -> String {
     let ladder = &diagnosis.steps;
     let (Some(first), Some(last)) = (ladder.first(), ladder.last()) else {
         return String::new();
@@ -126,12 +132,21 @@ pub fn verdict(diagnosis: &ModelDiagnosis, channels: &[String], judged: Validati
             }
         }
     };
-    let all = [suspicion_text(diagnosis), Some(says), disturbances_text(diagnosis)];
+    let all = [
+        suspicion_text(diagnosis),
+        Some(says),
+        disturbances_text(diagnosis),
+    ];
     all.into_iter().flatten().collect::<Vec<_>>().join(" ")
 }
 
 /// How the error falls: of all drives, or where that hardly does, of the drive whose error falls most, since the others hide it.
-fn error_reduction_text(first: &SelectionStep, last: &SelectionStep, channels: &[String], judged: ValidationMethod) -> String {
+fn error_reduction_text(
+    first: &SelectionStep,
+    last: &SelectionStep,
+    channels: &[String],
+    judged: ValidationMethod,
+) -> String {
     let pairs = first.check_by_channel.iter().zip(&last.check_by_channel);
     let most = (channels.iter().zip(pairs)).min_by(|(_, a), (_, b)| {
         let share = |(before, after): &(&f64, &f64)| **after / before.max(f64::MIN_POSITIVE);
@@ -154,7 +169,9 @@ fn error_reduction_text(first: &SelectionStep, last: &SelectionStep, channels: &
 /// What is to be cleared up before anything else is believed.
 fn suspicion_text(diagnosis: &ModelDiagnosis) -> Option<String> {
     let suspicions = (diagnosis.disturbances.iter()).filter(|one| is_suspicion(one));
-    let says: Vec<&str> = suspicions.filter_map(|one| one.description.as_deref()).collect();
+    let says: Vec<&str> = suspicions
+        .filter_map(|one| one.description.as_deref())
+        .collect();
     (!says.is_empty()).then(|| {
         format!(
             "Look first at what may be wrong with the recording or the model: {}.",

@@ -90,7 +90,11 @@ pub fn merged_limits(model: &Model, given: &[TrajectoryLimit]) -> Outcome<Motion
     Ok(limits)
 }
 
-fn set_coordinate_limit(model: &Model, limits: &mut MotionLimits, limit: &TrajectoryLimit) -> Outcome {
+fn set_coordinate_limit(
+    model: &Model,
+    limits: &mut MotionLimits,
+    limit: &TrajectoryLimit,
+) -> Outcome {
     let coordinates = &model.derivation.mechanism.coordinates;
     let name = limit.name.as_str();
     let this = Remedy::option(OptionName::Limits).with_value(name);

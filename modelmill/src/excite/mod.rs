@@ -10,7 +10,8 @@ use modelmill_boundary::message;
 use modelmill_boundary::text::{OptionName, Remedy};
 use modelmill_identify::RecordingNote;
 use modelmill_identify::excite::{
-    ExcitationTrajectory, ExcitationMotion, ExcitationPlant, excite, scaled_condition_number, max_progress_steps,
+    ExcitationMotion, ExcitationPlant, ExcitationTrajectory, excite, max_progress_steps,
+    scaled_condition_number,
 };
 
 use crate::diagnose::NamedEffect;
@@ -93,7 +94,11 @@ impl Model {
     /// are compared with when effects are told apart, and give their size and the noise where these are not given.
     ///
     /// Fails when a coordinate has no limits, when no trajectory keeps them, or when no motion tells the effects apart.
-    pub fn excite(&self, request: &ExcitationRequest, recordings: &[&PreparedRecording]) -> Outcome<ExcitationResult> {
+    pub fn excite(
+        &self,
+        request: &ExcitationRequest,
+        recordings: &[&PreparedRecording],
+    ) -> Outcome<ExcitationResult> {
         if free_bodies(&self.derivation.mechanism).next().is_some() {
             return Err(Error::input(format!(
                 "{}: motion is planned for joints, and this model has a body that hangs on nothing; plan with the body held, \
@@ -101,8 +106,11 @@ impl Model {
                 self.path
             )));
         }
-        let (all_limits, as_recorded) =
-            limits::with_recorded_ranges(self, limits::merged_limits(self, &request.limits)?, recordings);
+        let (all_limits, as_recorded) = limits::with_recorded_ranges(
+            self,
+            limits::merged_limits(self, &request.limits)?,
+            recordings,
+        );
         let coordinates = limits::active_limits(self, &all_limits)?;
         let mut options = request.options.clone();
         let plant = ModelPlant::new(self, &all_limits);
@@ -134,9 +142,11 @@ impl Model {
         };
         let found = self
             .host()
-            .run_job("searching for a trajectory", max_progress_steps(&options), |job| {
-                excite(searched, &coordinates, &options, &|more| job.flow(more))
-            })?
+            .run_job(
+                "searching for a trajectory",
+                max_progress_steps(&options),
+                |job| excite(searched, &coordinates, &options, &|more| job.flow(more)),
+            )?
             .map_err(|error| Error::input(format!("{}: {error}", self.path)))?;
         let samples = samples_per_period(request.rate, options.period);
         let motion = ExcitationMotion::sample(&found.series, samples);

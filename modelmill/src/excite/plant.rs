@@ -1,7 +1,9 @@
 //! A model as excitation sees it: regressor, and limits beyond those of the active coordinates.
 
 use modelmill_codegen::{ModelEvaluator, MotionStates};
-use modelmill_identify::excite::{LimitMargin, ExcitationMotion, ExcitationPlant, least_singular_value};
+use modelmill_identify::excite::{
+    ExcitationMotion, ExcitationPlant, LimitMargin, least_singular_value,
+};
 use modelmill_spec::{Kinematics, MotionLimits, PointIdx};
 use nalgebra::DMatrix;
 
@@ -118,7 +120,10 @@ impl<'a> ModelPlant<'a> {
         }
         if !self.passive.is_empty() {
             let still = self.zero_load(motion);
-            let columns = self.evaluator.passive_motion(&states(motion, &still)).ok()?;
+            let columns = self
+                .evaluator
+                .passive_motion(&states(motion, &still))
+                .ok()?;
             for (i, column) in self.passive.iter().zip(columns) {
                 all[*i] = column;
             }
@@ -223,7 +228,10 @@ impl ExcitationPlant for ModelPlant<'_> {
                 let at: Vec<f64> = coordinates.iter().map(|column| column[sample]).collect();
                 let poses = self.kinematics.poses(&at);
                 for (column, (point, axis, range)) in columns.iter_mut().zip(&self.point_ranges) {
-                    column.push(beyond(self.kinematics.point_position(&poses, *point)[*axis], *range));
+                    column.push(beyond(
+                        self.kinematics.point_position(&poses, *point)[*axis],
+                        *range,
+                    ));
                 }
             }
             all.append(&mut columns);

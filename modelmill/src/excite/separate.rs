@@ -5,8 +5,12 @@
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{OptionName, Remedy};
-use modelmill_identify::diagnose::{CandidateEffect, ColumnChoice, ForceColumn, LocatedEffect, SignConstraint, white_noise};
-use modelmill_identify::excite::separate::{SeparationProblem, SeparationMeasure, fit_coefficients, measure_separation};
+use modelmill_identify::diagnose::{
+    CandidateEffect, ColumnChoice, ForceColumn, LocatedEffect, SignConstraint, white_noise,
+};
+use modelmill_identify::excite::separate::{
+    SeparationMeasure, SeparationProblem, fit_coefficients, measure_separation,
+};
 use modelmill_identify::excite::{ExcitationMotion, ExcitationPlant};
 use modelmill_identify::{PreparationRecord, PreparedRun};
 use nalgebra::DMatrix;
@@ -82,7 +86,8 @@ impl SeparationSetup {
                 )));
             }
         }
-        let choose = |named: &NamedEffect, constants: ConstantPolicy| derive_effect(model, named, constants);
+        let choose =
+            |named: &NamedEffect, constants: ConstantPolicy| derive_effect(model, named, constants);
         let truth = choose(separate, ConstantPolicy::Usual)?;
         let parameters = &truth.kind.parameters;
         let is_size = |symbol: &str| {
@@ -166,7 +171,11 @@ impl SeparationSetup {
     }
 
     /// Takes from recordings what is not known: the noise, and the size of the effect by a fit beside the base.
-    pub(crate) fn estimate_from_recordings(&mut self, model: &Model, data: &[RecordingSegment]) -> Outcome {
+    pub(crate) fn estimate_from_recordings(
+        &mut self,
+        model: &Model,
+        data: &[RecordingSegment],
+    ) -> Outcome {
         let mut measured: Vec<Vec<f64>> = Vec::new();
         for one in data {
             let forces = crate::along::measured_forces(one)?;
@@ -221,7 +230,11 @@ impl SeparationSetup {
     }
 
     /// Columns along recordings; `None` if the effect has none.
-    fn separation_columns(&self, model: &Model, runs: &[(&RecordingSegment, bool)]) -> Outcome<Option<SeparationColumns>> {
+    fn separation_columns(
+        &self,
+        model: &Model,
+        runs: &[(&RecordingSegment, bool)],
+    ) -> Outcome<Option<SeparationColumns>> {
         let (mut columns, load, known) = base_columns(model, runs)?;
         let Some((candidate, choices)) = self.truth.candidate(model, runs, &load)? else {
             return Ok(None);
@@ -402,7 +415,11 @@ pub(crate) struct SeparatingPlant<'a> {
 
 impl SeparatingPlant<'_> {
     /// How far the effects are apart along a motion.
-    pub(crate) fn distance_along(&self, motion: &ExcitationMotion, which: &[usize]) -> Option<EffectDistance> {
+    pub(crate) fn distance_along(
+        &self,
+        motion: &ExcitationMotion,
+        which: &[usize],
+    ) -> Option<EffectDistance> {
         let data = [recording(self.inner, motion)?];
         self.pair.distance_along(self.model, &data, which).ok()?
     }
@@ -425,7 +442,8 @@ impl ExcitationPlant for SeparatingPlant<'_> {
     }
 
     fn separation(&self, motion: &ExcitationMotion) -> Option<f64> {
-        self.distance_along(motion, &self.which).map(|apart| apart.force)
+        self.distance_along(motion, &self.which)
+            .map(|apart| apart.force)
     }
 }
 

@@ -20,7 +20,7 @@ use crate::text::table::{ColumnAlignment, count, significant, table};
 
 use super::SeparationRequest;
 use super::plant::ModelPlant;
-use super::separate::{EffectDistance, SeparationSetup, SeparatingPlant};
+use super::separate::{EffectDistance, SeparatingPlant, SeparationSetup};
 
 /// Motions that are looked at before the search, for what no motion can tell.
 const LOOKED_AT: usize = 24;
@@ -174,7 +174,10 @@ impl SeparationTask {
     }
 
     /// How far the effects are apart along the recordings.
-    pub(crate) fn distance_along_recordings(&self, model: &Model) -> Outcome<Option<EffectDistance>> {
+    pub(crate) fn distance_along_recordings(
+        &self,
+        model: &Model,
+    ) -> Outcome<Option<EffectDistance>> {
         if self.data.is_empty() {
             return Ok(None);
         }
@@ -204,7 +207,8 @@ impl SeparationTask {
 /// What forces of a model are measured in.
 pub(crate) fn common_force_unit(model: &Model) -> &'static str {
     let mechanism = &model.derivation.mechanism;
-    let carries = |drive: &modelmill_spec::ModelDrive| drive.kind.place_load(&mechanism.coordinates);
+    let carries =
+        |drive: &modelmill_spec::ModelDrive| drive.kind.place_load(&mechanism.coordinates);
     let forces = mechanism
         .drives
         .iter()

@@ -145,7 +145,12 @@ impl Host {
     /// Runs a job that somebody may watch and stop.
     ///
     /// Fails with [`Error::Cancelled`] if somebody asked it to stop.
-    pub fn run_job<T>(&self, what: &str, total: usize, work: impl FnOnce(&JobHandle) -> T) -> Outcome<T> {
+    pub fn run_job<T>(
+        &self,
+        what: &str,
+        total: usize,
+        work: impl FnOnce(&JobHandle) -> T,
+    ) -> Outcome<T> {
         run_job(&*self.progress, what, total, work)
     }
 

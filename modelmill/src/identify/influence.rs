@@ -1,6 +1,6 @@
 //! What faults of sensors would have done to a fit, had they been left in: recordings go in, a sentence comes out.
 
-use modelmill_identify::{RecordingNote, ParameterInfo};
+use modelmill_identify::{ParameterInfo, RecordingNote};
 
 use super::options::EstimatorOptions;
 use super::regression::{self, RegressionEstimate};

@@ -5,7 +5,7 @@ use modelmill_boundary::text::{OptionName, Remedy};
 use modelmill_identify::sample_place_word;
 
 use crate::error::{Error, Outcome};
-use crate::identify::options::{EstimatorOptions, EquationWeights};
+use crate::identify::options::{EquationWeights, EstimatorOptions};
 use crate::recording::PreparedRecording;
 use crate::stretch::RecordingSegment;
 
@@ -40,7 +40,10 @@ pub(crate) fn instrument_segments(
     }
     match instruments {
         Instruments::None => Ok(Vec::new()),
-        Instruments::Period(period) => data.iter().map(|one| shift_by_period(one, *period)).collect(),
+        Instruments::Period(period) => data
+            .iter()
+            .map(|one| shift_by_period(one, *period))
+            .collect(),
         Instruments::Recordings(recordings) => {
             let all: Vec<RecordingSegment> = recordings
                 .iter()

@@ -12,7 +12,8 @@ use modelmill_boundary::text::{OptionName, Remedy};
 use modelmill_identify::estimate::FEWEST_ROWS;
 use modelmill_identify::fit_parameters;
 use modelmill_identify::{
-    EstimatorOutput, ErrorFigures, FitFile, FitParameter, RecordingNote, ParameterInfo, RunRepeatability, ParameterStatus,
+    ErrorFigures, EstimatorOutput, FitFile, FitParameter, ParameterInfo, ParameterStatus,
+    RecordingNote, RunRepeatability,
 };
 use modelmill_spec::Sign;
 
@@ -26,9 +27,9 @@ use crate::text::table::{count, number};
 
 pub use instruments::Instruments;
 pub use modelmill_identify::estimate::HUBER_BOUND;
-pub use options::{EstimatorOptions, EquationWeights};
-pub use refine::{RefinementResult, EstimateRefinement};
-use regression::{RegressionEstimate, InstrumentStatistics};
+pub use options::{EquationWeights, EstimatorOptions};
+pub use refine::{EstimateRefinement, RefinementResult};
+use regression::{InstrumentStatistics, RegressionEstimate};
 
 /// Instruments whose smallest canonical correlation with the regressor is below this deserve a warning.
 const WEAK_INSTRUMENTS: f64 = 0.2;
@@ -99,7 +100,12 @@ impl Model {
 
 /// What equations count where that is left open: each drive by its own residuals, where squares of different units would add
 /// up, and where nobody has said how a recording is prepared. Instruments do without.
-fn resolve_weights(model: &Model, data: &[RecordingSegment], instruments: &[RecordingSegment], weights: EquationWeights) -> EquationWeights {
+fn resolve_weights(
+    model: &Model,
+    data: &[RecordingSegment],
+    instruments: &[RecordingSegment],
+    weights: EquationWeights,
+) -> EquationWeights {
     if weights != EquationWeights::Automatic {
         return weights;
     }
@@ -153,7 +159,8 @@ pub fn identify(
     };
     let finite = |value: f64| value.is_finite().then_some(value);
     let of_recordings = recordings.flat_map(RecordingSegment::notes).cloned();
-    let mut all_notes: Vec<RecordingNote> = model.caution().into_iter().chain(of_recordings).collect();
+    let mut all_notes: Vec<RecordingNote> =
+        model.caution().into_iter().chain(of_recordings).collect();
     all_notes.extend(notes.iter().cloned());
     let constants = &model.derivation.mechanism.constants;
     Ok(Identification {
@@ -212,10 +219,17 @@ fn known_parameter(info: &ParameterInfo, value: f64) -> FitParameter {
 }
 
 /// What is not as one would wish: known parameters, undetermined ones, no deviations, impossible values.
-fn remarks(model: &Model, found: &RegressionEstimate, parameters: &[FitParameter]) -> Vec<RecordingNote> {
+fn remarks(
+    model: &Model,
+    found: &RegressionEstimate,
+    parameters: &[FitParameter],
+) -> Vec<RecordingNote> {
     let solution = &found.solution;
     let mut notes = Vec::new();
-    for p in parameters.iter().filter(|p| p.status == ParameterStatus::Known) {
+    for p in parameters
+        .iter()
+        .filter(|p| p.status == ParameterStatus::Known)
+    {
         notes.push(RecordingNote::info(format!(
             "{} = {} holds numbers of the model file only: it is known, its force is taken off the measured one, and it is \
              not identified.",

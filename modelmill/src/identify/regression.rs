@@ -3,13 +3,17 @@
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{Message, OptionName, Remedy};
-use modelmill_codegen::{ModelEvaluator, PoseFault, MotionStates};
-use modelmill_identify::estimate::{EstimateOptions, RowVisitor, RowWeighting, estimate, estimate_with_instruments};
-use modelmill_identify::{ParameterUncertainty, FilterError, LeastSquaresError, RegressionSolution, decimate_table};
+use modelmill_codegen::{ModelEvaluator, MotionStates, PoseFault};
+use modelmill_identify::estimate::{
+    EstimateOptions, RowVisitor, RowWeighting, estimate, estimate_with_instruments,
+};
+use modelmill_identify::{
+    FilterError, LeastSquaresError, ParameterUncertainty, RegressionSolution, decimate_table,
+};
 
 use crate::along::{included_forces, interleave};
 use crate::error::{Error, Outcome};
-use crate::identify::options::{EstimatorOptions, EquationWeights};
+use crate::identify::options::{EquationWeights, EstimatorOptions};
 use crate::identify::refine::{RefinementResult, refine};
 use crate::model::Model;
 use crate::progress::JobHandle;
@@ -140,7 +144,12 @@ pub fn identify(
 }
 
 /// Fails when there are fewer equations than unknown parameters.
-fn check_equation_count(data: &[RecordingSegment], runs: &[RegressionRows<'_>], unknown: usize, model: &Model) -> Outcome {
+fn check_equation_count(
+    data: &[RecordingSegment],
+    runs: &[RegressionRows<'_>],
+    unknown: usize,
+    model: &Model,
+) -> Outcome {
     let equations: usize = runs.iter().map(|run| run.measured.len()).sum();
     if equations >= unknown {
         return Ok(());

@@ -14,7 +14,11 @@ use crate::text::table::count;
 /// Gives equations at standstill the weight 0, and says how many there are.
 ///
 /// `part` is the share of a drive's fastest rate below which it stands still.
-pub(crate) fn exclude_standstill(model: &Model, data: &mut [RecordingSegment], part: f64) -> Outcome {
+pub(crate) fn exclude_standstill(
+    model: &Model,
+    data: &mut [RecordingSegment],
+    part: f64,
+) -> Outcome {
     let drives = model.drives();
     let rates: Vec<Vec<Vec<f64>>> = data
         .iter()

@@ -110,8 +110,18 @@ impl ModelChanges {
                 .collect()
         };
         let count = |pick: &dyn Fn(&Model) -> OperationCount| (pick(before), pick(after));
-        let regressor = count(&|m| m.derivation.programs.regressor.count_operations(ProgramStage::State));
-        let dynamics = count(&|m| m.derivation.programs.inverse_dynamics.count_operations(ProgramStage::State));
+        let regressor = count(&|m| {
+            m.derivation
+                .programs
+                .regressor
+                .count_operations(ProgramStage::State)
+        });
+        let dynamics = count(&|m| {
+            m.derivation
+                .programs
+                .inverse_dynamics
+                .count_operations(ProgramStage::State)
+        });
         Self {
             entries: changed_entries(
                 &entries(&before.derivation.mechanism),
@@ -164,7 +174,10 @@ mod tests {
             "link: -2.138038093018084",
             "link: -2.1380380930180856"
         ));
-        assert!(!is_equal_but_for_rounding("link: -2.138038093018084", "link: -2.13803809301"));
+        assert!(!is_equal_but_for_rounding(
+            "link: -2.138038093018084",
+            "link: -2.13803809301"
+        ));
         assert!(!is_equal_but_for_rounding("a: 1", "b: 1"));
         assert!(!is_equal_but_for_rounding("a: 1", "a: -1"));
         assert!(!is_equal_but_for_rounding("a: 1", "a: 1 m"));

@@ -1,8 +1,9 @@
 //! The entries of a model as pairs of a name and a text, so that two models can be compared.
 
 use modelmill_spec::{
-    ExactAngle, FrameAxis, FrameConvention, CoordinateIdx, DriveKind, ModelEffect, ExactExpression, PartInertia, ExactLength, Mechanism,
-    EffectPlace, PlaceQuantity, FrameStep, ModelSymbol, TwistAxes,
+    CoordinateIdx, DriveKind, EffectPlace, ExactAngle, ExactExpression, ExactLength, FrameAxis,
+    FrameConvention, FrameStep, Mechanism, ModelEffect, ModelSymbol, PartInertia, PlaceQuantity,
+    TwistAxes,
 };
 
 /// Entries as they are collected.
@@ -190,7 +191,9 @@ fn step(m: &Mechanism, step: &FrameStep) -> String {
     };
     match step {
         FrameStep::Rotate(axis, angle) => format!("R{}({})", letter(axis), angle_text(m, angle)),
-        FrameStep::Translate(axis, length) => format!("T{}({})", letter(axis), length_text(m, length)),
+        FrameStep::Translate(axis, length) => {
+            format!("T{}({})", letter(axis), length_text(m, length))
+        }
         FrameStep::Free(body) => {
             let names = |all: &[CoordinateIdx]| {
                 let names = all.iter().map(|i| m.coordinates[i.0].name.as_str());
@@ -228,7 +231,12 @@ fn length_text(m: &Mechanism, length: &ExactLength) -> String {
     let mut terms: Vec<String> = length
         .coordinates
         .iter()
-        .map(|(i, factor)| times(&factor.to_string(), m.symbol_name(ModelSymbol::Coordinate(*i))))
+        .map(|(i, factor)| {
+            times(
+                &factor.to_string(),
+                m.symbol_name(ModelSymbol::Coordinate(*i)),
+            )
+        })
         .collect();
     if !length.offset.is_zero() {
         terms.push(text(m, &length.offset));

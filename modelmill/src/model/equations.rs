@@ -1,6 +1,6 @@
 //! `equations`: the reduced model for people and programs.
 
-use modelmill_codegen::review::{ReducedEquations, PageFormat, page};
+use modelmill_codegen::review::{PageFormat, ReducedEquations, page};
 use modelmill_identify::RecordingNote;
 
 use crate::error::Outcome;

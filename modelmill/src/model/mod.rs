@@ -15,9 +15,10 @@ use modelmill_boundary::text::{CommandName, Remedy};
 use modelmill_codegen::review::base_expression;
 use modelmill_codegen::{BaseParameterEntry, ColumnDependency, Derivation, ParameterMonomial};
 use modelmill_identify::estimate::ParameterPrior;
-use modelmill_identify::{RecordingNote, ParameterInfo};
+use modelmill_identify::{ParameterInfo, RecordingNote};
 use modelmill_spec::{
-    EffectKind, ExactExpression, PartInertia, Mechanism, ParameterIdx, PlaceQuantity, Sign, ModelSymbol,
+    EffectKind, ExactExpression, Mechanism, ModelSymbol, ParameterIdx, PartInertia, PlaceQuantity,
+    Sign,
 };
 use nalgebra::DMatrix;
 
@@ -191,8 +192,8 @@ fn signs(mechanism: &Mechanism, kinds: &[EffectKind]) -> Vec<Sign> {
         }
     };
     for part in &mechanism.parts {
-        let (PartInertia::AboutCentre { mass, inertia, .. } | PartInertia::Linear { mass, inertia, .. }) =
-            &part.inertial;
+        let (PartInertia::AboutCentre { mass, inertia, .. }
+        | PartInertia::Linear { mass, inertia, .. }) = &part.inertial;
         positive(mass);
         for i in [0, 3, 5] {
             positive(&inertia[i]);

@@ -5,7 +5,7 @@
 use std::cmp::Ordering;
 
 use modelmill_codegen::review::NumericRank;
-use modelmill_codegen::{ModelEvaluator, ReductionMethod, PoseFault, PoseReason, MotionStates};
+use modelmill_codegen::{ModelEvaluator, MotionStates, PoseFault, PoseReason, ReductionMethod};
 use modelmill_identify::estimate::{condition_number, numeric_rank};
 use nalgebra::DMatrix;
 
@@ -74,7 +74,10 @@ impl SampledRank {
 
     /// What the pages of equations leave out: states that were not used, and the gap where the condition is poor.
     pub fn remark(&self) -> Option<String> {
-        let is_poor = self.numeric_rank.condition.is_none_or(|c| c > HIGH_CONDITION);
+        let is_poor = self
+            .numeric_rank
+            .condition
+            .is_none_or(|c| c > HIGH_CONDITION);
         (self.left_out > 0 || is_poor).then(|| format!("the numeric rank is {}", self.text()))
     }
 
@@ -105,7 +108,10 @@ pub(crate) fn judge_rank(model: &Model) -> Outcome<RankJudgement> {
     };
     let retained = model.base.len();
     let rank = found.numeric_rank.rank;
-    let is_exact = matches!(model.derivation.reduction.method, ReductionMethod::Exact { .. });
+    let is_exact = matches!(
+        model.derivation.reduction.method,
+        ReductionMethod::Exact { .. }
+    );
     let mut warnings = Vec::new();
     let undetermined = || count(retained - rank, "direction", "directions");
     match rank.cmp(&retained) {
@@ -154,7 +160,9 @@ fn sampled_rank(model: &Model) -> Result<SampledRank, String> {
     sampling.draw(&evaluator, wanted)?;
     let (full, retained) = match both_regressors(&evaluator, &sampling.states()) {
         Ok(both) => both,
-        Err(fault) if is_pose_dependent(&fault) => regressors_state_by_state(&evaluator, &mut sampling, wanted)?,
+        Err(fault) if is_pose_dependent(&fault) => {
+            regressors_state_by_state(&evaluator, &mut sampling, wanted)?
+        }
         Err(fault) => return Err(fault.to_string()),
     };
     let found = numeric_rank(&full).map_err(|error| error.to_string())?;

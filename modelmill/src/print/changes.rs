@@ -3,7 +3,7 @@
 use modelmill_codegen::review::NumericMethod;
 use serde_json::{Value, json};
 
-use crate::model::{EntryChange, ModelChanges, Model};
+use crate::model::{EntryChange, Model, ModelChanges};
 use crate::text::TerminalStyle;
 
 impl ModelChanges {

@@ -1,7 +1,7 @@
 //! `effects`: the library of effects, as a list or one kind in words.
 
 use modelmill_spec::{
-    ActsOn, PlaceLoad, EffectKind, KindConstant, KindParameter, Scale, ConstantSearch, Sign,
+    ActsOn, ConstantSearch, EffectKind, KindConstant, KindParameter, PlaceLoad, Scale, Sign,
 };
 use serde_json::{Value, json};
 

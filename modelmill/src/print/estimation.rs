@@ -5,7 +5,7 @@ use modelmill_identify::ParameterInfo;
 use modelmill_identify::estimate::PhysicalParameters;
 use serde_json::{Value, json};
 
-use crate::identify::regression::{RegressionEstimate, InstrumentStatistics};
+use crate::identify::regression::{InstrumentStatistics, RegressionEstimate};
 use crate::identify::{EstimatorOptions, RefinementResult};
 use crate::model::Model;
 use crate::text::table::{ColumnAlignment, count, number, percent, significant, table};
@@ -113,7 +113,11 @@ pub(crate) fn json(model: &Model, found: &RegressionEstimate, args: &EstimatorOp
 }
 
 /// The same for people, line by line.
-pub(crate) fn text(model: &Model, found: &RegressionEstimate, infos: &[ParameterInfo]) -> Vec<String> {
+pub(crate) fn text(
+    model: &Model,
+    found: &RegressionEstimate,
+    infos: &[ParameterInfo],
+) -> Vec<String> {
     let mut lines = Vec::new();
     let deviations = &found.deviations;
     if let Some(effective) = effective_samples(found) {
@@ -156,7 +160,9 @@ pub(crate) fn text(model: &Model, found: &RegressionEstimate, infos: &[Parameter
     let name = |i: usize| infos[found.unknown[i]].name.clone();
     match &found.refined {
         RefinementResult::Nothing => {}
-        RefinementResult::Prior(_, beliefs) => lines.push(prior_text(*beliefs, found.unknown.len())),
+        RefinementResult::Prior(_, beliefs) => {
+            lines.push(prior_text(*beliefs, found.unknown.len()))
+        }
         RefinementResult::Essential(dropped, rise) => {
             let names: Vec<String> = dropped.iter().map(|one| name(one.parameter)).collect();
             lines.push(if names.is_empty() {

@@ -1,10 +1,10 @@
 //! What a diagnosis found as JSON and for people.
 
-use modelmill_identify::diagnose::{SelectionStep, DiagnosisVerdict};
+use modelmill_identify::diagnose::{DiagnosisVerdict, SelectionStep};
 use serde_json::{Map, Value, json};
 
 use super::laws;
-use crate::diagnose::{EffectEstimate, DiagnosisFindings, words};
+use crate::diagnose::{DiagnosisFindings, EffectEstimate, words};
 use crate::print::{OptionName, Remedy, StepSpelling, notes};
 use crate::text::TerminalStyle;
 use crate::text::table::{ColumnAlignment, number, percent, significant, table};
@@ -140,11 +140,13 @@ impl DiagnosisFindings {
         self.missing_text(style, spelling, &mut lines);
         self.disturbances_text(style, &mut lines);
         lines.push(String::new());
-        lines.push(style.bold(if diagnosis.verdict == DiagnosisVerdict::Unexplained {
-            "where what is left sits"
-        } else {
-            "where the error of the model as it is sits"
-        }));
+        lines.push(
+            style.bold(if diagnosis.verdict == DiagnosisVerdict::Unexplained {
+                "where what is left sits"
+            } else {
+                "where the error of the model as it is sits"
+            }),
+        );
         let places = &self.regions;
         lines.extend(places.iter().map(|region| format!("  {}.", region.says)));
         if places.is_empty() {
@@ -213,7 +215,12 @@ impl DiagnosisFindings {
     }
 
     /// What was found, with values and doubles.
-    fn missing_text(&self, style: TerminalStyle, spelling: &dyn StepSpelling, lines: &mut Vec<String>) {
+    fn missing_text(
+        &self,
+        style: TerminalStyle,
+        spelling: &dyn StepSpelling,
+        lines: &mut Vec<String>,
+    ) {
         if self.missing.is_empty() {
             return;
         }
@@ -318,7 +325,12 @@ impl DiagnosisFindings {
     }
 
     /// Parameters that differ from what the file says.
-    fn off_nominal_text(&self, style: TerminalStyle, spelling: &dyn StepSpelling, lines: &mut Vec<String>) {
+    fn off_nominal_text(
+        &self,
+        style: TerminalStyle,
+        spelling: &dyn StepSpelling,
+        lines: &mut Vec<String>,
+    ) {
         if self.off_nominal.is_empty() {
             return;
         }
@@ -370,8 +382,7 @@ impl DiagnosisFindings {
 
 /// Estimates as scripts read them.
 pub(super) fn estimates(all: &[EffectEstimate]) -> Vec<Value> {
-    let one =
-        |e: &EffectEstimate| json!({"name": e.name, "value": e.value, "std": e.std, "unit": e.unit});
+    let one = |e: &EffectEstimate| json!({"name": e.name, "value": e.value, "std": e.std, "unit": e.unit});
     all.iter().map(one).collect()
 }
 

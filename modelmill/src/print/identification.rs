@@ -40,10 +40,18 @@ impl Identification {
     }
 
     /// The result for people.
-    pub fn text(&self, model: &Model, style: TerminalStyle, spelling: &dyn RemedySpelling) -> String {
+    pub fn text(
+        &self,
+        model: &Model,
+        style: TerminalStyle,
+        spelling: &dyn RemedySpelling,
+    ) -> String {
         let fit = &self.fit;
         let estimator = estimation::text(model, &self.found, &model.parameter_infos());
-        let identified = fit.parameters.iter().filter(|p| p.status != ParameterStatus::Known);
+        let identified = fit
+            .parameters
+            .iter()
+            .filter(|p| p.status != ParameterStatus::Known);
         let identified = identified.count();
         let mut lines = vec![style.bold(&format!(
             "{}: {} from {}",

@@ -17,7 +17,11 @@ pub(crate) const LIBRARY: &str = "laws.toml";
 pub(crate) const PATH_DEPENDENT_NOTE: &str = "It depends on the way there, which no formula of a library says; it is told so that it can be looked for.";
 
 /// Laws as scripts read them.
-pub(super) fn laws(laws: &[LawHypothesis], model: &Model, spelling: &dyn StepSpelling) -> Vec<Value> {
+pub(super) fn laws(
+    laws: &[LawHypothesis],
+    model: &Model,
+    spelling: &dyn StepSpelling,
+) -> Vec<Value> {
     let one = |hypothesis: &LawHypothesis| {
         let mut told = law(&hypothesis.law, model, spelling);
         let ties = hypothesis.near_ties.iter();

@@ -19,7 +19,7 @@ mod summary;
 pub mod tables;
 mod variants;
 
-use modelmill_identify::Note;
+use modelmill_identify::RecordingNote;
 use serde_json::Value;
 
 pub use spelling::{
@@ -29,6 +29,6 @@ pub use spelling::{
 pub use summary::{faults, refusal, warnings};
 
 /// Remarks as JSON.
-pub(crate) fn notes(notes: &[Note], spelling: &dyn RemedySpelling) -> Value {
+pub(crate) fn notes(notes: &[RecordingNote], spelling: &dyn RemedySpelling) -> Value {
     notes.iter().map(|note| note.json(spelling)).collect()
 }

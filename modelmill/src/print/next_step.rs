@@ -15,7 +15,9 @@ impl Identification {
     /// What to do next, in a sentence or two.
     pub fn next_step(&self) -> Message {
         let parameters = &self.fit.parameters;
-        let asked = parameters.iter().filter(|p| p.status != ParameterStatus::Known);
+        let asked = parameters
+            .iter()
+            .filter(|p| p.status != ParameterStatus::Known);
         let n = asked.clone().count();
         let vague = asked
             .filter(|p| match p.status {

@@ -4,7 +4,10 @@ use modelmill_identify::ParameterInfo;
 use serde_json::{Value, json};
 
 use crate::print::RemedySpelling;
-use crate::runs::{ChangePoint, RunChange, RunsComparison, FittedValue, RunReport, SharedFit, RunValue, PhysicalChange};
+use crate::runs::{
+    ChangePoint, FittedValue, PhysicalChange, RunChange, RunReport, RunValue, RunsComparison,
+    SharedFit,
+};
 use crate::text::TerminalStyle;
 use crate::text::table::{ColumnAlignment, count, table, with_deviation};
 
@@ -12,8 +15,11 @@ impl RunsComparison {
     /// All that was found as one JSON object.
     pub fn json(&self, spelling: &dyn RemedySpelling) -> Value {
         let later = || self.runs.iter().enumerate().skip(1);
-        let moved =
-            later().flat_map(|(k, run)| run.moved.iter().map(move |p| self.moved_parameter_json(k, *p)));
+        let moved = later().flat_map(|(k, run)| {
+            run.moved
+                .iter()
+                .map(move |p| self.moved_parameter_json(k, *p))
+        });
         let all = self.runs.iter().enumerate();
         let changes =
             all.flat_map(|(k, run)| run.changes.iter().map(move |one| change_json([0, k], one)));
@@ -157,7 +163,13 @@ impl RunsComparison {
     }
 
     /// A run against the first.
-    fn write_run(&self, first: &RunReport, run: &RunReport, lines: &mut Vec<String>, style: TerminalStyle) {
+    fn write_run(
+        &self,
+        first: &RunReport,
+        run: &RunReport,
+        lines: &mut Vec<String>,
+        style: TerminalStyle,
+    ) {
         lines.push(String::new());
         lines.push(style.bold(&run.file));
         write_changes(&run.changes, lines);

@@ -2,13 +2,14 @@
 
 use modelmill_boundary::text::plain;
 use modelmill_codegen::review::NumericMethod;
-use modelmill_codegen::{Derivation, ReductionMethod, BaseReduction, module_name};
+use modelmill_codegen::{BaseReduction, Derivation, ReductionMethod, module_name};
 use modelmill_spec::{
-    Diagnostic, DriveKind, LoadFailure, LoadedModel, Mechanism, CoordinateMotion, DiagnosticSeverity, SourceFiles,
+    CoordinateMotion, Diagnostic, DiagnosticSeverity, DriveKind, LoadFailure, LoadedModel,
+    Mechanism, SourceFiles,
 };
 use serde_json::{Value, json};
 
-use crate::model::{ModelCheck, SampledRank, ModelSummary, ineffective_retained};
+use crate::model::{ModelCheck, ModelSummary, SampledRank, ineffective_retained};
 use crate::print::RemedySpelling;
 use crate::text::TerminalStyle;
 use crate::text::table::count;

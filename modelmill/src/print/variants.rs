@@ -5,7 +5,9 @@ use serde_json::{Value, json};
 use crate::print::{RemedySpelling, notes, tables};
 use crate::text::TerminalStyle;
 use crate::text::table::{ColumnAlignment, count, number, percent, significant, table};
-use crate::variants::{LimitCrossing, DriveVariants, DriveEffort, LimitUse, TermShare, VariantComparison};
+use crate::variants::{
+    DriveEffort, DriveVariants, LimitCrossing, LimitUse, TermShare, VariantComparison,
+};
 
 /// Summands of a drive's difference that are shown, at most; the rest is told in one line.
 const MOST_TERMS: usize = 6;

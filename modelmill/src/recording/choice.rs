@@ -13,12 +13,15 @@
 use modelmill_boundary::message;
 use modelmill_boundary::text::{OptionName, Remedy};
 use modelmill_codegen::{ModelEvaluator, MotionStates};
-use modelmill_identify::{LowPass, RecordingNote, PreparationChoices, DECIMATION_PASSBAND, SignalRecording as Raw, PreparedRun};
+use modelmill_identify::{
+    DECIMATION_PASSBAND, LowPass, PreparationChoices, PreparedRun, RecordingNote,
+    SignalRecording as Raw,
+};
 use nalgebra::{DMatrix, DVector};
 
 use super::free;
 use super::options::RecordingOptions;
-use super::smoother::{SmootherCandidate, series_up_to, floor_to_count};
+use super::smoother::{SmootherCandidate, floor_to_count, series_up_to};
 use crate::error::Outcome;
 use crate::model::Model;
 use crate::text::table::{percent, significant};
@@ -148,7 +151,10 @@ impl SmootherSearch<'_> {
         while ladder[ladder.len() - 1] / RATIO >= lowest {
             ladder.push(ladder[ladder.len() - 1] / RATIO);
         }
-        let ladder: Vec<SmootherCandidate> = ladder.into_iter().map(SmootherCandidate::low_pass).collect();
+        let ladder: Vec<SmootherCandidate> = ladder
+            .into_iter()
+            .map(SmootherCandidate::low_pass)
+            .collect();
         // The lowest cut-off drops most samples; what it leaves is looked at for all.
         let runs = self.runs(ladder[ladder.len() - 1])?;
         let looked_at = self.windows(&runs);
@@ -158,13 +164,17 @@ impl SmootherSearch<'_> {
             self.try_smoothers(&ladder, &looked_at)
         });
         let (low_pass, by_filter) = filtered.best();
-        let is_better = |series: &SmootherTrials| series.best().1.figure < by_filter.figure - BETTER;
+        let is_better =
+            |series: &SmootherTrials| series.best().1.figure < by_filter.figure - BETTER;
         let (tried, other) = match series {
             Some(series) if is_better(&series) => {
                 let more = cost_text(by_filter.figure - series.best().1.figure);
                 (
                     series,
-                    Some(format!("{more} by a low-pass at {}", low_pass.frequency_text())),
+                    Some(format!(
+                        "{more} by a low-pass at {}",
+                        low_pass.frequency_text()
+                    )),
                 )
             }
             Some(series) => {
@@ -211,7 +221,11 @@ impl SmootherSearch<'_> {
     }
 
     /// Smoothers that are tried one after the other, the one that passes most first, until nothing is to be hoped for.
-    fn try_smoothers(&self, ladder: &[SmootherCandidate], looked_at: &[TimeWindow]) -> Option<SmootherTrials> {
+    fn try_smoothers(
+        &self,
+        ladder: &[SmootherCandidate],
+        looked_at: &[TimeWindow],
+    ) -> Option<SmootherTrials> {
         let mut all: Vec<(SmootherCandidate, HeldOutResidual)> = Vec::new();
         let mut least = f64::INFINITY;
         for smoother in ladder {
@@ -224,13 +238,18 @@ impl SmootherSearch<'_> {
                 break;
             }
         }
-        let is_good = |(_, left): &(SmootherCandidate, HeldOutResidual)| left.figure <= least + BETTER;
+        let is_good =
+            |(_, left): &(SmootherCandidate, HeldOutResidual)| left.figure <= least + BETTER;
         let best = all.iter().rposition(is_good)?;
         Some(SmootherTrials { all, best })
     }
 
     /// The factor of decimation, and what is left with it on held-out time.
-    fn decimation(&self, smoother: SmootherCandidate, looked_at: &[TimeWindow]) -> Option<(usize, HeldOutResidual)> {
+    fn decimation(
+        &self,
+        smoother: SmootherCandidate,
+        looked_at: &[TimeWindow],
+    ) -> Option<(usize, HeldOutResidual)> {
         let mut best: Option<(usize, HeldOutResidual)> = None;
         for part in PARALLEL {
             let passed = part * self.open.band_hz;
@@ -300,7 +319,12 @@ impl SmootherSearch<'_> {
     }
 
     /// What is left on held-out time by a smoother, where rows below `passed`, Hz, are fitted.
-    fn held_out_residual(&self, smoother: SmootherCandidate, passed: f64, windows: &[TimeWindow]) -> Option<HeldOutResidual> {
+    fn held_out_residual(
+        &self,
+        smoother: SmootherCandidate,
+        passed: f64,
+        windows: &[TimeWindow],
+    ) -> Option<HeldOutResidual> {
         let runs = self.runs(smoother)?;
         let every = floor_to_count(self.open.rate_hz / self.evaluation_rate()).max(1);
         let rate = self.open.rate_hz / every as f64;
@@ -385,7 +409,10 @@ impl SmootherSearch<'_> {
                 return None;
             }
             let rounding = ROUNDING * ROUNDING * size;
-            let above: f64 = octaves[1..].iter().map(|octave| octave.residual_power(true)).sum();
+            let above: f64 = octaves[1..]
+                .iter()
+                .map(|octave| octave.residual_power(true))
+                .sum();
             let within = octaves[0].residual_power(false).max(rounding);
             figure += 0.5 * (within + above).ln();
             relative += 0.5 * (within / size).ln();
@@ -398,7 +425,12 @@ impl SmootherSearch<'_> {
     }
 
     /// Regressor and forces at every so many samples of a window.
-    fn samples(&self, run: &PreparedRun, window: &TimeWindow, every: usize) -> Option<WindowSamples> {
+    fn samples(
+        &self,
+        run: &PreparedRun,
+        window: &TimeWindow,
+        every: usize,
+    ) -> Option<WindowSamples> {
         let forces = run.force.as_deref()?;
         let start = run.time.partition_point(|t| *t < window.from);
         let end = run.time.partition_point(|t| *t <= window.to);

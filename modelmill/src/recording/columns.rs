@@ -4,7 +4,7 @@
 use modelmill_boundary::message;
 use modelmill_boundary::text::{Message, OptionName, Remedy};
 use modelmill_identify::{ComputedColumn, NonFinitePolicy, ReadOptions};
-use modelmill_spec::{ColumnFault, ColumnSum, ColumnQuantity, read_column};
+use modelmill_spec::{ColumnFault, ColumnQuantity, ColumnSum, read_column};
 
 use super::options::RecordingOptions;
 use crate::error::{Error, Outcome};
@@ -200,7 +200,9 @@ fn quantity_of(known: &[(String, ColumnQuantity)], ours: &str) -> Option<ColumnQ
 fn is_optional(ours: &str, quantity: ColumnQuantity) -> bool {
     match quantity {
         ColumnQuantity::Time | ColumnQuantity::Number => false,
-        ColumnQuantity::Angle(order) | ColumnQuantity::Length(order) => order > 0 && ours.contains("_d"),
+        ColumnQuantity::Angle(order) | ColumnQuantity::Length(order) => {
+            order > 0 && ours.contains("_d")
+        }
         _ => true,
     }
 }

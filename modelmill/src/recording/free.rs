@@ -3,8 +3,8 @@
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{OptionName, Remedy};
-use modelmill_identify::{RecordingNote, StatePreparation, SignalRecording as Raw, PreparedRun};
-use modelmill_spec::{DriveKind, FreeBody, Kinematics, Mechanism, FrameStep, TwistAxes};
+use modelmill_identify::{PreparedRun, RecordingNote, SignalRecording as Raw, StatePreparation};
+use modelmill_spec::{DriveKind, FrameStep, FreeBody, Kinematics, Mechanism, TwistAxes};
 
 use crate::error::{Error, Outcome};
 use crate::model::Model;
@@ -171,7 +171,11 @@ fn twist_halves(body: &FreeBody) -> [[usize; 3]; 2] {
 }
 
 /// The states of a recording for a model, in which rates of free bodies are their twist.
-pub(super) fn runs(model: &Model, raw: &Raw, preparation: &StatePreparation) -> Outcome<Vec<PreparedRun>> {
+pub(super) fn runs(
+    model: &Model,
+    raw: &Raw,
+    preparation: &StatePreparation,
+) -> Outcome<Vec<PreparedRun>> {
     let mechanism = &model.derivation.mechanism;
     let mut runs = raw.runs_with(&model.active_coordinates(), &model.drives(), preparation)?;
     for body in free_bodies(mechanism) {

@@ -16,7 +16,7 @@ use modelmill_boundary::files::MemoryFiles;
 use modelmill_boundary::message;
 use modelmill_boundary::text::{Message, OptionName, OptionSetting, Remedy};
 use modelmill_identify::diagnose::{Disturbance, EstimatedQuantity};
-use modelmill_identify::{RecordingNote, PositionFault, SignalRecording as Raw, RecordingFiles};
+use modelmill_identify::{PositionFault, RecordingFiles, RecordingNote, SignalRecording as Raw};
 
 use crate::audit;
 use crate::error::{Error, Outcome};
@@ -30,7 +30,7 @@ use leverage::DriveLeverage;
 
 pub use contents::{ColumnInfo, RecordingContents, TableInfo};
 pub use modelmill_identify::{DerivativeSource, MAX_FILTER_ORDER, has_recording_extension};
-pub use modelmill_identify::{StatePreparation, PreparedRun, SmoothingMethod};
+pub use modelmill_identify::{PreparedRun, SmoothingMethod, StatePreparation};
 pub use options::RecordingOptions;
 
 /// Reads a recording with the columns that a model needs.
@@ -55,7 +55,11 @@ fn read_raw(model: &Model, file: &RecordingFiles, reading: &RecordingOptions) ->
 
 /// The stretches of a recording; where the model says that forces are read late, each force has the states of the moment at
 /// which it acted.
-fn prepare_segments(model: &Model, raw: &Raw, reading: &RecordingOptions) -> Outcome<Vec<RecordingSegment>> {
+fn prepare_segments(
+    model: &Model,
+    raw: &Raw,
+    reading: &RecordingOptions,
+) -> Outcome<Vec<RecordingSegment>> {
     let delay = model.derivation.mechanism.force_delay;
     let mut data = prepare(model, raw, reading, delay)?;
     note_idle_options(&mut data, reading);
@@ -91,11 +95,15 @@ pub(crate) fn read_as_recorded(
 }
 
 /// The reading with what it leaves open of the preparation chosen, and what was chosen.
-fn resolve_reading(model: &Model, raw: &Raw, reading: &RecordingOptions) -> Outcome<(RecordingOptions, Option<RecordingNote>)> {
+fn resolve_reading(
+    model: &Model,
+    raw: &Raw,
+    reading: &RecordingOptions,
+) -> Outcome<(RecordingOptions, Option<RecordingNote>)> {
     let says = format!("choosing how {} is smoothed", raw.file());
-    let chosen = model
-        .host()
-        .run_job(&says, 0, |_| choice::choose_preparation(model, raw, reading))??;
+    let chosen = model.host().run_job(&says, 0, |_| {
+        choice::choose_preparation(model, raw, reading)
+    })??;
     Ok(match chosen {
         Some((reading, note)) => (reading, Some(note)),
         None => (reading.clone(), None),
@@ -133,7 +141,12 @@ fn compensate_delay(run: &mut PreparedRun, delay: f64) -> Outcome {
     Ok(())
 }
 
-fn prepare(model: &Model, recording: &Raw, args: &RecordingOptions, delay: f64) -> Outcome<Vec<RecordingSegment>> {
+fn prepare(
+    model: &Model,
+    recording: &Raw,
+    args: &RecordingOptions,
+    delay: f64,
+) -> Outcome<Vec<RecordingSegment>> {
     let preparation = &args.preparation;
     let mut runs =
         model
@@ -168,9 +181,11 @@ fn prepare(model: &Model, recording: &Raw, args: &RecordingOptions, delay: f64) 
         compensate_delay(run, delay)?;
     }
     let faults: Vec<Disturbance> = if is_examined {
-        (recording.position_faults(&model.active_coordinates()).into_iter())
-            .map(|fault| position_fault(model, recording.file(), &fault))
-            .collect()
+        (recording
+            .position_faults(&model.active_coordinates())
+            .into_iter())
+        .map(|fault| position_fault(model, recording.file(), &fault))
+        .collect()
     } else {
         Vec::new()
     };
@@ -260,7 +275,11 @@ fn note_idle_options(data: &mut [RecordingSegment], args: &RecordingOptions) {
 }
 
 /// Warns of recordings that are given twice, also as copies: they count twice, or make a check that proves nothing.
-pub fn note_duplicates(model: &Model, data: &mut [RecordingSegment], check: &mut [RecordingSegment]) {
+pub fn note_duplicates(
+    model: &Model,
+    data: &mut [RecordingSegment],
+    check: &mut [RecordingSegment],
+) {
     for k in 1..data.len() {
         let (before, rest) = data.split_at_mut(k);
         if let Some(twin) = before.iter().find(|other| other.has_same_samples(&rest[0])) {
@@ -297,13 +316,21 @@ impl Model {
     /// what was done and what looks odd stands in the notes of its stretches.
     ///
     /// Fails with place and remedy when a column is missing or holds no number, or time stands still.
-    pub fn recording(&self, path: impl AsRef<Path>, reading: &RecordingOptions) -> Outcome<PreparedRecording> {
+    pub fn recording(
+        &self,
+        path: impl AsRef<Path>,
+        reading: &RecordingOptions,
+    ) -> Outcome<PreparedRecording> {
         self.recording_of(&[path.as_ref()], reading)
     }
 
     /// As [`Model::recording`], of several files of one run, whose columns are joined on time: the slowest gives the
     /// samples, and the others are interpolated.
-    pub fn recording_of(&self, paths: &[&Path], reading: &RecordingOptions) -> Outcome<PreparedRecording> {
+    pub fn recording_of(
+        &self,
+        paths: &[&Path],
+        reading: &RecordingOptions,
+    ) -> Outcome<PreparedRecording> {
         let opened = RecordingFiles::open(self.host().files(), paths);
         let read = opened
             .map_err(Error::from)

@@ -1,6 +1,6 @@
 //! Ways to smooth positions that are tried against each other: low-passes, and Fourier series where a motion repeats itself.
 
-use modelmill_identify::{StatePreparation, SmoothingMethod};
+use modelmill_identify::{SmoothingMethod, StatePreparation};
 
 use crate::text::table::significant;
 

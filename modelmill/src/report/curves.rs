@@ -8,7 +8,7 @@ use std::fmt::Write as _;
 
 use serde_json::json;
 
-use super::draw::{PlotAxis, LEFT, SvgPicture, RIGHT, WIDTH, attribute, line, range, with_room};
+use super::draw::{LEFT, PlotAxis, RIGHT, SvgPicture, WIDTH, attribute, line, range, with_room};
 use super::units::force_unit;
 use crate::diagnose::{ForceComparison, ModelVersion};
 use crate::text::svg::{escape, thin_out};

@@ -255,7 +255,13 @@ pub(crate) fn attribute(text: &str) -> String {
 }
 
 /// A curve over an axis, thinned to what can be seen; values that are no numbers are gaps.
-pub(crate) fn line(values: &[f64], x: &PlotAxis, span: [f64; 2], y: &PlotAxis, points: usize) -> String {
+pub(crate) fn line(
+    values: &[f64],
+    x: &PlotAxis,
+    span: [f64; 2],
+    y: &PlotAxis,
+    points: usize,
+) -> String {
     let last = values.len().max(2) - 1;
     let mut d = String::new();
     let mut pen = 'M';

@@ -102,7 +102,11 @@ fn pairs(variables: &[MapVariable]) -> Vec<(usize, usize)> {
 }
 
 /// A figure for each drive.
-pub(crate) fn figures(before: &ModelVersion, after: Option<&ModelVersion>, variables: &[MapVariable]) -> String {
+pub(crate) fn figures(
+    before: &ModelVersion,
+    after: Option<&ModelVersion>,
+    variables: &[MapVariable],
+) -> String {
     let judged = before.validation_runs();
     let mut html = String::new();
     for (d, drive) in before.model.drives().iter().enumerate() {
@@ -232,8 +236,12 @@ mod tests {
             .zip(&rate)
             .map(|(q, v)| if *q > 0.5 && *v < 0.0 { 3.0 } else { 0.1 })
             .collect();
-        let right = ErrorGrid::new(&q, &rate).unwrap().error_concentration(&error);
-        let wrong = ErrorGrid::new(&other, &rate).unwrap().error_concentration(&error);
+        let right = ErrorGrid::new(&q, &rate)
+            .unwrap()
+            .error_concentration(&error);
+        let wrong = ErrorGrid::new(&other, &rate)
+            .unwrap()
+            .error_concentration(&error);
         assert!(right > 0.8 && wrong < 0.5 * right, "{right} {wrong}");
         assert!(ErrorGrid::new(&q, &vec![1.0; q.len()]).is_none());
     }

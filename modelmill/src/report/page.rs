@@ -6,7 +6,7 @@ use modelmill_codegen::review::PageFormat;
 use modelmill_draw::page as pages;
 use modelmill_identify::diagnose::DiagnosisVerdict;
 
-use super::{DiagnosisFindings, curves, legend, ladder, maps, regions, spectrum, tables, words};
+use super::{DiagnosisFindings, curves, ladder, legend, maps, regions, spectrum, tables, words};
 use crate::compare::ErrorLocations;
 use crate::error::Outcome;
 use crate::print::{StepSpelling, laws as told};
@@ -47,7 +47,11 @@ pub fn page(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) -> Outcom
             "What was done to the recordings",
             tables::data(findings, spelling),
         ),
-        ("equations", "Equations", embed_equations(findings, &equations)),
+        (
+            "equations",
+            "Equations",
+            embed_equations(findings, &equations),
+        ),
     ];
     page.push_str("<nav>");
     for (id, title, _) in &sections {
@@ -96,7 +100,11 @@ fn summary(findings: &DiagnosisFindings) -> String {
         DiagnosisVerdict::MissingEffect => ("missing", "an effect is missing"),
         DiagnosisVerdict::Unexplained => ("unexplained", "unexplained"),
     };
-    let says = words::verdict(diagnosis, &findings.before.model.drives(), findings.validation);
+    let says = words::verdict(
+        diagnosis,
+        &findings.before.model.drives(),
+        findings.validation,
+    );
     let mut tiles = vec![("verdict", word.to_owned())];
     if let (Some(first), Some(last)) = (diagnosis.steps.first(), diagnosis.steps.last()) {
         tiles.push(("error as it is", percent(Some(first.check))));

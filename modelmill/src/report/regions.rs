@@ -143,7 +143,11 @@ fn picture(
             let at = x.position(bin.at);
             let pen = if k == 0 { 'M' } else { 'L' };
             let _ = write!(mean, "{pen}{at:.1} {:.1}", y.position(bin.mean));
-            let _ = write!(upper, "{pen}{at:.1} {:.1}", y.position(bin.mean + bin.spread));
+            let _ = write!(
+                upper,
+                "{pen}{at:.1} {:.1}",
+                y.position(bin.mean + bin.spread)
+            );
             lower = format!("L{at:.1} {:.1}{lower}", y.position(bin.mean - bin.spread));
         }
         picture.path(&format!("band {class}"), &format!("{upper}{lower}Z"));

@@ -5,12 +5,12 @@ use std::fmt::Write as _;
 use modelmill_draw::page as pages;
 use modelmill_identify::ParameterInfo;
 
-use super::draw::{PlotAxis, LEFT, SvgPicture, RIGHT, WIDTH, range, with_room};
+use super::draw::{LEFT, PlotAxis, RIGHT, SvgPicture, WIDTH, range, with_room};
 use super::page::end;
 use super::tables::{TableCell, table};
 use super::units::typographic_unit;
 use crate::print::RemedySpelling;
-use crate::runs::{RunChange, RunsComparison, FittedValue, SharedFit};
+use crate::runs::{FittedValue, RunChange, RunsComparison, SharedFit};
 use crate::text::svg::escape;
 use crate::text::table::{count, significant};
 
@@ -30,7 +30,11 @@ pub fn runs_page(compared: &RunsComparison, spelling: &dyn RemedySpelling) -> St
             "When something changed and stayed changed",
             points(compared),
         ),
-        ("against", "Every run against the first", changes_table(compared)),
+        (
+            "against",
+            "Every run against the first",
+            changes_table(compared),
+        ),
     ];
     if let Some(shared) = &compared.shared {
         sections.push(("own", "One fit of all runs", shared_fit_section(shared)));
@@ -304,7 +308,12 @@ fn runs(compared: &RunsComparison, spelling: &dyn RemedySpelling) -> String {
         .collect();
     rows.extend(compared.unread.iter().map(|one| {
         let says = TableCell::text(&format!("gave no answer: {}", one.error.spell(spelling)));
-        vec![TableCell::text(""), TableCell::text(&one.file), TableCell::text(""), says]
+        vec![
+            TableCell::text(""),
+            TableCell::text(&one.file),
+            TableCell::text(""),
+            says,
+        ]
     }));
     table(
         "runs",

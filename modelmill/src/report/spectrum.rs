@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
 
-use super::draw::{PlotAxis, LEFT, SvgPicture, RIGHT, WIDTH, range};
+use super::draw::{LEFT, PlotAxis, RIGHT, SvgPicture, WIDTH, range};
 use super::units::force_unit;
 use crate::diagnose::ModelVersion;
 use crate::text::svg::escape;
@@ -115,7 +115,12 @@ pub(crate) fn figures(before: &ModelVersion, after: Option<&ModelVersion>) -> St
             let mut path = String::new();
             for (k, (f, v)) in curve.iter().enumerate() {
                 let pen = if k == 0 { 'M' } else { 'L' };
-                let _ = write!(path, "{pen}{:.1} {:.1}", x.position(*f), y.position(v.sqrt()));
+                let _ = write!(
+                    path,
+                    "{pen}{:.1} {:.1}",
+                    x.position(*f),
+                    y.position(v.sqrt())
+                );
             }
             picture.path(&format!("curve {class}"), &path);
         }

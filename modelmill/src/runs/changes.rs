@@ -1,6 +1,6 @@
 //! What a change is in physics.
 
-use modelmill_identify::changes::{PossibleChange, SelectedChange, JointValues};
+use modelmill_identify::changes::{JointValues, PossibleChange, SelectedChange};
 use modelmill_spec::{DriveKind, EffectPlace};
 use nalgebra::DVector;
 
@@ -181,7 +181,11 @@ pub(crate) struct ChangeHypothesis {
 const RARE: f64 = 0.2;
 
 /// All changes that are possible.
-pub(crate) fn possible_changes(model: &Model, payloads: &PayloadColumns, layout: RunColumnLayout) -> Vec<ChangeHypothesis> {
+pub(crate) fn possible_changes(
+    model: &Model,
+    payloads: &PayloadColumns,
+    layout: RunColumnLayout,
+) -> Vec<ChangeHypothesis> {
     let possible = |kind: ChangeKind, columns: Vec<usize>| {
         let (most, rarity) = match kind {
             // Dry and viscous friction rise and fall together.
@@ -263,7 +267,12 @@ pub(crate) fn event(model: &Model, event: &ContactEvent) -> RunChange {
     }
 }
 
-fn physical_change(model: &Model, kind: &ChangeKind, found: &SelectedChange, values: &DVector<f64>) -> PhysicalChange {
+fn physical_change(
+    model: &Model,
+    kind: &ChangeKind,
+    found: &SelectedChange,
+    values: &DVector<f64>,
+) -> PhysicalChange {
     let estimate = |i: usize| ChangeEstimate {
         value: found.values[i],
         deviation: found.covariance[(i, i)].max(0.0).sqrt(),
@@ -315,7 +324,9 @@ fn physical_change(model: &Model, kind: &ChangeKind, found: &SelectedChange, val
 /// The unit of a force of a drive, or of a coordinate.
 fn unit(model: &Model, kind: &ChangeKind) -> &'static str {
     match kind {
-        ChangeKind::Friction(d) | ChangeKind::Offset(d) | ChangeKind::Scale(d) => model.force_unit(*d),
+        ChangeKind::Friction(d) | ChangeKind::Offset(d) | ChangeKind::Scale(d) => {
+            model.force_unit(*d)
+        }
         ChangeKind::EncoderZero(i) if model.motions()[*i].1 => "rad",
         ChangeKind::EncoderZero(_) | ChangeKind::Payload(_) => "m",
         ChangeKind::Clock => "1",

@@ -130,7 +130,11 @@ fn counts(stretch: &RecordingSegment, forces: &[Vec<f64>]) -> Vec<Vec<bool>> {
 }
 
 /// Ten columns for each body.
-fn payload_columns(model: &Model, stretch: &RecordingSegment, payloads: &PayloadColumns) -> Outcome<Vec<ForceColumn>> {
+fn payload_columns(
+    model: &Model,
+    stretch: &RecordingSegment,
+    payloads: &PayloadColumns,
+) -> Outcome<Vec<ForceColumn>> {
     let evaluator = ModelEvaluator::new(&payloads.derivation);
     let columns = regressor(&[(stretch, false)], &evaluator, model)?;
     let of = |k: &Option<usize>| k.map(|k| columns[k].clone()).unwrap_or_default();
@@ -138,7 +142,11 @@ fn payload_columns(model: &Model, stretch: &RecordingSegment, payloads: &Payload
 }
 
 /// Dry and viscous friction of each drive, then a constant force on each.
-fn drive_columns(model: &Model, stretch: &RecordingSegment, samples: usize) -> Outcome<Vec<ForceColumn>> {
+fn drive_columns(
+    model: &Model,
+    stretch: &RecordingSegment,
+    samples: usize,
+) -> Outcome<Vec<ForceColumn>> {
     let n = model.drives().len();
     let only = |drive: usize, values: Vec<f64>| {
         let mut column = ForceColumn(vec![None; n]);

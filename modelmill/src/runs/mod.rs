@@ -17,9 +17,11 @@ mod sums;
 use std::borrow::Borrow;
 
 use modelmill_boundary::message;
-use modelmill_identify::changes::{SelectedChange, NormalEquations, RunPair, ChangeHypotheses, search_changes, within_run_spread};
+use modelmill_identify::changes::{
+    ChangeHypotheses, NormalEquations, RunPair, SelectedChange, search_changes, within_run_spread,
+};
 use modelmill_identify::diagnose::ForceColumn;
-use modelmill_identify::{RecordingNote, ParameterInfo};
+use modelmill_identify::{ParameterInfo, RecordingNote};
 use nalgebra::DVector;
 
 use crate::audit::events::{self, ContactEvent};
@@ -28,13 +30,13 @@ use crate::model::Model;
 use crate::recording::PreparedRecording;
 use crate::stretch::RecordingSegment;
 
-pub use changes::{RunChange, ChangeEstimate, NamedEstimate, PhysicalChange};
+pub use changes::{ChangeEstimate, NamedEstimate, PhysicalChange, RunChange};
 use changes::{ChangeHypothesis, centre};
 use layout::RunColumnLayout;
 use payload::PayloadColumns;
-pub use per_run::{KnownLoad, PerRunSelection, SharedFit, RunValue};
+pub use per_run::{KnownLoad, PerRunSelection, RunValue, SharedFit};
 pub use points::{ChangePoint, ParameterStep};
-use rows::{RunRows, MeasuredMoments, WhitenedRun};
+use rows::{MeasuredMoments, RunRows, WhitenedRun};
 pub use sums::{ReferenceFit, RunSums};
 
 /// A difference of a base parameter counts as moved from this many standard deviations on.
@@ -249,7 +251,10 @@ pub(crate) struct RunStatistics {
 }
 
 /// Events of forces that were measured; those that follow each other at once are one.
-fn merged_contact_events(events: Vec<ContactEvent>, stretch: &RecordingSegment) -> Vec<ContactEvent> {
+fn merged_contact_events(
+    events: Vec<ContactEvent>,
+    stretch: &RecordingSegment,
+) -> Vec<ContactEvent> {
     let mut all: Vec<ContactEvent> = Vec::new();
     for mut event in events {
         let (from, to) = (event.from, event.to);
@@ -307,7 +312,11 @@ impl<'a> RunAnalyser<'a> {
         }
     }
 
-    fn analyse_run(&self, recording: &PreparedRecording, values: Option<&DVector<f64>>) -> Outcome<RunStatistics> {
+    fn analyse_run(
+        &self,
+        recording: &PreparedRecording,
+        values: Option<&DVector<f64>>,
+    ) -> Outcome<RunStatistics> {
         let mut stretches = recording.segments.clone();
         let mut told = Vec::new();
         for stretch in &mut stretches {
@@ -347,7 +356,9 @@ impl<'a> RunAnalyser<'a> {
     /// A run fitted alone.
     fn run_report(&self, run: &RunStatistics, before: &RunStatistics) -> RunReport {
         let base: Vec<usize> = (0..self.layout.base).collect();
-        let of = |run: &RunStatistics| fit_parameters(self.model, &run.white.total().select_columns(&base));
+        let of = |run: &RunStatistics| {
+            fit_parameters(self.model, &run.white.total().select_columns(&base))
+        };
         let (alone, reference) = (of(run), of(before));
         let differs = |(a, b): (&FittedValue, &FittedValue)| {
             let is_known = a.deviation.is_some() && b.deviation.is_some();
@@ -391,7 +402,11 @@ impl<'a> RunAnalyser<'a> {
         found
     }
 
-    fn identified_changes(&self, found: &[SelectedChange], values: &DVector<f64>) -> Vec<RunChange> {
+    fn identified_changes(
+        &self,
+        found: &[SelectedChange],
+        values: &DVector<f64>,
+    ) -> Vec<RunChange> {
         let told = found.iter();
         told.map(|one| changes::identified_change(self.model, &self.possible, one, values))
             .collect()
@@ -411,15 +426,19 @@ pub(crate) struct RecordingDifference {
 }
 
 /// What later recordings do not share with the first, with the forces that that makes.
-pub(crate) fn differences(model: &Model, recordings: &[&PreparedRecording]) -> Outcome<Vec<RecordingDifference>> {
+pub(crate) fn differences(
+    model: &Model,
+    recordings: &[&PreparedRecording],
+) -> Outcome<Vec<RecordingDifference>> {
     let [first, later @ ..] = recordings else {
         return Ok(Vec::new());
     };
     let payloads = PayloadColumns::new(model)?;
     let bench = RunAnalyser::new(model, &payloads);
     let before = bench.analyse_run(first, None)?;
-    let samples =
-        |one: &PreparedRecording| -> usize { one.segments.iter().map(|one| one.time().len()).sum() };
+    let samples = |one: &PreparedRecording| -> usize {
+        one.segments.iter().map(|one| one.time().len()).sum()
+    };
     let total: usize = recordings.iter().map(|one| samples(one)).sum();
     let mut start = samples(first);
     let mut differences = Vec::new();
@@ -436,9 +455,15 @@ pub(crate) fn differences(model: &Model, recordings: &[&PreparedRecording]) -> O
                 Some(&before.values),
             )?),
         };
-        for (one, changed) in found.iter().zip(bench.identified_changes(&found, &before.values)) {
+        for (one, changed) in found
+            .iter()
+            .zip(bench.identified_changes(&found, &before.values))
+        {
             let Some(rows) = &rows else { continue };
-            let own = rows.force(&bench.possible[one.candidate].candidate.columns, &one.values)?;
+            let own = rows.force(
+                &bench.possible[one.candidate].candidate.columns,
+                &one.values,
+            )?;
             let along_all = |values: Vec<f64>| {
                 let mut all = vec![0.0; total];
                 if values.len() == end - start {
@@ -461,7 +486,8 @@ pub(crate) fn differences(model: &Model, recordings: &[&PreparedRecording]) -> O
 /// The base parameters that some rows of variance 1 give; those that are numbers of the file keep them.
 fn fit_parameters(model: &Model, moments: &NormalEquations) -> Vec<FittedValue> {
     let solved = moments.solve();
-    let noise = (solved.residual_squares / (moments.rows as f64 - solved.rank as f64).max(1.0)).max(1.0);
+    let noise =
+        (solved.residual_squares / (moments.rows as f64 - solved.rank as f64).max(1.0)).max(1.0);
     merge_known(model, |i| FittedValue {
         value: solved.values[i],
         deviation: solved.determined[i].then(|| (noise * solved.covariance[(i, i)]).sqrt()),

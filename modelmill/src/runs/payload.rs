@@ -2,7 +2,10 @@
 //! and inertia about the frame's origin.
 
 use modelmill_codegen::{Derivation, derive_columns};
-use modelmill_spec::{ExactExpression, FrameIdx, PartInertia, Mechanism, DynamicParameter, ParameterIdx, ModelPart, ModelSymbol};
+use modelmill_spec::{
+    DynamicParameter, ExactExpression, FrameIdx, Mechanism, ModelPart, ModelSymbol, ParameterIdx,
+    PartInertia,
+};
 
 use crate::error::{Error, Outcome};
 use crate::model::Model;
@@ -33,8 +36,7 @@ impl PayloadColumns {
         }
         frames.sort_by_key(|frame| frame.0);
         let (variant, own) = with_bodies(mechanism, &frames);
-        let is_wanted =
-            |product: &modelmill_codegen::ParameterMonomial| matches!(product.0[..], [(p, 1)] if p >= own);
+        let is_wanted = |product: &modelmill_codegen::ParameterMonomial| matches!(product.0[..], [(p, 1)] if p >= own);
         let derivation = derive_columns(&variant, &is_wanted)
             .map_err(|error| Error::derivation(&model.path, error))?;
         let reduction = &derivation.reduction;
@@ -63,7 +65,8 @@ fn with_bodies(mechanism: &Mechanism, frames: &[FrameIdx]) -> (Mechanism, usize)
     let own = variant.parameters.len();
     for frame in frames {
         let first = variant.parameters.len();
-        let value = |i: usize| ExactExpression::Symbol(ModelSymbol::Parameter(ParameterIdx(first + i)));
+        let value =
+            |i: usize| ExactExpression::Symbol(ModelSymbol::Parameter(ParameterIdx(first + i)));
         variant.parts.push(ModelPart {
             name: format!("payload of {}", variant.frames[frame.0].name),
             frame: *frame,

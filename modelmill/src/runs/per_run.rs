@@ -201,7 +201,11 @@ impl<'a> SharedFitBuilder<'a> {
         let sums = if self.loads.is_empty() {
             vec![white.total().select_columns(&self.used)]
         } else {
-            white.drives.iter().map(|one| one.select_columns(&self.used)).collect()
+            white
+                .drives
+                .iter()
+                .map(|one| one.select_columns(&self.used))
+                .collect()
         };
         self.runs.push((file.to_owned(), sums));
     }
@@ -215,15 +219,20 @@ impl<'a> SharedFitBuilder<'a> {
         if !self.is_requested() {
             return Ok(None);
         }
-        let loads: Outcome<Vec<usize>> = self.loads.iter().map(|load| self.run_of_load(load)).collect();
+        let loads: Outcome<Vec<usize>> = self
+            .loads
+            .iter()
+            .map(|load| self.run_of_load(load))
+            .collect();
         let loads = loads?;
         let absolute = (self.own.iter()).filter(|one| !one.is_against_first);
         let not_shared: Vec<usize> = absolute.flat_map(|one| one.columns.clone()).collect();
         let shared: Vec<usize> = (0..self.layout.base)
             .filter(|k| !not_shared.contains(k))
             .collect();
-        let parts: Vec<(JointRun, Vec<&PerRunColumns>)> =
-            (0..self.runs.len()).map(|r| self.run_part(r, &loads)).collect();
+        let parts: Vec<(JointRun, Vec<&PerRunColumns>)> = (0..self.runs.len())
+            .map(|r| self.run_part(r, &loads))
+            .collect();
         let (parts, owns): (Vec<JointRun>, Vec<Vec<&PerRunColumns>>) = parts.into_iter().unzip();
         let places: Vec<usize> = shared.iter().map(|k| self.place(*k)).collect();
         let found = fit_jointly(&parts, &places, !self.loads.is_empty());

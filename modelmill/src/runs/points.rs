@@ -1,11 +1,13 @@
 //! When parameters changed and stayed changed, over the order of the runs, and what that is in physics.
 
-use modelmill_identify::changes::{NormalEquations, RunPair, UncertainValue, weighted_mean, change_points};
+use modelmill_identify::changes::{
+    NormalEquations, RunPair, UncertainValue, change_points, weighted_mean,
+};
 
 use nalgebra::DVector;
 
 use crate::runs::rows::MeasuredMoments;
-use crate::runs::{RunAnalyser, RunChange, FittedValue};
+use crate::runs::{FittedValue, RunAnalyser, RunChange};
 
 /// A change of one parameter from one stretch of runs to the next.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -50,7 +52,10 @@ pub(crate) fn find_change_points(
         .collect();
     let mut steps: Vec<(usize, ParameterStep)> = Vec::new();
     for parameter in &parameters {
-        let told: Vec<Option<UncertainValue>> = runs.iter().map(|run| known_value(run[*parameter])).collect();
+        let told: Vec<Option<UncertainValue>> = runs
+            .iter()
+            .map(|run| known_value(run[*parameter]))
+            .collect();
         let mut bounds = change_points(&told, parameters.len());
         bounds.insert(0, 0);
         bounds.push(runs.len());

@@ -171,7 +171,11 @@ impl<'a> RunRows<'a> {
         let mut before = 0;
         let zeros = [0.0; TOGETHER];
         self.visit(|laid| {
-            for (drive, noise) in noise.iter().enumerate().filter(|(_, n)| n.standard_deviation > 0.0) {
+            for (drive, noise) in noise
+                .iter()
+                .enumerate()
+                .filter(|(_, n)| n.standard_deviation > 0.0)
+            {
                 for some in laid.pieces(drive) {
                     let start = before + some.start;
                     whiten(laid, drive, some, noise, columns, |i, z, y| {
@@ -209,7 +213,8 @@ impl MeasuredMoments {
     /// What the best base parameters leave of the force of each drive, as a part of it: with `base` columns at the front.
     pub(crate) fn residual_ratios(&self, base: usize) -> Outcome<Vec<f64>> {
         let base: Vec<usize> = (0..base).collect();
-        let sums: Vec<NormalEquations> = self.0.iter().map(|one| one.select_columns(&base)).collect();
+        let sums: Vec<NormalEquations> =
+            self.0.iter().map(|one| one.select_columns(&base)).collect();
         let values = weighted_least_squares(&sums)?;
         let part = |one: &NormalEquations| {
             if one.total > 0.0 {
@@ -283,7 +288,10 @@ fn effective_value(sums: &NormalEquations, squares: f64) -> f64 {
 
 /// Least squares with every drive weighed by what is left on it.
 fn weighted_least_squares(sums: &[NormalEquations]) -> Outcome<DVector<f64>> {
-    let mut deviations: Vec<f64> = sums.iter().map(|one| effective_value(one, one.total)).collect();
+    let mut deviations: Vec<f64> = sums
+        .iter()
+        .map(|one| effective_value(one, one.total))
+        .collect();
     let floors: Vec<f64> = deviations.iter().map(|size| 1e-6 * size).collect();
     let mut values = DVector::zeros(0);
     for _ in 0..=ROUNDS {
@@ -299,7 +307,9 @@ fn weighted_least_squares(sums: &[NormalEquations]) -> Outcome<DVector<f64>> {
                 "a run has numbers that are too large to be fitted; look at its units".to_owned(),
             ));
         }
-        let left = sums.iter().map(|one| effective_value(one, one.residual_squares(&values)));
+        let left = sums
+            .iter()
+            .map(|one| effective_value(one, one.residual_squares(&values)));
         deviations = left.zip(&floors).map(|(d, floor)| d.max(*floor)).collect();
     }
     Ok(values)

@@ -6,7 +6,9 @@
 
 use std::sync::Arc;
 
-use modelmill_identify::changes::{NormalEquations, RunPair, fit_single_change, single_change_gains};
+use modelmill_identify::changes::{
+    NormalEquations, RunPair, fit_single_change, single_change_gains,
+};
 use modelmill_identify::{LeastSquaresError, RFactor};
 use nalgebra::DVector;
 
@@ -15,8 +17,8 @@ use crate::model::Model;
 use crate::recording::PreparedRecording;
 use crate::runs::layout::RunColumnLayout;
 use crate::runs::payload::PayloadColumns;
-use crate::runs::rows::{RunRows, MeasuredMoments};
-use crate::runs::{RunAnalyser, RunChange, FittedValue, merge_known, changes};
+use crate::runs::rows::{MeasuredMoments, RunRows};
+use crate::runs::{FittedValue, RunAnalyser, RunChange, changes, merge_known};
 
 /// What all runs of a fleet are summed up and held against.
 #[derive(Clone)]
@@ -165,7 +167,12 @@ impl ReferenceFit {
 
     /// What later runs do not share with those before, the largest first; `within` is by what parts of one run, or runs that are
     /// taken to be alike, differ among themselves.
-    pub fn changes(&self, before: &[NormalEquations], later: &[NormalEquations], within: f64) -> Vec<RunChange> {
+    pub fn changes(
+        &self,
+        before: &[NormalEquations],
+        later: &[NormalEquations],
+        within: f64,
+    ) -> Vec<RunChange> {
         let bench = self.analyser();
         let runs = RunPair {
             reference: before.to_vec(),
@@ -182,7 +189,12 @@ impl ReferenceFit {
     }
 
     /// One of these changes, by its place among them, whatever it explains.
-    pub fn single_change(&self, before: &[NormalEquations], later: &NormalEquations, which: usize) -> RunChange {
+    pub fn single_change(
+        &self,
+        before: &[NormalEquations],
+        later: &NormalEquations,
+        which: usize,
+    ) -> RunChange {
         let bench = self.analyser();
         let found = fit_single_change(&pair_runs(before, later), &bench.search, which);
         changes::identified_change(&self.model, &bench.possible, &found, &self.values)

@@ -5,10 +5,10 @@ pub mod variances;
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{OptionName, OptionSetting, Remedy};
-use modelmill_codegen::{PoseFault, PoseReason, MotionStates};
+use modelmill_codegen::{MotionStates, PoseFault, PoseReason};
 use modelmill_identify::decimate_time;
 use modelmill_identify::diagnose::Disturbance;
-use modelmill_identify::{RecordingNote, PreparedRun, sample_place_word};
+use modelmill_identify::{PreparedRun, RecordingNote, sample_place_word};
 
 use crate::error::{Error, Outcome};
 use crate::model::Model;

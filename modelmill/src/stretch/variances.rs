@@ -3,7 +3,7 @@
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{OptionName, Remedy};
-use modelmill_identify::{SignalRecording, PreparedRun, sample_place_word};
+use modelmill_identify::{PreparedRun, SignalRecording, sample_place_word};
 
 use crate::error::{Error, Outcome};
 
@@ -18,7 +18,11 @@ pub fn recorded_variances(
     run: &PreparedRun,
     drives: &[String],
 ) -> Outcome<Option<Vec<Vec<f64>>>> {
-    if drives.is_empty() || !drives.iter().all(|drive| recording.has_column(&column(drive))) {
+    if drives.is_empty()
+        || !drives
+            .iter()
+            .all(|drive| recording.has_column(&column(drive)))
+    {
         return Ok(None);
     }
     // A run may have lost samples at its ends and at gaps; lines of the file tell which are left.

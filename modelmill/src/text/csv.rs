@@ -54,7 +54,8 @@ mod tests {
         let values = [1.5, -0.25e-30];
         let columns: Vec<(&str, &[f64])> = names.iter().map(|name| (*name, &values[..])).collect();
         let options = ReadOptions::default();
-        let read = SignalRecording::from_bytes(csv(&columns).as_bytes(), "run.csv", &options).unwrap();
+        let read =
+            SignalRecording::from_bytes(csv(&columns).as_bytes(), "run.csv", &options).unwrap();
         for name in names {
             assert_eq!(read.column(name).unwrap(), values, "{name}");
         }

@@ -10,7 +10,11 @@ pub enum ColumnAlignment {
 }
 
 /// Lays out rows under a head, two blanks between columns, `indent` blanks in front; no trailing blanks.
-pub fn table(indent: usize, columns: &[(&str, ColumnAlignment)], rows: &[Vec<String>]) -> Vec<String> {
+pub fn table(
+    indent: usize,
+    columns: &[(&str, ColumnAlignment)],
+    rows: &[Vec<String>],
+) -> Vec<String> {
     let head: Vec<String> = columns.iter().map(|(name, _)| (*name).to_owned()).collect();
     let all: Vec<&Vec<String>> = std::iter::once(&head).chain(rows).collect();
     let widths: Vec<usize> = (0..columns.len())
@@ -129,7 +133,14 @@ mod tests {
             vec!["a".to_owned(), "1".to_owned()],
             vec!["long".to_owned(), "10".to_owned()],
         ];
-        let lines = table(2, &[("name", ColumnAlignment::Left), ("n", ColumnAlignment::Right)], &rows);
+        let lines = table(
+            2,
+            &[
+                ("name", ColumnAlignment::Left),
+                ("n", ColumnAlignment::Right),
+            ],
+            &rows,
+        );
         assert_eq!(lines, ["  name   n", "  a      1", "  long  10"]);
     }
 }

@@ -1,6 +1,6 @@
 //! What of one model is what of another: coordinates and drives of the same name.
 
-use modelmill_identify::{RecordingNote, PreparedRun};
+use modelmill_identify::{PreparedRun, RecordingNote};
 
 use crate::error::{Error, Outcome};
 use crate::model::Model;

@@ -1,6 +1,6 @@
 //! Limits of the model files along motions: which the variant exceeds, and which both do.
 
-use modelmill_identify::excite::{LimitMargin, ExcitationMotion, ExcitationPlant};
+use modelmill_identify::excite::{ExcitationMotion, ExcitationPlant, LimitMargin};
 
 use crate::error::{Error, Outcome};
 use crate::excite::plant::{AXES, ModelPlant, used_fraction};

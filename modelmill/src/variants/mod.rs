@@ -83,7 +83,10 @@ impl VariantComparison {
     /// depend on the load see the force that their own model has without them, so that a recording needs no forces.
     ///
     /// Fails when the models do not have the same active coordinates, have no drive in common, or cannot follow a motion.
-    pub fn along_recordings(models: [&Model; 2], runs: [&[&PreparedRecording]; 2]) -> Outcome<Self> {
+    pub fn along_recordings(
+        models: [&Model; 2],
+        runs: [&[&PreparedRecording]; 2],
+    ) -> Outcome<Self> {
         let counterparts = ModelCounterparts::match_models(models)?;
         let stretches = |runs: &[&PreparedRecording]| -> Vec<RecordingSegment> {
             runs.iter().flat_map(|one| one.segments.clone()).collect()
@@ -185,7 +188,10 @@ fn forces_of(model: &Model, states: &RecordingSegment) -> Outcome<Vec<Vec<f64>>>
 
 /// Which effects see the load, and what they take for it.
 fn load_note(models: [&Model; 2]) -> Option<RecordingNote> {
-    let mut effects: Vec<&str> = models.iter().flat_map(|m| m.load_dependent_effects()).collect();
+    let mut effects: Vec<&str> = models
+        .iter()
+        .flat_map(|m| m.load_dependent_effects())
+        .collect();
     effects.sort_unstable();
     effects.dedup();
     (!effects.is_empty()).then(|| {

@@ -3,7 +3,7 @@
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::Message;
-use modelmill_spec::{DriveKind, ModelEffect, Mechanics, Mechanism, EffectPlace, PointIdx};
+use modelmill_spec::{DriveKind, EffectPlace, Mechanics, Mechanism, ModelEffect, PointIdx};
 
 use super::DescriptionFormat;
 
@@ -50,7 +50,11 @@ pub(super) fn passive_effects(
             continue;
         }
         if !add_effect(mechanism, effect, format, &mut found) {
-            let places: Vec<String> = effect.places.iter().map(|p| place_text(mechanism, *p)).collect();
+            let places: Vec<String> = effect
+                .places
+                .iter()
+                .map(|p| place_text(mechanism, *p))
+                .collect();
             remarks.push(message!(
                 "`{}` at {} is left out: {} has nothing like it",
                 effect.kind,
@@ -63,7 +67,12 @@ pub(super) fn passive_effects(
 }
 
 /// Takes an effect in; false if the format has nothing like it.
-fn add_effect(mechanism: &Mechanism, effect: &ModelEffect, format: DescriptionFormat, found: &mut PassiveEffects) -> bool {
+fn add_effect(
+    mechanism: &Mechanism,
+    effect: &ModelEffect,
+    format: DescriptionFormat,
+    found: &mut PassiveEffects,
+) -> bool {
     let value = |symbol: &str| {
         let term = effect.terms.iter().find(|term| term.symbol == symbol);
         term.map_or(0.0, |term| mechanism.parameters[term.parameter.0].nominal)
@@ -131,7 +140,10 @@ fn add_effect(mechanism: &Mechanism, effect: &ModelEffect, format: DescriptionFo
                 }
                 DriveKind::Linear { .. } => return false,
             },
-            EffectPlace::Point(_) | EffectPlace::Part(_) | EffectPlace::Base | EffectPlace::Force => return false,
+            EffectPlace::Point(_)
+            | EffectPlace::Part(_)
+            | EffectPlace::Base
+            | EffectPlace::Force => return false,
         }
     }
     true

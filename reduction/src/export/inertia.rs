@@ -2,7 +2,9 @@
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{CommandName, Message, OptionName, Remedy};
-use modelmill_spec::{ExactExpression, FrameIdx, PartInertia, LumpedMass, Mechanism, ModelPart, EffectPlace};
+use modelmill_spec::{
+    EffectPlace, ExactExpression, FrameIdx, LumpedMass, Mechanism, ModelPart, PartInertia,
+};
 use nalgebra::{Matrix3, Vector3};
 
 use super::ExportError;
@@ -77,13 +79,19 @@ impl LinkInertia {
 }
 
 /// What each link carries.
-pub(super) fn bodies(mechanism: &Mechanism, tree: &LinkTree) -> Result<Vec<LinkInertia>, ExportError> {
-    let value = |exact: &ExactExpression| exact.evaluate(&|symbol| mechanism.symbol_nominal(symbol));
+pub(super) fn bodies(
+    mechanism: &Mechanism,
+    tree: &LinkTree,
+) -> Result<Vec<LinkInertia>, ExportError> {
+    let value =
+        |exact: &ExactExpression| exact.evaluate(&|symbol| mechanism.symbol_nominal(symbol));
     let vector = |exact: &[ExactExpression; 3]| Vector3::from_fn(|k, _| value(&exact[k]));
     let mut bodies = vec![LinkInertia::NONE; tree.links.len()];
     let mut add = |frame: FrameIdx, body: &LinkInertia| {
         let link = tree.link_of[frame.0];
-        let placed = tree.links[link].placed.relative_placement(&tree.frames[frame.0]);
+        let placed = tree.links[link]
+            .placed
+            .relative_placement(&tree.frames[frame.0]);
         bodies[link].add(&body.in_outer_frame(&placed));
     };
     let of_effects = mechanism.effects.iter().map(|effect| &effect.bodies);
@@ -106,7 +114,9 @@ pub(super) fn bodies(mechanism: &Mechanism, tree: &LinkTree) -> Result<Vec<LinkI
     }
     for effect in mechanism.effects.iter().filter(|e| e.mechanics.is_none()) {
         for place in &effect.places {
-            let EffectPlace::Point(at) = place else { continue };
+            let EffectPlace::Point(at) = place else {
+                continue;
+            };
             let at = &mechanism.points[at.0];
             for term in &effect.terms {
                 let mass = mechanism.parameters[term.parameter.0].nominal * value(&term.expression);
@@ -162,7 +172,11 @@ fn from_part(
 
 /// Gives links that only slide, or turn about one direction, moments of inertia that a body can have: those that the model
 /// does not say are not felt.
-pub(super) fn complete_inertias(tree: &LinkTree, bodies: &mut [LinkInertia], remarks: &mut Vec<Message>) {
+pub(super) fn complete_inertias(
+    tree: &LinkTree,
+    bodies: &mut [LinkInertia],
+    remarks: &mut Vec<Message>,
+) {
     let mut completed = Vec::new();
     for (l, link) in tree.links.iter().enumerate().skip(1) {
         let body = &mut bodies[l];
@@ -170,7 +184,9 @@ pub(super) fn complete_inertias(tree: &LinkTree, bodies: &mut [LinkInertia], rem
             continue;
         }
         let central = match link_rotation(tree, l) {
-            LinkRotation::Never => body.mass * DEFAULT_RADIUS_OF_GYRATION.powi(2) * Matrix3::identity(),
+            LinkRotation::Never => {
+                body.mass * DEFAULT_RADIUS_OF_GYRATION.powi(2) * Matrix3::identity()
+            }
             LinkRotation::OneAxis(axis) => {
                 let n = link.placed.rotation.transpose() * axis;
                 let about = n.dot(&(body.central_inertia() * n));
@@ -213,7 +229,9 @@ fn link_rotation(tree: &LinkTree, mut link: usize) -> LinkRotation {
         for joint in one.joints.iter().filter(|joint| joint.is_rotation) {
             turns = match turns {
                 LinkRotation::Never => LinkRotation::OneAxis(joint.axis),
-                LinkRotation::OneAxis(axis) if axis.cross(&joint.axis).norm() < 1e-9 => LinkRotation::OneAxis(axis),
+                LinkRotation::OneAxis(axis) if axis.cross(&joint.axis).norm() < 1e-9 => {
+                    LinkRotation::OneAxis(axis)
+                }
                 _ => return LinkRotation::AnyAxis,
             };
         }
@@ -239,7 +257,11 @@ fn inertia_fault(body: &LinkInertia) -> Option<&'static str> {
 }
 
 /// Tells of links that no body can be: simulators refuse them, or move them as nothing moves.
-pub(super) fn report_impossible(tree: &LinkTree, bodies: &[LinkInertia], remarks: &mut Vec<Message>) {
+pub(super) fn report_impossible(
+    tree: &LinkTree,
+    bodies: &[LinkInertia],
+    remarks: &mut Vec<Message>,
+) {
     for (link, body) in tree.links.iter().zip(bodies).skip(1) {
         let Some(fault) = inertia_fault(body).filter(|_| !body.is_zero()) else {
             continue;

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::Message;
-use modelmill_spec::{CoordinateIdx, ModelDrive, DriveKind, Mechanism, PointIdx};
+use modelmill_spec::{CoordinateIdx, DriveKind, Mechanism, ModelDrive, PointIdx};
 use nalgebra::UnitQuaternion;
 
 use super::friction::{PassiveEffects, PassiveProperties};
@@ -113,7 +113,9 @@ impl MjcfWriter<'_> {
 
     fn body(&mut self, at: usize) {
         let link = &self.tree.links[at];
-        let placed = self.tree.links[link.parent].placed.relative_placement(&link.placed);
+        let placed = self.tree.links[link.parent]
+            .placed
+            .relative_placement(&link.placed);
         let turn = UnitQuaternion::from_rotation_matrix(&orthonormal(&placed.rotation));
         let head = format!(
             " name=\"{}\" pos=\"{}\" quat=\"{}\"",
@@ -154,7 +156,12 @@ impl MjcfWriter<'_> {
             let limits = self.mechanism.limits.coordinates.iter();
             let of = limits.clone().find(|(i, _)| i.0 == joint.coordinate);
             if let Some([low, high]) = of.and_then(|(_, one)| one.position) {
-                let _ = write!(text, " range=\"{} {}\"", number_text(low), number_text(high));
+                let _ = write!(
+                    text,
+                    " range=\"{} {}\"",
+                    number_text(low),
+                    number_text(high)
+                );
             }
             text += &passive_attributes(&self.friction.joints[joint.coordinate], "springref");
         }
@@ -287,7 +294,11 @@ impl MjcfWriter<'_> {
             let limits = m.limits.forces.iter();
             let range = limits.clone().find(|(i, _)| Some(i.0) == d);
             let range = range.map_or(String::new(), |(_, [low, high])| {
-                format!(" ctrlrange=\"{} {}\"", number_text(*low), number_text(*high))
+                format!(
+                    " ctrlrange=\"{} {}\"",
+                    number_text(*low),
+                    number_text(*high)
+                )
             });
             lines.push(format!("<motor name=\"{}\" {on}{range}/>", drive.name));
         }

@@ -72,7 +72,10 @@ impl std::error::Error for ExportError {}
 ///
 /// Fails where a joint moves in a way that the format does not know, or a mass sits at different places for the balances of
 /// forces and of moments.
-pub fn export(mechanism: &Mechanism, format: DescriptionFormat) -> Result<DescriptionExport, ExportError> {
+pub fn export(
+    mechanism: &Mechanism,
+    format: DescriptionFormat,
+) -> Result<DescriptionExport, ExportError> {
     let mut remarks = Vec::new();
     // Closed loops are shown as they stand; the zeros of a tree are its own.
     let at: Vec<f64> = match format {
@@ -97,7 +100,9 @@ pub fn export(mechanism: &Mechanism, format: DescriptionFormat) -> Result<Descri
     let friction = friction::passive_effects(mechanism, format, &mut remarks);
     let text = match format {
         DescriptionFormat::Urdf => urdf::write(mechanism, &tree, &bodies, &friction, &mut remarks),
-        DescriptionFormat::Mjcf => mjcf::write(mechanism, &tree, &bodies, &friction, &at, &mut remarks),
+        DescriptionFormat::Mjcf => {
+            mjcf::write(mechanism, &tree, &bodies, &friction, &at, &mut remarks)
+        }
     };
     Ok(DescriptionExport { text, remarks })
 }
@@ -112,8 +117,12 @@ struct FollowedCoordinate {
 }
 
 /// Couplings that formats have; those to several coordinates they have not, which is said.
-fn followed_coordinates(mechanism: &Mechanism, remarks: &mut Vec<Message>) -> Vec<FollowedCoordinate> {
-    let value = |exact: &ExactExpression| exact.evaluate(&|symbol| mechanism.symbol_nominal(symbol));
+fn followed_coordinates(
+    mechanism: &Mechanism,
+    remarks: &mut Vec<Message>,
+) -> Vec<FollowedCoordinate> {
+    let value =
+        |exact: &ExactExpression| exact.evaluate(&|symbol| mechanism.symbol_nominal(symbol));
     let mut found = Vec::new();
     for coupling in &mechanism.couplings {
         if let [(of, factor)] = &coupling.terms[..] {

@@ -1,6 +1,6 @@
 //! Links and joints: frames that move as one are one link, and each motion of a coordinate between two of them is a joint.
 
-use modelmill_spec::{Kinematics, Mechanism, PointIdx, FrameStep};
+use modelmill_spec::{FrameStep, Kinematics, Mechanism, PointIdx};
 use nalgebra::{Matrix3, Vector3};
 
 use super::{ExportError, FollowedCoordinate};
@@ -108,7 +108,10 @@ pub(super) fn link_tree(mechanism: &Mechanism, at: &[f64]) -> Result<LinkTree, E
     for (f, pose) in poses.frames().iter().enumerate().skip(1) {
         let frame = &mechanism.frames[f];
         let parent = link_of[frame.parent.0];
-        let is_free = frame.steps.iter().any(|step| matches!(step, FrameStep::Free(_)));
+        let is_free = frame
+            .steps
+            .iter()
+            .any(|step| matches!(step, FrameStep::Free(_)));
         if pose.joint_axes.is_empty() && !is_free {
             link_of.push(parent);
             continue;

@@ -155,9 +155,14 @@ fn joint_element(
         let bounds = if kind == "continuous" {
             String::new()
         } else {
-            format!("lower=\"{}\" upper=\"{}\" ", number_text(low), number_text(high))
+            format!(
+                "lower=\"{}\" upper=\"{}\" ",
+                number_text(low),
+                number_text(high)
+            )
         };
-        let most = |range: Option<[f64; 2]>| range.map_or(UNLIMITED_RANGE, |r| r[0].abs().max(r[1].abs()));
+        let most =
+            |range: Option<[f64; 2]>| range.map_or(UNLIMITED_RANGE, |r| r[0].abs().max(r[1].abs()));
         let _ = writeln!(
             text,
             "    <limit {bounds}effort=\"{}\" velocity=\"{}\"/>",

@@ -74,7 +74,11 @@ impl FrameChain {
     }
 
     /// Gaps of all pairs, their derivatives by the variables, and the size of the mechanism.
-    pub(crate) fn gaps(&self, pairs: &[CoincidentPair], values: &[f64]) -> (DVector<f64>, DMatrix<f64>, f64) {
+    pub(crate) fn gaps(
+        &self,
+        pairs: &[CoincidentPair],
+        values: &[f64],
+    ) -> (DVector<f64>, DMatrix<f64>, f64) {
         let posed = self.pose(values);
         let mut gaps = DVector::zeros(3 * pairs.len());
         let mut rows = DMatrix::zeros(3 * pairs.len(), self.n_variables);
@@ -112,9 +116,9 @@ impl FrameChain {
     pub(crate) fn align_pairs(&self, pairs: &mut [CoincidentPair], values: &[f64]) {
         let posed = self.pose(values);
         for pair in pairs {
-            let [place, other] = pair
-                .ends
-                .map(|(frame, _)| frame.map_or(DescriptionPose::identity(), |frame| posed[frame].at));
+            let [place, other] = pair.ends.map(|(frame, _)| {
+                frame.map_or(DescriptionPose::identity(), |frame| posed[frame].at)
+            });
             let first = place.p + place.r * pair.ends[0].1;
             pair.ends[1].1 = other.r.transpose() * (first - other.p);
         }

@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::chain::{FrameChain, CoincidentPair, rank};
+use super::chain::{CoincidentPair, FrameChain, rank};
 
 /// Gaps, relative to the size, up to which loops close.
 const CLOSED: f64 = 1e-11;
@@ -78,7 +78,9 @@ pub(crate) fn close_loops(
         least = least.min(gap);
         if gap < NEARLY_CLOSED {
             let is_inside = values.iter().zip(ranges).all(|(x, range)| {
-                range.is_none_or(|[low, high]| (low - RANGE_TOLERANCE..=high + RANGE_TOLERANCE).contains(x))
+                range.is_none_or(|[low, high]| {
+                    (low - RANGE_TOLERANCE..=high + RANGE_TOLERANCE).contains(x)
+                })
             });
             if is_inside {
                 poses.push(values);
@@ -145,13 +147,21 @@ pub(crate) fn close_loops(
 }
 
 /// How many conditions of the pairs are independent, and the least of their singular values as a share of the largest.
-fn independent_conditions(chain: &FrameChain, pairs: &[CoincidentPair], values: &[f64]) -> (usize, f64) {
+fn independent_conditions(
+    chain: &FrameChain,
+    pairs: &[CoincidentPair],
+    values: &[f64],
+) -> (usize, f64) {
     let (gaps, rows, size) = chain.gaps(pairs, values);
     rank(&rows, ZERO_SHARE.max(GAP_FACTOR * gaps.amax() / size))
 }
 
 /// The pairs that say something that those before do not.
-fn independent_pairs(chain: &FrameChain, pairs: &[CoincidentPair], values: &[f64]) -> Vec<CoincidentPair> {
+fn independent_pairs(
+    chain: &FrameChain,
+    pairs: &[CoincidentPair],
+    values: &[f64],
+) -> Vec<CoincidentPair> {
     let mut kept: Vec<CoincidentPair> = Vec::new();
     let mut n = 0;
     for pair in pairs {
@@ -217,7 +227,12 @@ fn passive_conditioning(rows: &DMatrix<f64>, passive: &[bool]) -> f64 {
 }
 
 /// Columns in their order of which, beside those taken before, no less than a share is left; and how many.
-fn select_columns(rows: &DMatrix<f64>, order: &[usize], wanted: usize, least: f64) -> (Vec<bool>, usize) {
+fn select_columns(
+    rows: &DMatrix<f64>,
+    order: &[usize],
+    wanted: usize,
+    least: f64,
+) -> (Vec<bool>, usize) {
     let mut passive = vec![false; rows.ncols()];
     // Each made orthogonal to those chosen.
     let scale = rows.amax().max(f64::MIN_POSITIVE);

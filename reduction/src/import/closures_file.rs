@@ -64,7 +64,9 @@ pub(crate) fn read(text: &str) -> Result<ClosureFile, String> {
     }
     let list = |key: &str| -> (u32, Vec<String>) {
         let entry = entries.iter().find(|(_, name, _)| *name == key);
-        entry.map_or((0, Vec::new()), |(line, _, value)| (*line, list_words(value)))
+        entry.map_or((0, Vec::new()), |(line, _, value)| {
+            (*line, list_words(value))
+        })
     };
     let (line, ends) = list("closed_loop");
     let (_, kinds) = list("type");

@@ -2,7 +2,7 @@
 //!
 //! A joint whose angle is a whole multiple of another's shares its coordinate; any other one has a coordinate that follows.
 
-use super::description::{RobotDescription, DescriptionJoint, DescriptionJointKind};
+use super::description::{DescriptionJoint, DescriptionJointKind, RobotDescription};
 use crate::write::toml_float;
 
 /// Integer multiples of a coordinate beyond this make expressions that nobody wants.
@@ -59,7 +59,12 @@ pub(crate) fn resolve(description: &mut RobotDescription) -> Result<ImportCoupli
         .links
         .iter()
         .flat_map(|link| &link.joints)
-        .filter(|joint| matches!(joint.kind, DescriptionJointKind::Revolute | DescriptionJointKind::Prismatic))
+        .filter(|joint| {
+            matches!(
+                joint.kind,
+                DescriptionJointKind::Revolute | DescriptionJointKind::Prismatic
+            )
+        })
         .cloned()
         .collect();
     let mut rules = coupling_rules(description, &joints)?;
@@ -102,7 +107,9 @@ pub(crate) fn resolve(description: &mut RobotDescription) -> Result<ImportCoupli
                     ));
                 }
                 let shares = |of: usize| match (joint.kind, joints[of].kind) {
-                    (DescriptionJointKind::Revolute, DescriptionJointKind::Revolute) => fraction(ratio).is_some_and(|(_, q)| q == 1),
+                    (DescriptionJointKind::Revolute, DescriptionJointKind::Revolute) => {
+                        fraction(ratio).is_some_and(|(_, q)| q == 1)
+                    }
                     (one, other) => one == other,
                 };
                 JointFollower {
@@ -120,7 +127,10 @@ pub(crate) fn resolve(description: &mut RobotDescription) -> Result<ImportCoupli
 }
 
 /// Every joint by the joint that leads in the end.
-fn coupling_rules(description: &RobotDescription, joints: &[DescriptionJoint]) -> Result<Vec<Option<CouplingRule>>, String> {
+fn coupling_rules(
+    description: &RobotDescription,
+    joints: &[DescriptionJoint],
+) -> Result<Vec<Option<CouplingRule>>, String> {
     let index = |name: &str, line: u32| {
         joints
             .iter()

@@ -80,7 +80,12 @@ impl GeomShape {
     }
 
     /// The shape with a mass, or else a density.
-    pub(crate) fn inertial(&self, mass: Option<f64>, density: f64, at: DescriptionPose) -> DescriptionInertia {
+    pub(crate) fn inertial(
+        &self,
+        mass: Option<f64>,
+        density: f64,
+        at: DescriptionPose,
+    ) -> DescriptionInertia {
         let mass = mass.unwrap_or(density * self.volume);
         let moments = Vector3::from(self.moments) * mass;
         DescriptionInertia {

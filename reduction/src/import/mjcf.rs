@@ -7,11 +7,15 @@ use std::f64::consts::PI;
 use nalgebra::{Matrix3, Vector3};
 use roxmltree::{Document, Node};
 
-use super::description::{RobotDescription, DescriptionInertia, DescriptionJoint, DescriptionJointKind, DescriptionLink};
+use super::description::{
+    DescriptionInertia, DescriptionJoint, DescriptionJointKind, DescriptionLink, RobotDescription,
+};
 use super::geoms;
 use super::mjcf_defaults::MjcfDefaults;
 use super::placed::{DescriptionPose, rotation_about, rotation_from_quaternion};
-use super::xml::{located_message, children, exact_numbers, line, numbers, symmetric, vector, required_attribute};
+use super::xml::{
+    children, exact_numbers, line, located_message, numbers, required_attribute, symmetric, vector,
+};
 
 /// Sections that say nothing of how a robot moves.
 const NO_DYNAMICS: [&str; 12] = [
@@ -162,7 +166,10 @@ fn compiler(root: &Node) -> Result<MjcfCompiler, String> {
                 && sequence.chars().all(|c| "xyzXYZ".contains(c))
                 && (sequence == sequence.to_lowercase() || sequence == sequence.to_uppercase());
             if !is_fine {
-                return Err(located_message(&node, "expected three of x, y and z in `eulerseq`"));
+                return Err(located_message(
+                    &node,
+                    "expected three of x, y and z in `eulerseq`",
+                ));
             }
             sequence.clone_into(&mut out.euler);
         }
@@ -252,7 +259,11 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
     }
 
     /// Position and orientation of an element.
-    fn read_placement(&self, node: &Node<'a, 'i>, class: Option<&str>) -> Result<DescriptionPose, String> {
+    fn read_placement(
+        &self,
+        node: &Node<'a, 'i>,
+        class: Option<&str>,
+    ) -> Result<DescriptionPose, String> {
         let mut out = DescriptionPose::identity();
         if let Some(pos) = self.numbers(node, class, "pos")? {
             out.p = vector(pos);
@@ -349,7 +360,10 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
             .attribute("name")
             .map_or_else(|| format!("body{}", own + 1), str::to_owned);
         if self.out.links.iter().any(|link| link.name == name) {
-            return Err(located_message(node, &format!("two bodies are called `{name}`")));
+            return Err(located_message(
+                node,
+                &format!("two bodies are called `{name}`"),
+            ));
         }
         let parent = around
             .link
@@ -409,7 +423,10 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
                 } else if let Some(text) = given.attribute("diaginertia") {
                     Matrix3::from_diagonal(&vector(exact_numbers(&given, "diaginertia", text)?))
                 } else {
-                    return Err(located_message(&given, "it needs `diaginertia` or `fullinertia`"));
+                    return Err(located_message(
+                        &given,
+                        "it needs `diaginertia` or `fullinertia`",
+                    ));
                 };
                 DescriptionInertia {
                     mass,
@@ -470,7 +487,11 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
                 let class = child.attribute("childclass").or(class);
                 match child.tag_name().name() {
                     "frame" => {
-                        waiting.push((child, class, place.compose(&self.read_placement(&child, class)?)));
+                        waiting.push((
+                            child,
+                            class,
+                            place.compose(&self.read_placement(&child, class)?),
+                        ));
                     }
                     "geom" => shapes.extend(self.geom_inertia(&child, class, place)?),
                     _ => {}
@@ -525,21 +546,31 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
             let angle = axis.norm().atan2(z.z);
             placed.r = rotation_about(&axis.try_normalize(1e-12).unwrap_or_else(Vector3::x), angle);
         }
-        let shape = geoms::GeomShape::new(kind, &size, half).map_err(|fault| located_message(node, &fault))?;
+        let shape = geoms::GeomShape::new(kind, &size, half)
+            .map_err(|fault| located_message(node, &fault))?;
         Ok(shape.map(|shape| shape.inertial(mass, density, place.compose(&placed))))
     }
 
-    fn read_free_joint(&mut self, node: &Node<'a, 'i>, inside: MjcfContext<'a>) -> Result<(), String> {
+    fn read_free_joint(
+        &mut self,
+        node: &Node<'a, 'i>,
+        inside: MjcfContext<'a>,
+    ) -> Result<(), String> {
         let name = node.attribute("name").unwrap_or("root").to_owned();
         let Some(link) = inside.link else {
             return Ok(());
         };
         if self.out.links[link].parent.is_some() {
-            return Err(located_message(node, "a free joint belongs to a body of the world"));
+            return Err(located_message(
+                node,
+                "a free joint belongs to a body of the world",
+            ));
         }
-        self.out.links[link]
-            .joints
-            .push(DescriptionJoint::new(name, DescriptionJointKind::Free, line(node)));
+        self.out.links[link].joints.push(DescriptionJoint::new(
+            name,
+            DescriptionJointKind::Free,
+            line(node),
+        ));
         Ok(())
     }
 
@@ -557,7 +588,12 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
             "slide" => DescriptionJointKind::Prismatic,
             "ball" => DescriptionJointKind::Ball,
             "free" => return self.read_free_joint(node, inside),
-            other => return Err(located_message(node, &format!("no joint is of the type `{other}`"))),
+            other => {
+                return Err(located_message(
+                    node,
+                    &format!("no joint is of the type `{other}`"),
+                ));
+            }
         };
         let n = self.out.links[link].joints.len();
         let name = node.attribute("name").map_or_else(
@@ -591,7 +627,10 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
                 reader.angle(value)
             }
         };
-        if matches!(kind, DescriptionJointKind::Revolute | DescriptionJointKind::Prismatic) {
+        if matches!(
+            kind,
+            DescriptionJointKind::Revolute | DescriptionJointKind::Prismatic
+        ) {
             let zero = self.first(node, class, "ref")?;
             joint.zero = in_unit(self, zero);
         }

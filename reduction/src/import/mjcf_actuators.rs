@@ -6,7 +6,7 @@ use roxmltree::Node;
 
 use super::description::{DescriptionJointKind, StraightDrive};
 use super::mjcf::MjcfReader;
-use super::xml::{located_message, children, numbers, required_attribute};
+use super::xml::{children, located_message, numbers, required_attribute};
 
 impl<'a, 'i> MjcfReader<'a, 'i> {
     /// Which joints are driven, and by how much.
@@ -32,7 +32,9 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
                 let tendon = children(root, "tendon")
                     .flat_map(|section| section.children().collect::<Vec<_>>())
                     .find(|tendon| tendon.attribute("name") == Some(name))
-                    .ok_or_else(|| located_message(&node, &format!("no tendon is called `{name}`")))?;
+                    .ok_or_else(|| {
+                        located_message(&node, &format!("no tendon is called `{name}`"))
+                    })?;
                 if tendon.tag_name().name() != "fixed" {
                     self.add_tendon_drive(&node, &tendon, gear)?;
                     continue;
@@ -124,7 +126,12 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
             *end = (link, place.p);
         }
         let line = tendon.attribute("name").unwrap_or_default().to_owned();
-        if self.out.straight_drives.iter().any(|known| known.tendon == line) {
+        if self
+            .out
+            .straight_drives
+            .iter()
+            .any(|known| known.tendon == line)
+        {
             self.out.remarks.push(located_message(
                 node,
                 &format!("another actuator pulls the tendon `{line}` too: both are one drive here"),
@@ -143,7 +150,9 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
             name: node.attribute("name").unwrap_or(&line).to_owned(),
             line: super::xml::line(node),
             ends,
-            force: self.force_range(node)?.map(|range| scale_range(range, gear)),
+            force: self
+                .force_range(node)?
+                .map(|range| scale_range(range, gear)),
             damping,
             friction,
             armature: on_tendon + on_drive * gear * gear,
@@ -178,7 +187,12 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
     }
 
     /// Gives a joint its drive.
-    fn add_joint_drive(&mut self, node: &Node<'a, 'i>, name: &str, gear: f64) -> Result<(), String> {
+    fn add_joint_drive(
+        &mut self,
+        node: &Node<'a, 'i>,
+        name: &str,
+        gear: f64,
+    ) -> Result<(), String> {
         let range = self.force_range(node)?;
         let armature = self
             .numbers::<1>(node, None, "armature")?

@@ -3,7 +3,7 @@
 
 use roxmltree::Node;
 
-use super::xml::{located_message, children};
+use super::xml::{children, located_message};
 
 /// The classes of a file.
 #[derive(Default)]
@@ -32,7 +32,10 @@ impl<'a, 'i> MjcfDefaults<'a, 'i> {
             (Some(name), _) => name,
             (None, None) => "main",
             (None, Some(_)) => {
-                return Err(located_message(&node, "a default class needs the attribute `class`"));
+                return Err(located_message(
+                    &node,
+                    "a default class needs the attribute `class`",
+                ));
             }
         };
         self.classes.push(MjcfDefaultClass {
@@ -66,7 +69,9 @@ impl<'a, 'i> MjcfDefaults<'a, 'i> {
                 self.classes
                     .iter()
                     .position(|class| class.name == name)
-                    .ok_or_else(|| located_message(node, &format!("no default class is called `{name}`")))?,
+                    .ok_or_else(|| {
+                        located_message(node, &format!("no default class is called `{name}`"))
+                    })?,
             ),
         };
         let tag = node.tag_name().name();

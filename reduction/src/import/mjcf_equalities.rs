@@ -3,10 +3,13 @@
 use nalgebra::{Matrix3, Vector3};
 use roxmltree::Node;
 
-use super::description::{DescriptionClosure, DescriptionCoupling, ClosureConstraint};
+use super::description::{ClosureConstraint, DescriptionClosure, DescriptionCoupling};
 use super::mjcf::MjcfReader;
 use super::placed::{DescriptionPose, rotation_from_quaternion};
-use super::xml::{located_message, children, exact_numbers, line, number_attribute, numbers, vector, required_attribute};
+use super::xml::{
+    children, exact_numbers, line, located_message, number_attribute, numbers, required_attribute,
+    vector,
+};
 
 impl<'a, 'i> MjcfReader<'a, 'i> {
     fn link(&self, node: &Node, name: &str) -> Result<Option<usize>, String> {
@@ -19,7 +22,11 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
             .ok_or_else(|| located_message(node, &format!("no body is called `{name}`")))
     }
 
-    pub(super) fn site(&self, node: &Node, name: &str) -> Result<(Option<usize>, DescriptionPose), String> {
+    pub(super) fn site(
+        &self,
+        node: &Node,
+        name: &str,
+    ) -> Result<(Option<usize>, DescriptionPose), String> {
         let found = self.sites.iter().find(|(site, _, _)| site == name);
         found
             .map(|(_, link, placed)| (*link, *placed))
@@ -28,9 +35,10 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
 
     pub(super) fn read_equality(&mut self, node: &Node<'a, 'i>) -> Result<(), String> {
         if self.text(node, None, "active")? == Some("false") {
-            self.out
-                .remarks
-                .push(located_message(node, "this equality is not active and is left out"));
+            self.out.remarks.push(located_message(
+                node,
+                "this equality is not active and is left out",
+            ));
             return Ok(());
         }
         let tag = node.tag_name().name();
@@ -46,7 +54,10 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
                     ClosureConstraint::Frames
                 };
                 let ends = if node.attribute("site1").is_some() {
-                    let [one, other] = [required_attribute(node, "site1")?, required_attribute(node, "site2")?];
+                    let [one, other] = [
+                        required_attribute(node, "site1")?,
+                        required_attribute(node, "site2")?,
+                    ];
                     [self.site(node, &one)?, self.site(node, &other)?]
                 } else {
                     self.body_ends(node, tag)?
@@ -96,7 +107,8 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
             let relative = match pose {
                 Some([x, y, z, q @ ..]) if q.iter().any(|x| x.abs() > 0.0) => DescriptionPose {
                     p: Vector3::new(x, y, z),
-                    r: rotation_from_quaternion(q).ok_or_else(|| located_message(node, "`relpose` has no direction"))?,
+                    r: rotation_from_quaternion(q)
+                        .ok_or_else(|| located_message(node, "`relpose` has no direction"))?,
                 },
                 _ => in_world(one).inverse().compose(&in_world(other)),
             };
@@ -110,7 +122,10 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
             p: anchor,
             r: Matrix3::identity(),
         };
-        let second = in_world(other).inverse().compose(&in_world(one)).compose(&first);
+        let second = in_world(other)
+            .inverse()
+            .compose(&in_world(one))
+            .compose(&first);
         Ok([(one, first), (other, second)])
     }
 
@@ -220,6 +235,11 @@ fn tendon_joints(node: &Node<'_, '_>, name: &str) -> Result<Vec<(String, f64)>, 
     }
     let joints = children(&tendon, "joint");
     joints
-        .map(|joint| Ok((required_attribute(&joint, "joint")?, number_attribute(&joint, "coef")?)))
+        .map(|joint| {
+            Ok((
+                required_attribute(&joint, "joint")?,
+                number_attribute(&joint, "coef")?,
+            ))
+        })
         .collect()
 }

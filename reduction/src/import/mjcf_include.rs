@@ -14,7 +14,10 @@ const DEEPEST: usize = 20;
 /// itself. `read` gives the text of a file by its name.
 ///
 /// Text that is no XML, or no MJCF, stays as it is: reading it says what is wrong.
-pub fn expand_includes(text: &str, read: &dyn Fn(&str) -> Result<String, String>) -> Result<String, String> {
+pub fn expand_includes(
+    text: &str,
+    read: &dyn Fn(&str) -> Result<String, String>,
+) -> Result<String, String> {
     expand_file(text, read, &mut Vec::new(), 0)
 }
 

@@ -23,7 +23,7 @@ mod urdf;
 mod welds;
 mod xml;
 
-pub use mjcf_include::expand_includes as expand_includes;
+pub use mjcf_include::expand_includes;
 
 use std::fmt;
 

@@ -11,10 +11,13 @@ use modelmill_boundary::message;
 use modelmill_boundary::text::{Message, OptionName, Remedy};
 use nalgebra::{Matrix3, Vector3};
 
-use super::chain::{FrameChain, ChainMotion, ChainFrame, CoincidentPair};
+use super::chain::{ChainFrame, ChainMotion, CoincidentPair, FrameChain};
 use super::closing::{self, LoopSolution, RANGE_TOLERANCE};
 use super::couplings::{self, ImportCouplings, JointFollower};
-use super::description::{DescriptionClosure, RobotDescription, ClosureConstraint, DescriptionJoint, DescriptionJointKind, DescriptionLink};
+use super::description::{
+    ClosureConstraint, DescriptionClosure, DescriptionJoint, DescriptionJointKind, DescriptionLink,
+    RobotDescription,
+};
 use super::placed::{DescriptionPose, named_axis, roll_pitch_yaw, twelfths_of_pi};
 use super::{DescriptionImport, ImportedJoint, Options};
 use crate::write::{significant_digits, toml_float, toml_string};
@@ -94,7 +97,10 @@ struct ModelTextBuilder<'a> {
 }
 
 /// Makes the model file of a description.
-pub(crate) fn model_text(mut description: RobotDescription, options: &Options) -> Result<DescriptionImport, String> {
+pub(crate) fn model_text(
+    mut description: RobotDescription,
+    options: &Options,
+) -> Result<DescriptionImport, String> {
     let couplings = couplings::resolve(&mut description)?;
     let n = couplings.variables.len();
     let mut build = ModelTextBuilder {
@@ -147,7 +153,9 @@ impl ModelTextBuilder<'_> {
         let link = &description.links[index];
         let (mut frame, carried) = link
             .parent
-            .map_or((None, DescriptionPose::identity()), |parent| self.links[parent]);
+            .map_or((None, DescriptionPose::identity()), |parent| {
+                self.links[parent]
+            });
         let mut here = carried.compose(&link.at);
         let n = link.joints.len();
         for (k, joint) in link.joints.iter().enumerate() {
@@ -160,7 +168,9 @@ impl ModelTextBuilder<'_> {
             (frame, here) = match joint.kind {
                 DescriptionJointKind::Free => self.add_free_joint(joint, &here, &name),
                 DescriptionJointKind::Ball => self.add_ball_joint(joint, frame, &here, &name, tip),
-                DescriptionJointKind::Revolute | DescriptionJointKind::Prismatic => self.add_scalar_joint(description, joint, frame, &here, &name)?,
+                DescriptionJointKind::Revolute | DescriptionJointKind::Prismatic => {
+                    self.add_scalar_joint(description, joint, frame, &here, &name)?
+                }
             };
         }
         self.links.push((frame, here));
@@ -298,11 +308,20 @@ impl ModelTextBuilder<'_> {
     }
 
     /// The coordinate of a joint that follows another coordinate.
-    fn follower(&mut self, joint: &DescriptionJoint, leader: &str, follows: &JointFollower) -> String {
+    fn follower(
+        &mut self,
+        joint: &DescriptionJoint,
+        leader: &str,
+        follows: &JointFollower,
+    ) -> String {
         let own = self.unique_name(&joint.name);
         let offset = self.offset(&format!("{}_offset", joint.name), follows.offset, joint);
         let ratio = if follows.changes_kind {
-            let unit = if joint.kind == DescriptionJointKind::Revolute { "1/m" } else { "m" };
+            let unit = if joint.kind == DescriptionJointKind::Revolute {
+                "1/m"
+            } else {
+                "m"
+            };
             let per = self.unique_name(&format!("{}_per_{leader}", joint.name));
             let _ = writeln!(
                 self.constants,
@@ -463,7 +482,12 @@ impl ModelTextBuilder<'_> {
     }
 
     /// A body that hangs on nothing.
-    fn add_free_joint(&mut self, joint: &DescriptionJoint, link: &DescriptionPose, name: &str) -> (Option<usize>, DescriptionPose) {
+    fn add_free_joint(
+        &mut self,
+        joint: &DescriptionJoint,
+        link: &DescriptionPose,
+        name: &str,
+    ) -> (Option<usize>, DescriptionPose) {
         let own = self.unique_name(name);
         let quaternion = nalgebra::UnitQuaternion::from_matrix(&link.r);
         let [x, y, z, w] = quaternion.coords.into();
@@ -551,7 +575,12 @@ impl ModelTextBuilder<'_> {
     }
 
     /// Puts a link into the body that carries it.
-    fn add_inertia(&mut self, link: &DescriptionLink, frame: Option<usize>, at: &DescriptionPose) -> Result<(), String> {
+    fn add_inertia(
+        &mut self,
+        link: &DescriptionLink,
+        frame: Option<usize>,
+        at: &DescriptionPose,
+    ) -> Result<(), String> {
         let (name, mass, matrix) = (&link.name, link.inertial.mass, link.inertial.inertia);
         let placed = at.compose(&link.inertial.at);
         if mass < 0.0 {
@@ -618,7 +647,11 @@ impl ModelTextBuilder<'_> {
             let offsets: &[[f64; 3]] = match closure.constraint {
                 ClosureConstraint::Origins => &[[0.0; 3]],
                 ClosureConstraint::Axes => &[[0.0; 3], [ORIENTATION_ARM, 0.0, 0.0]],
-                ClosureConstraint::Frames => &[[0.0; 3], [ORIENTATION_ARM, 0.0, 0.0], [0.0, ORIENTATION_ARM, 0.0]],
+                ClosureConstraint::Frames => &[
+                    [0.0; 3],
+                    [ORIENTATION_ARM, 0.0, 0.0],
+                    [0.0, ORIENTATION_ARM, 0.0],
+                ],
             };
             for offset in offsets {
                 let ends = closure.ends.map(|(link, placed)| {
@@ -643,7 +676,8 @@ impl ModelTextBuilder<'_> {
             .iter()
             .map(|acts| acts.range.filter(|[low, high]| low < high))
             .collect();
-        let closed = closing::close_loops(&self.chain, &pairs, &self.start, &ranges, &self.reluctance)?;
+        let closed =
+            closing::close_loops(&self.chain, &pairs, &self.start, &ranges, &self.reluctance)?;
         for coordinate in &mut self.coordinates {
             let Some(variable) = coordinate.variable else {
                 continue;
@@ -687,7 +721,11 @@ impl ModelTextBuilder<'_> {
     }
 
     /// Fails where a loop would act between a free body and something else.
-    fn check_free_ends(&self, closure: &DescriptionClosure, ends: [Option<usize>; 2]) -> Result<(), String> {
+    fn check_free_ends(
+        &self,
+        closure: &DescriptionClosure,
+        ends: [Option<usize>; 2],
+    ) -> Result<(), String> {
         let roots = ends.map(|mut frame| {
             let mut root = None;
             while let Some(k) = frame {
@@ -878,7 +916,12 @@ impl ModelTextBuilder<'_> {
         }
     }
 
-    fn loops(&mut self, description: &RobotDescription, closed: Option<&LoopSolution>, text: &mut String) {
+    fn loops(
+        &mut self,
+        description: &RobotDescription,
+        closed: Option<&LoopSolution>,
+        text: &mut String,
+    ) {
         let Some(closed) = closed else { return };
         let mut loops = String::new();
         for pair in &closed.pairs {

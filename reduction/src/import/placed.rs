@@ -48,7 +48,9 @@ pub(crate) fn rotation_about(axis: &Vector3<f64>, angle: f64) -> Matrix3<f64> {
 
 /// `Rz(yaw) Ry(pitch) Rx(roll)`.
 pub(crate) fn rotation([roll, pitch, yaw]: [f64; 3]) -> Matrix3<f64> {
-    rotation_about(&Vector3::z(), yaw) * rotation_about(&Vector3::y(), pitch) * rotation_about(&Vector3::x(), roll)
+    rotation_about(&Vector3::z(), yaw)
+        * rotation_about(&Vector3::y(), pitch)
+        * rotation_about(&Vector3::x(), roll)
 }
 
 /// The rotation of a quaternion w, x, y, z of any length; none where it is zero.

@@ -5,9 +5,15 @@
 use nalgebra::{Matrix3, Vector3};
 use roxmltree::{Document, Node};
 
-use super::description::{DescriptionClosure, DescriptionCoupling, RobotDescription, ClosureConstraint, DescriptionInertia, DescriptionJoint, DescriptionJointKind, DescriptionLink};
-use super::placed::{DescriptionPose, rotation_from_quaternion, rotation};
-use super::xml::{located_message, child, children, exact_numbers, line, required_child, symmetric, vector, required_attribute};
+use super::description::{
+    ClosureConstraint, DescriptionClosure, DescriptionCoupling, DescriptionInertia,
+    DescriptionJoint, DescriptionJointKind, DescriptionLink, RobotDescription,
+};
+use super::placed::{DescriptionPose, rotation, rotation_from_quaternion};
+use super::xml::{
+    child, children, exact_numbers, line, located_message, required_attribute, required_child,
+    symmetric, vector,
+};
 
 /// Values beyond this stand for "no limit".
 const NO_LIMIT: f64 = 1e15;
@@ -81,7 +87,12 @@ pub(crate) fn read(document: &Document) -> Result<RobotDescription, String> {
     let links: Vec<Node> = children(&model, "link").collect();
     let mut places = Vec::new();
     for node in &links {
-        places.push(pose_in_model(&frames, &required_attribute(node, "name")?, node, 0)?);
+        places.push(pose_in_model(
+            &frames,
+            &required_attribute(node, "name")?,
+            node,
+            0,
+        )?);
     }
     let mut joints = Vec::new();
     for node in children(&model, "joint") {
@@ -144,12 +155,20 @@ fn model_frames<'a, 'i>(model: &Node<'a, 'i>) -> Result<Vec<SdfFrame<'a, 'i>>, S
 }
 
 /// Where a frame is in the model.
-fn pose_in_model(frames: &[SdfFrame], name: &str, from: &Node, depth: usize) -> Result<DescriptionPose, String> {
+fn pose_in_model(
+    frames: &[SdfFrame],
+    name: &str,
+    from: &Node,
+    depth: usize,
+) -> Result<DescriptionPose, String> {
     if name == "__model__" || name.is_empty() || name == "world" {
         return Ok(DescriptionPose::identity());
     }
     if depth > LONGEST_CHAIN {
-        return Err(located_message(from, "its pose refers to itself by way of others"));
+        return Err(located_message(
+            from,
+            "its pose refers to itself by way of others",
+        ));
     }
     let frame = frames
         .iter()
@@ -174,7 +193,8 @@ fn pose_of(node: &Node) -> Result<DescriptionPose, String> {
         let [px, py, pz, x, y, z, w] = exact_numbers(node, "pose", text)?;
         return Ok(DescriptionPose {
             p: Vector3::new(px, py, pz),
-            r: rotation_from_quaternion([w, x, y, z]).ok_or_else(|| located_message(node, "the quaternion is zero"))?,
+            r: rotation_from_quaternion([w, x, y, z])
+                .ok_or_else(|| located_message(node, "the quaternion is zero"))?,
         });
     }
     let [px, py, pz, angles @ ..] = exact_numbers::<6>(node, "pose", text)?;
@@ -271,8 +291,14 @@ fn joint(
         "revolute" | "continuous" => &[("axis", DescriptionJointKind::Revolute)],
         "prismatic" => &[("axis", DescriptionJointKind::Prismatic)],
         "ball" => &[("", DescriptionJointKind::Ball)],
-        "universal" | "revolute2" => &[("axis", DescriptionJointKind::Revolute), ("axis2", DescriptionJointKind::Revolute)],
-        "screw" => &[("axis", DescriptionJointKind::Revolute), ("axis", DescriptionJointKind::Prismatic)],
+        "universal" | "revolute2" => &[
+            ("axis", DescriptionJointKind::Revolute),
+            ("axis2", DescriptionJointKind::Revolute),
+        ],
+        "screw" => &[
+            ("axis", DescriptionJointKind::Revolute),
+            ("axis", DescriptionJointKind::Prismatic),
+        ],
         other => {
             return Err(located_message(
                 node,
@@ -315,14 +341,22 @@ fn joint(
 }
 
 /// A screw: limits and losses are those of its turn, and what slides follows.
-fn screw_coupling(node: &Node, turn: &DescriptionJoint, slide: &mut DescriptionJoint) -> Result<DescriptionCoupling, String> {
+fn screw_coupling(
+    node: &Node,
+    turn: &DescriptionJoint,
+    slide: &mut DescriptionJoint,
+) -> Result<DescriptionCoupling, String> {
     let pitch = number_of(node, "screw_thread_pitch")?.ok_or_else(|| {
         located_message(
             node,
             "it needs <screw_thread_pitch>, in metres for each turn; the older <thread_pitch> had several meanings",
         )
     })?;
-    let mut bare = DescriptionJoint::new(slide.name.clone(), DescriptionJointKind::Prismatic, slide.line);
+    let mut bare = DescriptionJoint::new(
+        slide.name.clone(),
+        DescriptionJointKind::Prismatic,
+        slide.line,
+    );
     (bare.axis, bare.anchor) = (slide.axis, slide.anchor);
     bare.is_driven = false;
     *slide = bare;
@@ -504,7 +538,10 @@ fn tree(
                     }
                 }
                 if !is_forward {
-                    if moving.iter().any(|joint| joint.kind == DescriptionJointKind::Ball) {
+                    if moving
+                        .iter()
+                        .any(|joint| joint.kind == DescriptionJointKind::Ball)
+                    {
                         out.remarks.push(format!(
                             "line {}: the ball joint `{}` is passed from child to parent: its angles are those of the parent",
                             between.line, between.name

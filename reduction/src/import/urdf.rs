@@ -5,10 +5,16 @@
 use nalgebra::Vector3;
 use roxmltree::{Document, Node};
 
-use super::closures_file::{self, JointReplacement, ClosureFile};
-use super::description::{DescriptionClosure, DescriptionCoupling, RobotDescription, ClosureConstraint, DescriptionInertia, DescriptionJoint, DescriptionJointKind, DescriptionLink};
+use super::closures_file::{self, ClosureFile, JointReplacement};
+use super::description::{
+    ClosureConstraint, DescriptionClosure, DescriptionCoupling, DescriptionInertia,
+    DescriptionJoint, DescriptionJointKind, DescriptionLink, RobotDescription,
+};
 use super::placed::DescriptionPose;
-use super::xml::{located_message, child, children, line, number_attribute, required_child, symmetric, three_numbers, vector, required_attribute};
+use super::xml::{
+    child, children, line, located_message, number_attribute, required_attribute, required_child,
+    symmetric, three_numbers, vector,
+};
 
 /// A joint between two links, as the file has it.
 struct UrdfJoint {
@@ -88,7 +94,10 @@ pub(crate) fn read(
             link.parent = out.links.iter().position(|link| link.name == joint.parent);
             link.at = joint.origin;
             link.joints.clone_from(&joint.joints);
-            if joint.joints.iter().any(|j| j.kind == DescriptionJointKind::Free)
+            if joint
+                .joints
+                .iter()
+                .any(|j| j.kind == DescriptionJointKind::Free)
                 && joint.parent != required_attribute(&root, "name")?
             {
                 return Err(format!(
@@ -97,8 +106,11 @@ pub(crate) fn read(
                 ));
             }
         } else if is_floating {
-            link.joints
-                .push(DescriptionJoint::new("root_joint".to_owned(), DescriptionJointKind::Free, line(&node)));
+            link.joints.push(DescriptionJoint::new(
+                "root_joint".to_owned(),
+                DescriptionJointKind::Free,
+                line(&node),
+            ));
         }
         out.links.push(link);
         for (j, joint) in joints.iter().enumerate() {
@@ -140,7 +152,10 @@ pub(crate) fn read(
 }
 
 /// Puts in the place of joints what the file of closures says that they are.
-fn replace_joints(joints: &mut [UrdfJoint], by: &[(String, JointReplacement)]) -> Result<(), String> {
+fn replace_joints(
+    joints: &mut [UrdfJoint],
+    by: &[(String, JointReplacement)],
+) -> Result<(), String> {
     for (name, becomes) in by {
         let found = joints.iter_mut().find(|joint| &joint.name == name);
         let Some(UrdfJoint { joints, line, .. }) = found else {
@@ -304,11 +319,17 @@ fn joint(node: &Node, out: &mut RobotDescription) -> Result<UrdfJoint, String> {
             Some(axis) => vector(three_numbers(&axis, "xyz")?),
             None => vector([1.0, 0.0, 0.0]),
         };
-        if joint.axis.norm() == 0.0 && matches!(kind, DescriptionJointKind::Revolute | DescriptionJointKind::Prismatic) {
+        if joint.axis.norm() == 0.0
+            && matches!(
+                kind,
+                DescriptionJointKind::Revolute | DescriptionJointKind::Prismatic
+            )
+        {
             return Err(located_message(node, "the axis has no direction"));
         }
         let (lower, upper) = (given(limit, "lower")?, given(limit, "upper")?);
-        if required_attribute(node, "type")? != "continuous" && (lower.is_some() || upper.is_some()) {
+        if required_attribute(node, "type")? != "continuous" && (lower.is_some() || upper.is_some())
+        {
             // An absent bound is zero, says the format.
             let range = [lower.unwrap_or(0.0), upper.unwrap_or(0.0)];
             joint.range = (range[0] < range[1]).then_some(range);
@@ -352,11 +373,18 @@ fn origin(of: &Node) -> Result<DescriptionPose, String> {
             Ok([0.0; 3])
         }
     };
-    Ok(DescriptionPose::from_xyz_rpy(or_zeros("xyz")?, or_zeros("rpy")?))
+    Ok(DescriptionPose::from_xyz_rpy(
+        or_zeros("xyz")?,
+        or_zeros("rpy")?,
+    ))
 }
 
 /// Puts in what a file of closures says: frames that coincide and joints that are driven.
-fn add_closures(out: &mut RobotDescription, joints: &[UrdfJoint], file: ClosureFile) -> Result<(), String> {
+fn add_closures(
+    out: &mut RobotDescription,
+    joints: &[UrdfJoint],
+    file: ClosureFile,
+) -> Result<(), String> {
     let place = |name: &str| -> Result<Option<usize>, String> {
         let joint = joints.iter().find(|joint| joint.name == name);
         let link = joint.map_or(name, |joint| joint.child.as_str());

@@ -7,7 +7,10 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::description::{DescriptionClosure, RobotDescription, ClosureConstraint, DescriptionJoint, DescriptionJointKind, DescriptionLink};
+use super::description::{
+    ClosureConstraint, DescriptionClosure, DescriptionJoint, DescriptionJointKind, DescriptionLink,
+    RobotDescription,
+};
 use super::placed::DescriptionPose;
 
 /// Axes meet where they come this near to each other, m.
@@ -29,7 +32,10 @@ struct LoopCut {
 impl LoopCut {
     /// Points before axes, and then as little as can be hung anew.
     fn rank(&self) -> (bool, usize) {
-        (self.constraint != ClosureConstraint::Origins, self.inverted_links.len())
+        (
+            self.constraint != ClosureConstraint::Origins,
+            self.inverted_links.len(),
+        )
     }
 }
 
@@ -69,7 +75,11 @@ fn ancestors(links: &[DescriptionLink], link: Option<usize>) -> Vec<usize> {
 }
 
 /// The joints at which what hangs between them and one end of a weld can go to the other end.
-fn possible_cuts(description: &RobotDescription, end: Option<usize>, other: Option<usize>) -> Vec<LoopCut> {
+fn possible_cuts(
+    description: &RobotDescription,
+    end: Option<usize>,
+    other: Option<usize>,
+) -> Vec<LoopCut> {
     let links = &description.links;
     let shared = ancestors(links, other);
     let mut turned = Vec::new();
@@ -83,9 +93,12 @@ fn possible_cuts(description: &RobotDescription, end: Option<usize>, other: Opti
         // Only what has one axis can be hung the other way round.
         let joints = &links[link].joints;
         if joints.len() > 1
-            || joints
-                .iter()
-                .any(|j| matches!(j.kind, DescriptionJointKind::Ball | DescriptionJointKind::Free))
+            || joints.iter().any(|j| {
+                matches!(
+                    j.kind,
+                    DescriptionJointKind::Ball | DescriptionJointKind::Free
+                )
+            })
         {
             break;
         }
@@ -164,7 +177,11 @@ fn cut_below(description: &RobotDescription, turned: &[usize]) -> Option<LoopCut
 fn is_ball(found: &[(DescriptionJointKind, DescriptionPose)]) -> bool {
     match found {
         [(DescriptionJointKind::Ball, _)] => true,
-        [(DescriptionJointKind::Revolute, a), (DescriptionJointKind::Revolute, b), (DescriptionJointKind::Revolute, c)] => {
+        [
+            (DescriptionJointKind::Revolute, a),
+            (DescriptionJointKind::Revolute, b),
+            (DescriptionJointKind::Revolute, c),
+        ] => {
             let meet = |x: &DescriptionPose| (x.p - a.p).amax() < MEETING_DISTANCE;
             let axes = Matrix3::from_columns(&[a.r.column(0), b.r.column(0), c.r.column(0)]);
             meet(b) && meet(c) && axes.determinant().abs() > COPLANAR_VOLUME
@@ -226,7 +243,10 @@ fn apply_cut(description: &mut RobotDescription, closure: usize, end: usize, cut
         at = before.inverse();
     }
     let DescriptionClosure {
-        line, ends, constraint: holds, ..
+        line,
+        ends,
+        constraint: holds,
+        ..
     } = &mut description.closures[closure];
     *holds = cut.constraint;
     *ends = [(carrier, in_carrier), (Some(own), cut.at)];
@@ -260,7 +280,8 @@ fn sort_links(description: &mut RobotDescription) {
             *link = link.map(place);
         }
     }
-    let mut links: Vec<(usize, DescriptionLink)> = description.links.drain(..).enumerate().collect();
+    let mut links: Vec<(usize, DescriptionLink)> =
+        description.links.drain(..).enumerate().collect();
     for (_, link) in &mut links {
         link.parent = link.parent.map(place);
     }

@@ -1,7 +1,9 @@
 //! What is not exact is found and sized: each number here is worked out by hand.
 
 use modelmill_boundary::files::MemoryFiles;
-use modelmill_reduction::{ReductionFinding, PlanarReduction, plan, default_plan, reduce, sampled_forces};
+use modelmill_reduction::{
+    PlanarReduction, ReductionFinding, default_plan, plan, reduce, sampled_forces,
+};
 use modelmill_rig::Rig;
 
 fn rig(text: &str) -> Rig {
@@ -186,7 +188,9 @@ fn a_rig_without_a_plan() {
         );
     }
 
-    let says = default_plan(&machine()).expect_err("a weld").in_library_words();
+    let says = default_plan(&machine())
+        .expect_err("a weld")
+        .in_library_words();
     assert!(
         says.contains("`weld` is no revolute joint") && says.contains("option `plan`"),
         "{says}"

@@ -184,7 +184,8 @@ fn the_report_names_every_approximation() {
     );
     let elbow = finding("elbow_left", "only translates");
     assert!(
-        !elbow.sizes[0].is_significant() && (elbow.sizes[1].value - 0.018_f64.hypot(0.062)).abs() < 1e-9
+        !elbow.sizes[0].is_significant()
+            && (elbow.sizes[1].value - 0.018_f64.hypot(0.062)).abs() < 1e-9
     );
     // A point mass has no inertia about itself.
     assert!((elbow.sizes[2].value - 0.12).abs() < 1e-9);

@@ -2,7 +2,7 @@
 
 use modelmill_boundary::files::MemoryFiles;
 use modelmill_codegen::{Derivation, ModelEvaluator, MotionStates, derive};
-use modelmill_reduction::{ImportOptions, DescriptionImport, import};
+use modelmill_reduction::{DescriptionImport, ImportOptions, import};
 
 use crate::lines;
 

@@ -8,7 +8,7 @@ use std::time::Instant;
 
 use modelmill_boundary::files::MemoryFiles;
 use modelmill_codegen::{Derivation, ModelEvaluator, MotionStates};
-use modelmill_reduction::{ImportOptions, DescriptionImport, ImportedJoint, import};
+use modelmill_reduction::{DescriptionImport, ImportOptions, ImportedJoint, import};
 use modelmill_spec::DriveKind;
 use nalgebra::{DMatrix, Matrix3, Quaternion, UnitQuaternion, Vector3};
 
@@ -487,8 +487,12 @@ fn check(name: &str) {
         Err(error) => panic!("{name}: not imported: {error}"),
     };
     let start = Instant::now();
-    let loaded = modelmill_spec::load("model.toml", &rigid(&imported.model), &MemoryFiles::default())
-        .unwrap_or_else(|failure| panic!("{name}: {failure}"));
+    let loaded = modelmill_spec::load(
+        "model.toml",
+        &rigid(&imported.model),
+        &MemoryFiles::default(),
+    )
+    .unwrap_or_else(|failure| panic!("{name}: {failure}"));
     // Ranks of the reference are those of the file's values.
     let derivation = match modelmill_codegen::derive(&loaded.mechanism.with_numeric_constants()) {
         Ok(derivation) => derivation,

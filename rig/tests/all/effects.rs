@@ -3,7 +3,9 @@
 use std::f64::consts::PI;
 
 use crate::common::{close, force, rig, states};
-use modelmill_rig::{RigLaw, Rig, CoordinateSamples, RigState, RigTracker, Trajectory, forces_along, simulate};
+use modelmill_rig::{
+    CoordinateSamples, Rig, RigLaw, RigState, RigTracker, Trajectory, forces_along, simulate,
+};
 
 /// A cart of 2 kg on an upright rail: its load is `2*(qdd + 9.81)`.
 fn cart() -> Rig {

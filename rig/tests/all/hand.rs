@@ -189,9 +189,10 @@ fn power_balances_energy() {
         let now = at(t);
         let mut balance = -growth;
         for (force, place) in forces(&rig, &now).expect("forces").iter().zip([0, 1]) {
-            let rate = modelmill_rig::place_motion(&rig, modelmill_rig::RigPlace::Drive(place), &now)
-                .expect("a drive")
-                .rate;
+            let rate =
+                modelmill_rig::place_motion(&rig, modelmill_rig::RigPlace::Drive(place), &now)
+                    .expect("a drive")
+                    .rate;
             balance += force * rate;
             largest = largest.max((force * rate).abs());
         }

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use modelmill_rig::{RigPlant, PlantError, Rig, RigState, RigTracker, energy, forces, load_file};
+use modelmill_rig::{PlantError, Rig, RigPlant, RigState, RigTracker, energy, forces, load_file};
 
 fn rig(name: &str) -> Rig {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../model-spec/rigs");

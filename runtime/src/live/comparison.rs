@@ -58,7 +58,11 @@ impl<T: Real, const NB: usize> WindowComparison<T, NB> {
     }
 
     /// Begins with a window and a reference as they are now.
-    pub(super) fn start(&mut self, reference: &RecursiveEstimator<T, NB>, window: &RecursiveEstimator<T, NB>) {
+    pub(super) fn start(
+        &mut self,
+        reference: &RecursiveEstimator<T, NB>,
+        window: &RecursiveEstimator<T, NB>,
+    ) {
         self.both = reference.rows;
         self.values = reference.values;
         self.change = [[T::from_f64(0.0); NB]; NB];
@@ -123,7 +127,11 @@ impl<T: Real, const NB: usize> WindowComparison<T, NB> {
     }
 
     /// The same for a further change besides that of parameter `first`.
-    pub(super) fn second_changes(&self, first: usize, singles: &[ChangeScore<T>; NB]) -> [ChangeScore<T>; NB] {
+    pub(super) fn second_changes(
+        &self,
+        first: usize,
+        singles: &[ChangeScore<T>; NB],
+    ) -> [ChangeScore<T>; NB] {
         let zero = T::from_f64(0.0);
         let mut common = [zero; NB];
         for row in &self.window {

@@ -306,7 +306,9 @@ mod tests {
         let mut estimator = RecursiveEstimator::<f64, 2>::new();
         assert!(!estimator.add([1.0, f64::NAN], 1.0));
         assert!(!estimator.add([1.0, 1.0], f64::INFINITY));
-        let nothing = estimator.solve(&EstimatorPrior::uninformative()).map(f64::to_bits);
+        let nothing = estimator
+            .solve(&EstimatorPrior::uninformative())
+            .map(f64::to_bits);
         assert_eq!(nothing, [0.0_f64.to_bits(); 2]);
     }
 }

@@ -20,6 +20,6 @@ mod options;
 mod scatter;
 mod watch;
 
-pub use estimator::{RecursiveEstimator, EstimatorPrior};
+pub use estimator::{EstimatorPrior, RecursiveEstimator};
 pub use options::Options;
-pub use watch::{WatchChange, WatchVerdict, ParameterWatch};
+pub use watch::{ParameterWatch, WatchChange, WatchVerdict};

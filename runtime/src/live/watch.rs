@@ -1,8 +1,8 @@
 //! The watch: samples in, a verdict out.
 
 use super::averages::{DriveAverages, WatchRow};
-use super::comparison::{WindowComparison, ChangeScore};
-use super::estimator::{RecursiveEstimator, EstimatorPrior};
+use super::comparison::{ChangeScore, WindowComparison};
+use super::estimator::{EstimatorPrior, RecursiveEstimator};
 use super::options::{Options, WatchSchedule};
 use super::scatter::WindowScatter;
 use crate::Real;
@@ -221,7 +221,11 @@ impl<T: Real, const NB: usize, const NQ: usize> ParameterWatch<T, NB, NQ> {
         let means = {
             let nominal = &self.nominal;
             let mut drives = self.drives.iter_mut();
-            [(); NQ].map(|()| drives.next().and_then(|drive| drive.end_block(share, nominal)))
+            [(); NQ].map(|()| {
+                drives
+                    .next()
+                    .and_then(|drive| drive.end_block(share, nominal))
+            })
         };
         let n_counted = means.iter().flatten().count();
         self.left_out += (NQ - n_counted) as u64;

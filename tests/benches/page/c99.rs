@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use modelmill_codegen::{Derivation, LANGUAGES, EmissionRequest};
+use modelmill_codegen::{Derivation, EmissionRequest, LANGUAGES};
 
 use crate::models::{Motion, STATES};
 

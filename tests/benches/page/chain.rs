@@ -3,8 +3,8 @@
 use std::fmt::Write as _;
 
 use modelmill_spec::{
-    FrameAxis, CoordinateIdx, DriveKind, ExactExpression, FrameIdx, PartInertia, LumpedMass, Mechanism, ModelPart, FrameStep,
-    ModelSymbol,
+    CoordinateIdx, DriveKind, ExactExpression, FrameAxis, FrameIdx, FrameStep, LumpedMass,
+    Mechanism, ModelPart, ModelSymbol, PartInertia,
 };
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
@@ -237,7 +237,10 @@ fn elementary(
     Ok((axis, slides, offset, moved))
 }
 
-fn symmetric(entries: &[ExactExpression; 6], number: &dyn Fn(&ExactExpression) -> f64) -> Matrix3<f64> {
+fn symmetric(
+    entries: &[ExactExpression; 6],
+    number: &dyn Fn(&ExactExpression) -> f64,
+) -> Matrix3<f64> {
     let [xx, xy, xz, yy, yz, zz] = std::array::from_fn(|i| number(&entries[i]));
     Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz)
 }
@@ -272,13 +275,17 @@ fn part(part: &ModelPart, number: &dyn Fn(&ExactExpression) -> f64) -> Body {
     }
 }
 
-fn lumped_mass(mass: &LumpedMass, number: &dyn Fn(&ExactExpression) -> f64) -> Result<Body, String> {
+fn lumped_mass(
+    mass: &LumpedMass,
+    number: &dyn Fn(&ExactExpression) -> f64,
+) -> Result<Body, String> {
     let vector = |v: &[ExactExpression; 3]| Vector3::from_fn(|i, _| number(&v[i]));
     let (position, other) = (vector(&mass.force_at), vector(&mass.moment_at));
     if position != other {
         return Err("forces and moments see a mass at different places".to_owned());
     }
-    let ratio = |n: &num_rational::BigRational| ExactExpression::Rational(n.clone()).evaluate(&|_| 0.0);
+    let ratio =
+        |n: &num_rational::BigRational| ExactExpression::Rational(n.clone()).evaluate(&|_| 0.0);
     let point = Body {
         mass: number(&mass.mass) * ratio(&mass.share),
         ..Body::default()

@@ -2,7 +2,9 @@
 
 use std::fmt::Write as _;
 
-use modelmill_codegen::{ReductionMethod, OperationCount, PassCount, StraightLineProgram, ProgramStage};
+use modelmill_codegen::{
+    OperationCount, PassCount, ProgramStage, ReductionMethod, StraightLineProgram,
+};
 use modelmill_tests::counts::{HEADINGS, best_known, row, text};
 use modelmill_tests::fixtures::derived;
 
@@ -36,7 +38,8 @@ pub(crate) fn passes(names: &[&str]) -> Result<Vec<Passes>, String> {
         .map(|name| {
             let derivation = derived(name);
             let fault = |error: modelmill_codegen::DeriveError| format!("{name}: {error}");
-            let count = |program: &StraightLineProgram| program.count_operations(ProgramStage::State);
+            let count =
+                |program: &StraightLineProgram| program.count_operations(ProgramStage::State);
             Ok(Passes {
                 name,
                 counts: derivation.operations_by_pass().map_err(fault)?,

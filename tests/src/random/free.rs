@@ -1,8 +1,8 @@
 //! Mechanisms taken off their base: everything that stood on it hangs on a body that nothing holds.
 
 use modelmill_spec::{
-    FrameConvention, JointCoordinate, CoordinateIdx, ModelDrive, DriveKind, ModelFrame, FrameIdx, FreeBody, Mechanism,
-    CoordinateMotion, FrameStep, TwistAxes,
+    CoordinateIdx, CoordinateMotion, DriveKind, FrameConvention, FrameIdx, FrameStep, FreeBody,
+    JointCoordinate, Mechanism, ModelDrive, ModelFrame, TwistAxes,
 };
 
 /// The mechanism with a free body between base and all else, which carries what the base did.

@@ -9,10 +9,11 @@ pub use planar_loop::{planar_loop, regularity_at};
 pub use tree::tree;
 
 use modelmill_spec::{
-    FrameAxis, EffectBodies, ModelConstant, ConstantIdx, FrameConvention, JointCoordinate, CoordinateIdx, ModelDrive, DriveIdx,
-    DriveKind, ModelEffect, EffectTerm, ExactExpression, ModelFrame, FrameIdx, ExactFunction, PartInertia, ExactLength, MotionLimits,
-    LumpedMass, Mechanism, CoordinateMotion, DynamicParameter, ParameterIdx, ModelPart, EffectPlace, PlaceQuantity, FramePoint,
-    PointIdx, RecordingColumns, FrameStep, ModelSymbol,
+    ConstantIdx, CoordinateIdx, CoordinateMotion, DriveIdx, DriveKind, DynamicParameter,
+    EffectBodies, EffectPlace, EffectTerm, ExactExpression, ExactFunction, ExactLength, FrameAxis,
+    FrameConvention, FrameIdx, FramePoint, FrameStep, JointCoordinate, LumpedMass, Mechanism,
+    ModelConstant, ModelDrive, ModelEffect, ModelFrame, ModelPart, ModelSymbol, MotionLimits,
+    ParameterIdx, PartInertia, PlaceQuantity, PointIdx, RecordingColumns,
 };
 use nalgebra::{Matrix3, Vector3};
 use num_rational::BigRational;
@@ -416,7 +417,8 @@ impl Draft {
                 continue;
             }
             let symbol = |quantity| ExactExpression::Symbol(ModelSymbol::Place(quantity));
-            let sign = ExactExpression::Apply(ExactFunction::Sign, Box::new(symbol(PlaceQuantity::Rate)));
+            let sign =
+                ExactExpression::Apply(ExactFunction::Sign, Box::new(symbol(PlaceQuantity::Rate)));
             let on_drive = self.stream.chance(0.6);
             let choices = [
                 ("viscous_friction", symbol(PlaceQuantity::Rate)),
@@ -425,7 +427,8 @@ impl Draft {
                 ("force_offset", number(1)),
                 if on_drive {
                     // A coordinate carries no load of its own.
-                    let friction = ExactExpression::Product(vec![symbol(PlaceQuantity::Load), sign]);
+                    let friction =
+                        ExactExpression::Product(vec![symbol(PlaceQuantity::Load), sign]);
                     ("load_friction", friction)
                 } else {
                     ("spring", symbol(PlaceQuantity::Coordinate))

@@ -1,7 +1,8 @@
 //! Random planar mechanisms of one loop.
 
 use modelmill_spec::{
-    ExactAngle, FrameAxis, CoordinateIdx, ExactExpression, FrameIdx, KinematicLoop, Mechanism, CoordinateMotion, PointIdx, FrameStep, ModelSymbol,
+    CoordinateIdx, CoordinateMotion, ExactAngle, ExactExpression, FrameAxis, FrameIdx, FrameStep,
+    KinematicLoop, Mechanism, ModelSymbol, PointIdx,
 };
 
 use super::{Draft, Matter, ZERO, number, ratio, shift, slide};
@@ -36,7 +37,10 @@ fn draw(seed: u64, matter: Matter) -> Option<Mechanism> {
         draft.constant("by", 0.0, "m"),
     );
     let symbol = |i| ExactExpression::Symbol(ModelSymbol::Constant(i));
-    let base_steps = vec![shift(FrameAxis::X, symbol(x)), shift(FrameAxis::Y, symbol(y))];
+    let base_steps = vec![
+        shift(FrameAxis::X, symbol(x)),
+        shift(FrameAxis::Y, symbol(y)),
+    ];
     let base = draft.frame(FrameIdx(0), base_steps);
     let right = draft.chain(base, n - n_left, &mut joints);
     draft.mechanism.loops.push(KinematicLoop {

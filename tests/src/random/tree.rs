@@ -1,6 +1,9 @@
 //! Random spatial trees of revolute and prismatic joints.
 
-use modelmill_spec::{ExactAngle, FrameAxis, CoordinateIdx, FrameIdx, Mechanism, CoordinateMotion, FrameStep, ModelSymbol};
+use modelmill_spec::{
+    CoordinateIdx, CoordinateMotion, ExactAngle, FrameAxis, FrameIdx, FrameStep, Mechanism,
+    ModelSymbol,
+};
 
 use super::{Draft, Matter, ZERO, ratio, shift, slide, small};
 
@@ -95,8 +98,12 @@ impl Draft {
                 fixed
             }
         };
-        let (about, along, joint, last) =
-            (axis(FrameAxis::X), axis(FrameAxis::X), axis(FrameAxis::Z), axis(FrameAxis::Z));
+        let (about, along, joint, last) = (
+            axis(FrameAxis::X),
+            axis(FrameAxis::X),
+            axis(FrameAxis::Z),
+            axis(FrameAxis::Z),
+        );
         let turn = ExactAngle {
             pi: ratio(0, 1),
             terms: vec![(ModelSymbol::Coordinate(coordinate), 1)],

@@ -3,7 +3,9 @@
 use std::fmt::Write;
 
 use modelmill_boundary::files::MemoryFiles;
-use modelmill_codegen::{DeriveError, ModelEvaluator, ReductionMethod, PassivePosition, MotionStates};
+use modelmill_codegen::{
+    DeriveError, ModelEvaluator, MotionStates, PassivePosition, ReductionMethod,
+};
 use modelmill_spec::{DriveKind, FrameIdx, Mechanism, PointIdx};
 use modelmill_tests::fixtures::{derive, fixtures, model};
 use modelmill_tests::laws::Case;
@@ -181,7 +183,10 @@ fn large_multiples_and_many_roots_come_to_an_end() {
         derive(&model("two_link")).reduction.retained.len() + 1
     );
     let roots = derive(&awkward("many_roots"));
-    assert!(matches!(roots.reduction.method, ReductionMethod::Numeric { .. }));
+    assert!(matches!(
+        roots.reduction.method,
+        ReductionMethod::Numeric { .. }
+    ));
 }
 
 /// Four-bars beside each other, each with a crank of its own, or in a row, each cranked by the rocker of the one before.

@@ -6,7 +6,10 @@ use modelmill_tests::sample::Sample;
 use modelmill_tests::stream::Stream;
 
 /// All rows that are shown, and how it ended.
-fn shown(evaluator: &ModelEvaluator<'_>, sample: &Sample) -> (Vec<Vec<f64>>, Result<(), PoseFault>) {
+fn shown(
+    evaluator: &ModelEvaluator<'_>,
+    sample: &Sample,
+) -> (Vec<Vec<f64>>, Result<(), PoseFault>) {
     let mut columns: Vec<Vec<f64>> = Vec::new();
     let end = evaluator.regressor_blocks::<PoseFault>(&sample.states(), |len, block| {
         columns.resize(block.len(), Vec::new());

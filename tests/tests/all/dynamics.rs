@@ -246,7 +246,8 @@ fn compare(
 ) {
     let dynamics = derivation.dynamics().expect("affine in the accelerations");
     let p_min = base(derivation, &nominal(&derivation.mechanism));
-    let expected = terms(&ModelEvaluator::new(derivation), &dynamics, one, &p_min).expect("a state");
+    let expected =
+        terms(&ModelEvaluator::new(derivation), &dynamics, one, &p_min).expect("a state");
     let close = |what: &str, a: &[f64], b: &[f64]| {
         let scale = largest(a);
         for (x, y) in a.iter().zip(b) {

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use modelmill_boundary::files::DiskFiles;
-use modelmill_codegen::{ModelEvaluator, ReductionMethod, MotionStates};
+use modelmill_codegen::{ModelEvaluator, MotionStates, ReductionMethod};
 use modelmill_rig::{Rig, RigState, RigTracker, forces};
 use modelmill_spec::Mechanism;
 use modelmill_tests::fixtures::{derive, fixtures, model_file};
@@ -395,7 +395,10 @@ fn what_pulls_two_points_together_obeys_virtual_power() {
             figure.unwrap_or_else(|breach| panic!("{model}: {breach}"));
         }
         let reduction = &case.derivation.reduction;
-        assert!(matches!(reduction.method, ReductionMethod::Exact { .. }), "{model}");
+        assert!(
+            matches!(reduction.method, ReductionMethod::Exact { .. }),
+            "{model}"
+        );
         // Nothing else pulls along that line.
         let more = reduction.retained.len() - plain.reduction.retained.len();
         assert_eq!(more, 3, "{model}");
@@ -417,7 +420,8 @@ fn an_element_needs_two_bodies() {
     ] {
         let more = effect("two_point_element", at, &[], &[]);
         let file = path.to_string_lossy();
-        let failure = modelmill_spec::load(&file, &format!("{text}\n{more}"), &DiskFiles::default());
+        let failure =
+            modelmill_spec::load(&file, &format!("{text}\n{more}"), &DiskFiles::default());
         let told = failure.map(|_| ()).expect_err("a refusal").to_string();
         assert!(told.contains(says), "{told}");
     }

@@ -1,7 +1,7 @@
 //! The emitted code: every model's module against the block evaluator, and both SpiderMill models against the tables.
 
 use crate::{fixture_models, random_models};
-use modelmill_codegen::{Derivation, ModelEvaluator, PoseReason, MotionStates};
+use modelmill_codegen::{Derivation, ModelEvaluator, MotionStates, PoseReason};
 use modelmill_generated as generated;
 use modelmill_runtime::{PoseError, Real};
 use modelmill_tests::base_parameters;

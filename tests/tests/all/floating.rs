@@ -4,7 +4,7 @@
 //! The tables come from `fixtures/reference/make_pinocchio_floating.py`, made by Pinocchio 4.1.
 
 use modelmill_codegen::{Derivation, ModelEvaluator};
-use modelmill_spec::{Mechanism, FrameStep, TwistAxes};
+use modelmill_spec::{FrameStep, Mechanism, TwistAxes};
 use modelmill_tests::base_parameters::{base, nominal, products};
 use modelmill_tests::fixtures::{Table, derive, derived, model};
 use modelmill_tests::laws::{Case, motion};

@@ -1,7 +1,7 @@
 //! Spatial loops: the laws of mechanics on parallel robots and arms with linkages, against code that shares nothing with
 //! the mill; closed forms where each leg allows them.
 
-use modelmill_codegen::{ModelEvaluator, ReductionMethod, PassivePosition};
+use modelmill_codegen::{ModelEvaluator, PassivePosition, ReductionMethod};
 use modelmill_tests::fixtures::{derived, model};
 use modelmill_tests::laws::{ACCURACY, Case};
 
@@ -123,7 +123,10 @@ fn drives_may_be_independent_instead_of_the_platform() {
     ] {
         let case = Case::near_nominal(&model(name), 160, 0.05).unwrap();
         let reduction = &case.derivation.reduction;
-        assert!(matches!(reduction.method, ReductionMethod::Exact { .. }), "{name}");
+        assert!(
+            matches!(reduction.method, ReductionMethod::Exact { .. }),
+            "{name}"
+        );
         laws(&case);
         // Which coordinates are independent changes neither the products nor their dependences.
         let other = derived(same);
@@ -139,7 +142,10 @@ fn platforms_of_three_freedoms() {
     for name in ["three_rrs", "three_prs"] {
         let case = Case::near_nominal(&model(name), 160, 0.1).unwrap();
         let method = &case.derivation.reduction.method;
-        assert!(matches!(method, ReductionMethod::Exact { .. }), "{name}: {method:?}");
+        assert!(
+            matches!(method, ReductionMethod::Exact { .. }),
+            "{name}: {method:?}"
+        );
         for error in [case.forces_satisfy_dalembert(10), case.loops_stay_closed()] {
             assert!(error.unwrap() < 100.0 * ACCURACY);
         }
@@ -152,6 +158,9 @@ fn platforms_of_three_freedoms() {
 fn equations_that_follow_from_others_are_left_out() {
     let case = Case::near_nominal(&model("spherical_wrist"), 160, 0.2).unwrap();
     let method = &case.derivation.reduction.method;
-    assert!(matches!(method, ReductionMethod::Exact { .. }), "{method:?}");
+    assert!(
+        matches!(method, ReductionMethod::Exact { .. }),
+        "{method:?}"
+    );
     laws(&case);
 }

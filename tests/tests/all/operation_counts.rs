@@ -1,7 +1,7 @@
 //! Operations per call of the straight-line programs, beside the lowest counts that other tools reach; and that fewer
 //! operations give the same values.
 
-use modelmill_codegen::{ModelEvaluator, OperationCount, StraightLineProgram, ProgramStage};
+use modelmill_codegen::{ModelEvaluator, OperationCount, ProgramStage, StraightLineProgram};
 use modelmill_tests::base_parameters::{base, products};
 use modelmill_tests::fixtures::derived;
 use modelmill_tests::sample::Sample;

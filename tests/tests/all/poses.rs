@@ -4,7 +4,7 @@
 use std::f64::consts::FRAC_PI_2;
 
 use crate::fixture_models as fixtures;
-use modelmill_codegen::{Derivation, ModelEvaluator, PoseFault, PoseReason, MotionStates};
+use modelmill_codegen::{Derivation, ModelEvaluator, MotionStates, PoseFault, PoseReason};
 use modelmill_generated::{spidermill, three_rrr};
 use modelmill_runtime::{Loops, PoseError};
 use modelmill_tests::base_parameters;

@@ -101,7 +101,9 @@ fn check_table(name: &str, table: &str) {
             );
         }
     };
-    let passive = evaluator.passive_motion(&sample.states()).expect("all in reach");
+    let passive = evaluator
+        .passive_motion(&sample.states())
+        .expect("all in reach");
     for (k, angle) in ["gamma1", "gamma2"].into_iter().enumerate() {
         close(angle, table.column(angle), &|i| passive[k][i]);
     }

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::{Arc, MutexGuard, PoisonError};
 
-use modelmill::excite::{TrajectoryLimit, Options, ExcitationRequest, limits};
+use modelmill::excite::{ExcitationRequest, Options, TrajectoryLimit, limits};
 use modelmill::files::PathKind;
 use modelmill::text::table::significant;
 use modelmill::{Error, Outcome};
@@ -76,7 +76,9 @@ impl ExcitationSettings {
                 "rate: expected 1 to 100000 samples per second, and no more than {MOST_SAMPLES} of them in a period"
             ));
         }
-        let limit = |text: &String| TrajectoryLimit::parse(text).map_err(|says| format!("`{text}`: {says}"));
+        let limit = |text: &String| {
+            TrajectoryLimit::parse(text).map_err(|says| format!("`{text}`: {says}"))
+        };
         Ok(ExcitationRequest {
             options: Options {
                 harmonics: self.harmonics,
@@ -171,7 +173,12 @@ impl WorkbenchSession {
         Ok(self.excitation())
     }
 
-    fn plan(&self, host: &modelmill::Host, text: &str, request: &ExcitationRequest) -> Outcome<PlannedTrajectory> {
+    fn plan(
+        &self,
+        host: &modelmill::Host,
+        text: &str,
+        request: &ExcitationRequest,
+    ) -> Outcome<PlannedTrajectory> {
         let path = &self.options.model;
         let model = host.derive(&self.name(), host.load_text(path, text)?)?;
         let found = model.excite(request, &[])?;

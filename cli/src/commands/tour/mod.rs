@@ -7,12 +7,12 @@ mod story;
 use std::path::{Path, PathBuf};
 
 use modelmill::compare::ModelComparison;
-use modelmill::diagnose::{DiagnosisFindings, FixedParameters, DiagnosisOptions, words};
+use modelmill::diagnose::{DiagnosisFindings, DiagnosisOptions, FixedParameters, words};
 use modelmill::print::{StepSpelling, edit};
-use modelmill::recording::{RecordingOptions, PreparedRecording};
+use modelmill::recording::{PreparedRecording, RecordingOptions};
 use modelmill::report::page;
 use modelmill::{Host, Model, along, bundled};
-use modelmill_recordings::{PLAIN, BundledRuns, WITH_RODS};
+use modelmill_recordings::{BundledRuns, PLAIN, WITH_RODS};
 
 use crate::args::TourArgs;
 use crate::failure::{CommandFailure, CommandOutcome};
@@ -63,7 +63,11 @@ pub(crate) fn run(host: &Host, args: &TourArgs) -> CommandOutcome {
     terminal::print(story.text.trim_start())
 }
 
-fn diagnose(model: &Model, [fit, check]: &[PreparedRecording; 2], held: FixedParameters) -> CommandOutcome<DiagnosisFindings> {
+fn diagnose(
+    model: &Model,
+    [fit, check]: &[PreparedRecording; 2],
+    held: FixedParameters,
+) -> CommandOutcome<DiagnosisFindings> {
     let question = DiagnosisOptions {
         fixed: held,
         repeat_with_nominal: false,
@@ -167,10 +171,9 @@ struct TourComparison {
 
 impl TourComparison {
     fn new(model: &Model, recording: &PreparedRecording) -> CommandOutcome<Self> {
-        let one = recording
-            .segments
-            .first()
-            .ok_or_else(|| CommandFailure::Input("the bundled recording has no sample".to_owned()))?;
+        let one = recording.segments.first().ok_or_else(|| {
+            CommandFailure::Input("the bundled recording has no sample".to_owned())
+        })?;
         let measured = along::measured_forces(one)?;
         let forces = along::filter_and_decimate(along::forces(model, one, &model.nominal)?, one)?;
         let errors = measured
@@ -189,5 +192,9 @@ impl TourComparison {
 
 /// The verdict of a diagnosis in words.
 fn verdict(findings: &DiagnosisFindings) -> String {
-    words::verdict(&findings.diagnosis, findings.channels(), findings.validation)
+    words::verdict(
+        &findings.diagnosis,
+        findings.channels(),
+        findings.validation,
+    )
 }

@@ -6,7 +6,7 @@ use modelmill::print::tables;
 use modelmill::text::TerminalStyle;
 use modelmill::text::table::{ColumnAlignment, count, percent, table};
 
-use super::{EDITED, PAPER_PAGE, PLAIN, TourFolder, RODS_PAGE, TourComparison, WITH_RODS, verdict};
+use super::{EDITED, PAPER_PAGE, PLAIN, RODS_PAGE, TourComparison, TourFolder, WITH_RODS, verdict};
 use crate::terminal::plot::{TerminalCurve, bar, time_axis};
 
 /// Width of a paragraph.
@@ -133,14 +133,19 @@ impl TourText {
         ));
         self.paragraph(&verdict(findings));
         let shown = all.iter().filter(|c| c.rejection_reason.is_none());
-        let others = all.iter().filter(|c| c.rejection_reason.is_some()).take(OTHERS);
+        let others = all
+            .iter()
+            .filter(|c| c.rejection_reason.is_some())
+            .take(OTHERS);
         let rows: Vec<Vec<String>> = shown
             .chain(others)
             .map(|c| {
                 vec![
                     words::effect(&c.effect),
                     format!("{:.0} %", 100.0 * c.explained),
-                    c.rejection_reason.clone().unwrap_or_else(|| "found".to_owned()),
+                    c.rejection_reason
+                        .clone()
+                        .unwrap_or_else(|| "found".to_owned()),
                 ]
             })
             .collect();

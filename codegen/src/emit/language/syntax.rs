@@ -1,6 +1,6 @@
 //! What languages differ in when they print expressions and statements, and what they share.
 
-use crate::emit::tree::{OperatorPrecedence, CodeExpression};
+use crate::emit::tree::{CodeExpression, OperatorPrecedence};
 use crate::expr::Unary;
 
 /// How a language writes what stands in statements.
@@ -45,8 +45,17 @@ pub(in crate::emit) trait LanguageSyntax {
     }
 
     /// One operator on two operands; numbers may stand on one side only.
-    fn binary_text(&self, a: &CodeExpression, operator: &str, b: &CodeExpression, binding: OperatorPrecedence) -> String {
-        let both = matches!((a, b), (CodeExpression::Number(_), CodeExpression::Number(_)));
+    fn binary_text(
+        &self,
+        a: &CodeExpression,
+        operator: &str,
+        b: &CodeExpression,
+        binding: OperatorPrecedence,
+    ) -> String {
+        let both = matches!(
+            (a, b),
+            (CodeExpression::Number(_), CodeExpression::Number(_))
+        );
         let left = if both {
             self.operand_text(a)
         } else {
@@ -56,7 +65,10 @@ pub(in crate::emit) trait LanguageSyntax {
             OperatorPrecedence::Sum => OperatorPrecedence::Product,
             _ => OperatorPrecedence::Negation,
         };
-        let (left, right) = (parenthesize(left, a, binding), parenthesize(self.expression_text(b), b, next));
+        let (left, right) = (
+            parenthesize(left, a, binding),
+            parenthesize(self.expression_text(b), b, next),
+        );
         format!("{left} {operator} {right}")
     }
 }

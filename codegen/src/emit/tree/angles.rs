@@ -1,6 +1,6 @@
 //! The angles of a program that come before everything else.
 
-use crate::lower::{ProgramOp, StraightLineProgram, ProgramStage};
+use crate::lower::{ProgramOp, ProgramStage, StraightLineProgram};
 
 /// Sines with their cosines whose angles need no other function, if there are several: they take much of the time of one
 /// state, and less if they are computed at once.
@@ -24,7 +24,12 @@ impl LeadingAngles {
             let fixed = program.stages[i] == ProgramStage::Fixed;
             let simple = matches!(
                 op,
-                ProgramOp::Number(_) | ProgramOp::Input(_) | ProgramOp::Add(..) | ProgramOp::Sub(..) | ProgramOp::Mul(..) | ProgramOp::Neg(_)
+                ProgramOp::Number(_)
+                    | ProgramOp::Input(_)
+                    | ProgramOp::Add(..)
+                    | ProgramOp::Sub(..)
+                    | ProgramOp::Mul(..)
+                    | ProgramOp::Neg(_)
             );
             plain[i] = fixed || simple && of_plain;
             if let ProgramOp::Sin(a) = op

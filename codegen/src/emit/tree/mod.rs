@@ -14,7 +14,7 @@ mod pose;
 mod scope;
 mod sections;
 
-pub(in crate::emit) use expression::{OperatorPrecedence, CodeExpression};
+pub(in crate::emit) use expression::{CodeExpression, OperatorPrecedence};
 pub(in crate::emit) use once::PrecomputedValues;
 pub(in crate::emit) use order::order as in_order;
 pub(in crate::emit) use pose::SharedPose;
@@ -66,7 +66,10 @@ impl StatementRoutine {
 
     /// Whether a statement of a state is such.
     fn has_statement(&self, is_such: &dyn Fn(&CodeStatement) -> bool) -> bool {
-        fn has_statement_in(statements: &[CodeStatement], is_such: &dyn Fn(&CodeStatement) -> bool) -> bool {
+        fn has_statement_in(
+            statements: &[CodeStatement],
+            is_such: &dyn Fn(&CodeStatement) -> bool,
+        ) -> bool {
             statements.iter().any(|statement| match statement {
                 CodeStatement::Group { statements, .. } => has_statement_in(statements, is_such),
                 statement => is_such(statement),
@@ -101,7 +104,10 @@ pub(in crate::emit) enum CodeStatement {
     /// What must hold for the model to have an answer.
     Guard(PoseCheck),
     /// A result.
-    Put { output: usize, value: CodeExpression },
+    Put {
+        output: usize,
+        value: CodeExpression,
+    },
     /// A part of a long program that hands on what later parts need.
     Group {
         statements: Vec<CodeStatement>,
@@ -157,7 +163,10 @@ pub(in crate::emit) fn inputs_of_state(derivation: &Derivation, with_passive: bo
 }
 
 /// Whether a program needs passive coordinates that Newton's method finds.
-pub(in crate::emit) fn reads_passive(derivation: &Derivation, program: &StraightLineProgram) -> bool {
+pub(in crate::emit) fn reads_passive(
+    derivation: &Derivation,
+    program: &StraightLineProgram,
+) -> bool {
     let (_, passive) = derivation.coordinates();
     matches!(
         derivation.programs.passive_position,
@@ -186,7 +195,10 @@ pub(in crate::emit) struct GuardedDivisor {
 }
 
 /// The base parameters of a derivation, by the names of a scope.
-pub(in crate::emit) fn base_parameters(derivation: &Derivation, scope: &NameScope) -> BaseParameterCode {
+pub(in crate::emit) fn base_parameters(
+    derivation: &Derivation,
+    scope: &NameScope,
+) -> BaseParameterCode {
     let mechanism = &derivation.mechanism;
     let constants = mechanism.constants.iter().enumerate();
     let parameters = mechanism.parameters.iter().enumerate();

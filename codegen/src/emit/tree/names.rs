@@ -10,7 +10,7 @@ use modelmill_spec::{DriveKind, Mechanism};
 
 use crate::expr::print::FormulaSymbol;
 use crate::expr::vector::{self, SymbolicVector};
-use crate::expr::{Atom, ExprId, FloatDomain, Graph, Node, EvaluationTape};
+use crate::expr::{Atom, EvaluationTape, ExprId, FloatDomain, Graph, Node};
 use crate::lower::{ProgramOp, StraightLineProgram};
 use crate::newton_euler::{JointLoad, SymbolicWrench, joint_wrenches};
 use crate::regressor::form::{RecursionFrames, TotalForm};
@@ -51,7 +51,10 @@ impl NamedQuantities {
     }
 
     /// What a program's values are, by position; each name is given once.
-    pub(crate) fn name_values(&self, program: &StraightLineProgram) -> BTreeMap<usize, QuantityName> {
+    pub(crate) fn name_values(
+        &self,
+        program: &StraightLineProgram,
+    ) -> BTreeMap<usize, QuantityName> {
         let mut names = BTreeMap::new();
         if self.known.is_empty() {
             return names;
@@ -59,7 +62,10 @@ impl NamedQuantities {
         let values = operation_values(program, &self.atoms);
         let mut free: Vec<&(FormulaSymbol, f64)> = self.known.iter().collect();
         for (i, (op, value)) in program.ops.iter().zip(&values).enumerate() {
-            if matches!(op, ProgramOp::Number(_) | ProgramOp::Input(_) | ProgramOp::Neg(_)) {
+            if matches!(
+                op,
+                ProgramOp::Number(_) | ProgramOp::Input(_) | ProgramOp::Neg(_)
+            ) {
                 continue;
             }
             let found = free
@@ -150,7 +156,10 @@ fn generic_state(
 }
 
 /// Values of all operations of a program at a state.
-pub(crate) fn operation_values(program: &StraightLineProgram, atoms: &BTreeMap<Atom, f64>) -> Vec<f64> {
+pub(crate) fn operation_values(
+    program: &StraightLineProgram,
+    atoms: &BTreeMap<Atom, f64>,
+) -> Vec<f64> {
     use crate::expr::{EvaluationDomain, Unary};
     let mut values: Vec<f64> = Vec::with_capacity(program.ops.len());
     for op in &program.ops {
@@ -165,7 +174,9 @@ pub(crate) fn operation_values(program: &StraightLineProgram, atoms: &BTreeMap<A
             ProgramOp::Div(a, b) => at(a) / at(b),
             ProgramOp::Neg(a) => -at(a),
             ProgramOp::Unary(Unary::Sqrt, a) => at(a).sqrt(),
-            ProgramOp::Unary(function, a) => FloatDomain(|_| 0.0).unary(*function, &at(a)).unwrap_or(f64::NAN),
+            ProgramOp::Unary(function, a) => FloatDomain(|_| 0.0)
+                .unary(*function, &at(a))
+                .unwrap_or(f64::NAN),
             ProgramOp::Sin(a) => at(a).sin(),
             ProgramOp::Cos(a) => at(a).cos(),
             ProgramOp::Atan2(y, x) => at(y).atan2(at(x)),
@@ -176,7 +187,10 @@ pub(crate) fn operation_values(program: &StraightLineProgram, atoms: &BTreeMap<A
 }
 
 /// Quantities with a meaning and their values; the first of several equal ones gives the name.
-fn evaluate_quantities(derivation: &Derivation, atoms: &BTreeMap<Atom, f64>) -> Vec<(FormulaSymbol, f64)> {
+fn evaluate_quantities(
+    derivation: &Derivation,
+    atoms: &BTreeMap<Atom, f64>,
+) -> Vec<(FormulaSymbol, f64)> {
     let mut graph = derivation.graph.clone();
     let mut named = trigonometric_quantities(&mut graph, derivation);
     named.extend(motion_quantities(&mut graph, derivation));
@@ -196,14 +210,16 @@ fn evaluate_quantities(derivation: &Derivation, atoms: &BTreeMap<Atom, f64>) -> 
         // One that has no value takes it from all others.
         let value = match &together {
             Some(values) => Some(values[k]),
-            None => EvaluationTape::new(&graph, &[id]).evaluate(&FloatDomain(atom)).map(|v| v[0]),
+            None => EvaluationTape::new(&graph, &[id])
+                .evaluate(&FloatDomain(atom))
+                .map(|v| v[0]),
         };
         let Some(value) = value else {
             continue;
         };
-        let taken = known
-            .iter()
-            .any(|(s, v)| *s == symbol || (value.abs() - v.abs()).abs() <= RELATIVE_AGREEMENT * v.abs());
+        let taken = known.iter().any(|(s, v)| {
+            *s == symbol || (value.abs() - v.abs()).abs() <= RELATIVE_AGREEMENT * v.abs()
+        });
         if value.is_finite() && value != 0.0 && !taken && !reserved.contains(&symbol.text()) {
             known.push((symbol, value));
         }
@@ -221,7 +237,10 @@ pub(crate) fn reserved_names(mechanism: &Mechanism) -> BTreeSet<String> {
 }
 
 /// Sines and cosines of sums of angles: `c_theta1_gamma1`.
-fn trigonometric_quantities(graph: &mut Graph, derivation: &Derivation) -> Vec<(FormulaSymbol, ExprId)> {
+fn trigonometric_quantities(
+    graph: &mut Graph,
+    derivation: &Derivation,
+) -> Vec<(FormulaSymbol, ExprId)> {
     let projection = &derivation.equations.projection;
     let mechanism = &derivation.mechanism;
     let seen = graph.reachable(&projection.loops.residual);
@@ -272,7 +291,10 @@ fn motion_quantities(graph: &mut Graph, derivation: &Derivation) -> Vec<(Formula
     let mut named = Vec::new();
     for (k, p) in projection.loops.passive.iter().enumerate() {
         let name = &*mechanism.coordinates[*p].name;
-        named.push((FormulaSymbol::time_derivative(name, 1), projection.passive_rates[k]));
+        named.push((
+            FormulaSymbol::time_derivative(name, 1),
+            projection.passive_rates[k],
+        ));
         named.push((
             FormulaSymbol::time_derivative(name, 2),
             projection.passive_accelerations[k],
@@ -286,7 +308,10 @@ fn motion_quantities(graph: &mut Graph, derivation: &Derivation) -> Vec<(Formula
         let name = format!("l_{}", drive.name);
         named.push((FormulaSymbol::new(&*name), motion.coordinate));
         named.push((FormulaSymbol::time_derivative(&*name, 1), motion.rate));
-        named.push((FormulaSymbol::time_derivative(&*name, 2), motion.acceleration));
+        named.push((
+            FormulaSymbol::time_derivative(&*name, 2),
+            motion.acceleration,
+        ));
         for (a, slope) in projection
             .loops
             .active
@@ -385,8 +410,14 @@ fn link_quantities(graph: &mut Graph, derivation: &Derivation) -> Vec<(FormulaSy
             let both = graph.add(squares[0], squares[1]);
             named.push((FormulaSymbol::new(entry(axis, axis)), graph.neg(both)));
             let product = graph.mul(omega[axis], omega[j]);
-            named.push((FormulaSymbol::new(entry(axis, j)), graph.sub(product, alpha[k])));
-            named.push((FormulaSymbol::new(entry(j, axis)), graph.add(product, alpha[k])));
+            named.push((
+                FormulaSymbol::new(entry(axis, j)),
+                graph.sub(product, alpha[k]),
+            ));
+            named.push((
+                FormulaSymbol::new(entry(j, axis)),
+                graph.add(product, alpha[k]),
+            ));
         }
         let parent = &mechanism.frames[frame.parent.0].name;
         for (axis, id) in AXES.iter().zip(before[*link]) {

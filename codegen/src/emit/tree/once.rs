@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::build::group_statements;
 use super::scope::{NameScope, unique_name};
-use super::{PoseCheck, StatementRoutine, CodeStatement};
+use super::{CodeStatement, PoseCheck, StatementRoutine};
 use crate::expr::Atom;
 
 /// What is computed once for a geometry and its parameters, by all programs of one struct.
@@ -38,7 +38,9 @@ impl PrecomputedValues {
             match statement {
                 CodeStatement::Let { name, value, note } => {
                     let known = self.statements.iter().find_map(|other| match other {
-                        CodeStatement::Let { name, value: v, .. } if *v == value => Some(name.clone()),
+                        CodeStatement::Let { name, value: v, .. } if *v == value => {
+                            Some(name.clone())
+                        }
                         _ => None,
                     });
                     let new = known.unwrap_or_else(|| {

@@ -7,7 +7,7 @@
 
 use std::cmp::Reverse;
 
-use crate::lower::{ProgramOp, StraightLineProgram, ProgramStage};
+use crate::lower::{ProgramOp, ProgramStage, StraightLineProgram};
 
 /// How many values may wait before the ones that free others come first: a quarter of the registers of AVX-512. Constants
 /// need some, and the compiler keeps to this order only roughly. Measured on the Panda between 2 and 28: above 12 blocks of
@@ -59,7 +59,11 @@ pub(in crate::emit) fn order(
 }
 
 /// The statements of those operations that are to be put in order.
-fn statements(program: &StraightLineProgram, fused: &[bool], wanted: &dyn Fn(usize) -> bool) -> Vec<SchedulerStatement> {
+fn statements(
+    program: &StraightLineProgram,
+    fused: &[bool],
+    wanted: &dyn Fn(usize) -> bool,
+) -> Vec<SchedulerStatement> {
     let n = program.ops.len();
     let mut statements: Vec<SchedulerStatement> = Vec::new();
     let mut owner = vec![usize::MAX; n];
@@ -112,7 +116,10 @@ fn statements(program: &StraightLineProgram, fused: &[bool], wanted: &dyn Fn(usi
     for k in (0..statements.len()).rev() {
         let longest = |users: &[usize]| users.iter().map(|u| statements[*u].height).max();
         let after = longest(&statements[k].users).unwrap_or(0);
-        let own = statements[k].ops.iter().map(|i| latency_cycles(&program.ops[*i]));
+        let own = statements[k]
+            .ops
+            .iter()
+            .map(|i| latency_cycles(&program.ops[*i]));
         // Half of a formula's operations wait for the other half.
         let own = own
             .sum::<usize>()
@@ -154,7 +161,11 @@ fn schedule_statements(statements: &[SchedulerStatement]) -> Vec<usize> {
         };
         let best = (0..ready.len()).min_by_key(|place| {
             let k = ready[*place];
-            let pressure = if live < MOST_WAITING_VALUES { 0 } else { kept(k) };
+            let pressure = if live < MOST_WAITING_VALUES {
+                0
+            } else {
+                kept(k)
+            };
             (
                 statements[k].section,
                 pressure,

@@ -10,7 +10,7 @@ use super::scope::NameScope;
 use super::{PrecomputedValues, StatementRoutine};
 use crate::Derivation;
 use crate::expr::Atom;
-use crate::lower::{PoseGuard, ProgramOp, StraightLineProgram, ProgramStage, ValueId};
+use crate::lower::{PoseGuard, ProgramOp, ProgramStage, StraightLineProgram, ValueId};
 
 /// The common part, and which values of it programs read.
 #[derive(Clone, Debug)]
@@ -42,12 +42,17 @@ impl SharedPose {
         let mut numbers = FxHashMap::default();
         let numbered = programs.map(|program| {
             let values = numbers_of(program, &mut numbers);
-            let guards: Vec<PoseGuard> = program.guards.iter().map(|g| g.map_values(&values)).collect();
+            let guards: Vec<PoseGuard> = program
+                .guards
+                .iter()
+                .map(|g| g.map_values(&values))
+                .collect();
             (program, values, guards)
         });
         let plain = programs.map(pose_dependent_values);
         // The begin of the guards that all programs have that have any of it.
-        let common = |a: &[PoseGuard], b: &[PoseGuard]| a.iter().zip(b).take_while(|(a, b)| a == b).count();
+        let common =
+            |a: &[PoseGuard], b: &[PoseGuard]| a.iter().zip(b).take_while(|(a, b)| a == b).count();
         let (_, _, first) = &numbered[0];
         let others = numbered[1..].iter();
         let shared = others.map(|(_, _, guards)| common(first, guards));
@@ -111,7 +116,10 @@ impl SharedPose {
     }
 
     /// What is left of a program whose common part is computed before; none if it has another one.
-    pub(in crate::emit) fn remaining_program(&self, program: &StraightLineProgram) -> Option<StraightLineProgram> {
+    pub(in crate::emit) fn remaining_program(
+        &self,
+        program: &StraightLineProgram,
+    ) -> Option<StraightLineProgram> {
         let mut numbers = self.numbers.clone();
         let values = numbers_of(program, &mut numbers);
         let guards: Vec<PoseGuard> = program
@@ -146,7 +154,10 @@ impl PoseGuard {
 }
 
 /// The numbers of a program's operations, the same for equal ones.
-fn numbers_of(program: &StraightLineProgram, numbers: &mut FxHashMap<ProgramOp, ValueId>) -> Vec<ValueId> {
+fn numbers_of(
+    program: &StraightLineProgram,
+    numbers: &mut FxHashMap<ProgramOp, ValueId>,
+) -> Vec<ValueId> {
     let mut values: Vec<ValueId> = Vec::with_capacity(program.ops.len());
     for op in &program.ops {
         let op = match op.clone().map_operands(|v| values[v.index()]) {
@@ -191,7 +202,8 @@ fn shared_program<'a>(
     let mut places: BTreeMap<ValueId, ValueId> = BTreeMap::new();
     for (part, values, plain) in parts {
         for (i, op) in part.ops.iter().enumerate() {
-            let of_known = matches!(op, ProgramOp::Neg(v) if places.contains_key(&values[v.index()]));
+            let of_known =
+                matches!(op, ProgramOp::Neg(v) if places.contains_key(&values[v.index()]));
             let fixed = part.stages[i] == ProgramStage::Fixed;
             let wanted = fixed || is_leaf(op) || of_known || shared(&values[i]);
             if !wanted || !plain[i] || places.contains_key(&values[i]) {

@@ -6,7 +6,7 @@ use modelmill_spec::DriveKind;
 
 use super::build::NamedValue;
 use crate::Derivation;
-use crate::lower::{PoseGuard, ProgramOp, StraightLineProgram, ProgramStage};
+use crate::lower::{PoseGuard, ProgramOp, ProgramStage, StraightLineProgram};
 
 /// Programs of more statements are put in the order that suits machines; their parts of the mechanism are mixed.
 const MOST_STATEMENTS: usize = 150;

@@ -7,7 +7,7 @@ use super::c_header::header;
 use super::functions::{WrappedFunction, wrapped_functions};
 use super::{LanguageBinding, source_file};
 use crate::emit::language::c99::RESERVED;
-use crate::emit::language::{EmittedFile, EmissionRequest};
+use crate::emit::language::{EmissionRequest, EmittedFile};
 
 /// What a function returns, with its name in the header after the prefix, and its meaning.
 pub(super) const STATUS: [(&str, &str); 9] = [
@@ -114,7 +114,9 @@ pub(super) fn storage_words(face: &LanguageBinding<'_>) -> usize {
 
 fn fixed_values(program: &crate::StraightLineProgram) -> usize {
     let fixed = program.stages.iter();
-    fixed.filter(|stage| **stage == crate::ProgramStage::Fixed).count()
+    fixed
+        .filter(|stage| **stage == crate::ProgramStage::Fixed)
+        .count()
 }
 
 #[allow(clippy::too_many_lines, reason = "one text from top to bottom")]
@@ -394,7 +396,11 @@ fn items(face: &LanguageBinding<'_>) -> TokenStream {
 }
 
 /// A function of one state; one that is `near` takes passive coordinates of a pose near by.
-fn single_state_function(face: &LanguageBinding<'_>, one: &WrappedFunction, near: bool) -> TokenStream {
+fn single_state_function(
+    face: &LanguageBinding<'_>,
+    one: &WrappedFunction,
+    near: bool,
+) -> TokenStream {
     let suffix = if near { "_near" } else { "" };
     let name = format_ident!("{}_{}{suffix}", face.name, one.name);
     let dynamics = format_ident!("{}_dynamics", face.name);

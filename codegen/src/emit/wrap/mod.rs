@@ -15,7 +15,7 @@ use quote::{format_ident, quote};
 
 use crate::emit::identifier::{field_identifier, module_identifier};
 use crate::emit::language::rust::{doc_lines, emit, print_source};
-use crate::emit::language::{EmittedFile, EmissionRequest};
+use crate::emit::language::{EmissionRequest, EmittedFile};
 use crate::emit::tree::uses_load;
 use crate::programs::PassivePosition;
 use crate::{Derivation, DynamicsPrograms};

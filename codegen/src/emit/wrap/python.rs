@@ -6,7 +6,7 @@ use quote::{format_ident, quote};
 use super::functions::{WrappedFunction, wrapped_functions};
 use super::{LanguageBinding, source_file};
 use crate::emit::language::rust::doc_lines;
-use crate::emit::language::{EmittedFile, EmissionRequest};
+use crate::emit::language::{EmissionRequest, EmittedFile};
 
 /// Names that a module of Python cannot have, or must leave to the module whose arrays it takes.
 const RESERVED: &[&str] = &[
@@ -105,7 +105,9 @@ fn items(face: &LanguageBinding<'_>) -> TokenStream {
         .clone()
         .map(|one| format_ident!("{}", python_name(one)))
         .collect();
-    let singles: Vec<TokenStream> = singles.map(|one| single_state_function(face, one)).collect();
+    let singles: Vec<TokenStream> = singles
+        .map(|one| single_state_function(face, one))
+        .collect();
     let doc_forces = "Forces of the drives, N or N m, for base parameters `p`. `parallel` uses all cores; `geometry` names known \
                       quantities that differ from the model file's.";
     let doc_regressor = "H_min: one row per drive, one column per base parameter. `parallel` and `geometry` as in `inverse_dynamics`.";

@@ -55,23 +55,24 @@ pub(crate) fn solve(
             .map(|r| columns.iter().map(|c| matrix[*r][*c]).collect())
             .collect();
         let block_rhs: Vec<Vec<ExprId>> = rows.iter().map(|r| rhs[*r].clone()).collect();
-        let found = if rows.len() > LARGEST_BLOCK {
-            let (found, regular) =
-                torn::solve_by_tearing(graph, &block, &block_rhs).ok_or_else(|| DeriveError::TooLarge {
-                    what: what.to_owned(),
-                    size: rows.len(),
-                    limit: LARGEST_BLOCK,
-                })?;
-            determinants.extend(regular.into_iter().filter(|d| d.index() > 1));
-            found
-        } else {
-            let (found, determinant) =
-                solve_by_cofactors(graph, &block, &block_rhs).ok_or_else(singular)?;
-            if determinant.index() > 1 {
-                determinants.push(determinant);
-            }
-            found
-        };
+        let found =
+            if rows.len() > LARGEST_BLOCK {
+                let (found, regular) = torn::solve_by_tearing(graph, &block, &block_rhs)
+                    .ok_or_else(|| DeriveError::TooLarge {
+                        what: what.to_owned(),
+                        size: rows.len(),
+                        limit: LARGEST_BLOCK,
+                    })?;
+                determinants.extend(regular.into_iter().filter(|d| d.index() > 1));
+                found
+            } else {
+                let (found, determinant) =
+                    solve_by_cofactors(graph, &block, &block_rhs).ok_or_else(singular)?;
+                if determinant.index() > 1 {
+                    determinants.push(determinant);
+                }
+                found
+            };
         for (column, value) in columns.iter().zip(found) {
             values[*column] = value;
         }

@@ -6,7 +6,7 @@
 //! and every part follows by least squares, which here are exact and divide by a sum of squares: a part is singular only
 //! where its own unknowns are not determined. (Tearing: Kron 1963.)
 
-use super::cofactors::{LARGEST_BLOCK, solve_by_cofactors, determinant};
+use super::cofactors::{LARGEST_BLOCK, determinant, solve_by_cofactors};
 use crate::expr::{ExprId, Graph, Rational};
 
 /// Rows and columns that hang together without the torn columns.
@@ -123,9 +123,9 @@ fn connected_blocks(matrix: &[Vec<ExprId>], columns: &[usize]) -> Vec<ConnectedB
             rows: vec![row],
             columns: own,
         };
-        let (touching, others) = parts
-            .into_iter()
-            .partition(|part: &ConnectedBlock| part.columns.iter().any(|c| joined.columns.contains(c)));
+        let (touching, others) = parts.into_iter().partition(|part: &ConnectedBlock| {
+            part.columns.iter().any(|c| joined.columns.contains(c))
+        });
         parts = others;
         for part in touching {
             let part: ConnectedBlock = part;
@@ -141,7 +141,11 @@ fn connected_blocks(matrix: &[Vec<ExprId>], columns: &[usize]) -> Vec<ConnectedB
 }
 
 /// Combinations of a part's rows, as rows with factors, in which its own columns cancel.
-fn cancelling_rows(graph: &mut Graph, matrix: &[Vec<ExprId>], part: &ConnectedBlock) -> Vec<Vec<(usize, ExprId)>> {
+fn cancelling_rows(
+    graph: &mut Graph,
+    matrix: &[Vec<ExprId>],
+    part: &ConnectedBlock,
+) -> Vec<Vec<(usize, ExprId)>> {
     if part.columns.is_empty() {
         return part
             .rows

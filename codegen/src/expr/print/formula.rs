@@ -194,7 +194,12 @@ impl PrintedFormula {
         }
     }
 
-    fn gather_factor(one: Self, number: &mut Rational, above: &mut Vec<Self>, below: &mut Vec<Self>) {
+    fn gather_factor(
+        one: Self,
+        number: &mut Rational,
+        above: &mut Vec<Self>,
+        below: &mut Vec<Self>,
+    ) {
         match one {
             Self::Number(n) => *number = &*number * &n,
             Self::Term {

@@ -1,8 +1,11 @@
 //! Formulas of the exact expressions that a model file is written in.
 
-use modelmill_spec::{ExactAngle, ExactExpression, ExactFunction as FileFunction, ExactLength, Mechanism, PlaceQuantity};
+use modelmill_spec::{
+    ExactAngle, ExactExpression, ExactFunction as FileFunction, ExactLength, Mechanism,
+    PlaceQuantity,
+};
 
-use super::formula::{PrintedFormula, FormulaFunction};
+use super::formula::{FormulaFunction, PrintedFormula};
 use super::symbol::FormulaSymbol;
 use crate::expr::Rational;
 
@@ -13,14 +16,22 @@ pub fn exact_formula(mechanism: &Mechanism, expression: &ExactExpression) -> Pri
 
 /// The formula of an exact expression that acts at the first of two places: `x`, `x_d`, `x_dd` and `load` are the
 /// quantities of a place `x`.
-pub fn exact_formula_at(mechanism: &Mechanism, expression: &ExactExpression, places: [&str; 2]) -> PrintedFormula {
+pub fn exact_formula_at(
+    mechanism: &Mechanism,
+    expression: &ExactExpression,
+    places: [&str; 2],
+) -> PrintedFormula {
     let of = |inner: &ExactExpression| exact_formula_at(mechanism, inner, places);
     match expression {
         ExactExpression::Rational(value) => PrintedFormula::Number(Rational::from(value.clone())),
         ExactExpression::Pi => PrintedFormula::name("pi"),
-        ExactExpression::Symbol(symbol) => PrintedFormula::Symbol(symbol_name(mechanism, *symbol, places)),
+        ExactExpression::Symbol(symbol) => {
+            PrintedFormula::Symbol(symbol_name(mechanism, *symbol, places))
+        }
         ExactExpression::Sum(terms) => PrintedFormula::sum(terms.iter().map(of)),
-        ExactExpression::Product(factors) => PrintedFormula::product(Rational::ONE, factors.iter().map(of)),
+        ExactExpression::Product(factors) => {
+            PrintedFormula::product(Rational::ONE, factors.iter().map(of))
+        }
         ExactExpression::Quotient(above, below) => PrintedFormula::quotient(of(above), of(below)),
         ExactExpression::Negative(inner) => of(inner).negate(),
         ExactExpression::Power(base, n) => of(base).power(*n),
@@ -41,7 +52,10 @@ pub fn exact_formula_at(mechanism: &Mechanism, expression: &ExactExpression, pla
 
 /// The formula of an angle.
 pub fn angle_formula(mechanism: &Mechanism, angle: &ExactAngle) -> PrintedFormula {
-    let turns = PrintedFormula::product(Rational::from(angle.pi.clone()), [PrintedFormula::name("pi")]);
+    let turns = PrintedFormula::product(
+        Rational::from(angle.pi.clone()),
+        [PrintedFormula::name("pi")],
+    );
     let terms = angle.terms.iter().map(|(symbol, n)| {
         let symbol = PrintedFormula::Symbol(symbol_name(mechanism, *symbol, ["x", "other"]));
         PrintedFormula::product(Rational::integer(i64::from(*n)), [symbol])
@@ -55,10 +69,18 @@ pub fn length_formula(mechanism: &Mechanism, length: &ExactLength) -> PrintedFor
         let name = PrintedFormula::name(&*mechanism.coordinates[i.0].name);
         PrintedFormula::product(Rational::from(k.clone()), [name])
     });
-    PrintedFormula::sum([exact_formula(mechanism, &length.offset)].into_iter().chain(slides))
+    PrintedFormula::sum(
+        [exact_formula(mechanism, &length.offset)]
+            .into_iter()
+            .chain(slides),
+    )
 }
 
-fn symbol_name(mechanism: &Mechanism, symbol: modelmill_spec::ModelSymbol, [x, other]: [&str; 2]) -> FormulaSymbol {
+fn symbol_name(
+    mechanism: &Mechanism,
+    symbol: modelmill_spec::ModelSymbol,
+    [x, other]: [&str; 2],
+) -> FormulaSymbol {
     use modelmill_spec::ModelSymbol as Named;
     match symbol {
         Named::Constant(i) => FormulaSymbol::new(&*mechanism.constants[i.0].name),

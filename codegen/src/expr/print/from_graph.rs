@@ -2,9 +2,9 @@
 
 use modelmill_spec::Mechanism;
 
-use super::formula::{PrintedFormula, FormulaFunction};
+use super::formula::{FormulaFunction, PrintedFormula};
 use super::symbol::FormulaSymbol;
-use crate::expr::{AtomAngleSum, Atom, ExprId, Graph, Node, Rational};
+use crate::expr::{Atom, AtomAngleSum, ExprId, Graph, Node, Rational};
 
 /// The name of an atom: as in the model file, `theta1_d` and `theta1_dd` for rate and acceleration.
 pub fn atom(mechanism: &Mechanism, atom: Atom) -> FormulaSymbol {
@@ -27,8 +27,12 @@ pub fn formula(graph: &Graph, mechanism: &Mechanism, id: ExprId) -> PrintedFormu
     match graph.node(id) {
         Node::Rational(value) => PrintedFormula::Number(value.clone()),
         Node::Atom(a) => PrintedFormula::Symbol(atom(mechanism, *a)),
-        Node::Sin(angle) => PrintedFormula::apply(FormulaFunction::Sin, angle_sum_formula(mechanism, angle)),
-        Node::Cos(angle) => PrintedFormula::apply(FormulaFunction::Cos, angle_sum_formula(mechanism, angle)),
+        Node::Sin(angle) => {
+            PrintedFormula::apply(FormulaFunction::Sin, angle_sum_formula(mechanism, angle))
+        }
+        Node::Cos(angle) => {
+            PrintedFormula::apply(FormulaFunction::Cos, angle_sum_formula(mechanism, angle))
+        }
         Node::Sum(terms) => PrintedFormula::sum(
             terms
                 .iter()

@@ -2,8 +2,8 @@
 
 use std::fmt::Write;
 
-use super::formula::{PrintedFormula, FormulaFunction, digits};
-use super::symbol::{GlyphRun, FormulaSymbol, typeset};
+use super::formula::{FormulaFunction, PrintedFormula, digits};
+use super::symbol::{FormulaSymbol, GlyphRun, typeset};
 use crate::expr::Rational;
 
 impl PrintedFormula {
@@ -105,7 +105,10 @@ fn write(out: &mut String, formula: &PrintedFormula, tight: bool) {
 
 fn power(out: &mut String, base: &PrintedFormula, n: u32) {
     match base {
-        PrintedFormula::Apply(f @ (FormulaFunction::Sin | FormulaFunction::Cos | FormulaFunction::Tanh), operands) => {
+        PrintedFormula::Apply(
+            f @ (FormulaFunction::Sin | FormulaFunction::Cos | FormulaFunction::Tanh),
+            operands,
+        ) => {
             apply(out, *f, Some(n), operands);
         }
         PrintedFormula::Symbol(_) | PrintedFormula::Indexed(..) => {
@@ -123,7 +126,12 @@ fn power(out: &mut String, base: &PrintedFormula, n: u32) {
     }
 }
 
-fn apply(out: &mut String, function: FormulaFunction, exponent: Option<u32>, operands: &[PrintedFormula]) {
+fn apply(
+    out: &mut String,
+    function: FormulaFunction,
+    exponent: Option<u32>,
+    operands: &[PrintedFormula],
+) {
     let arguments: Vec<String> = operands.iter().map(PrintedFormula::latex).collect();
     let arguments = arguments.join(", ");
     let command = match function {
@@ -147,7 +155,9 @@ fn apply(out: &mut String, function: FormulaFunction, exponent: Option<u32>, ope
         _ = write!(out, "^{{{n}}}");
     }
     match operands {
-        [PrintedFormula::Symbol(_)] if matches!(function, FormulaFunction::Sin | FormulaFunction::Cos) => {
+        [PrintedFormula::Symbol(_)]
+            if matches!(function, FormulaFunction::Sin | FormulaFunction::Cos) =>
+        {
             _ = write!(out, "{{{arguments}}}");
         }
         _ => _ = write!(out, "\\left({arguments}\\right)"),

@@ -4,8 +4,8 @@ use std::fmt::Write;
 
 use modelmill_boundary::text::html as escape;
 
-use super::formula::{PrintedFormula, FormulaFunction, digits};
-use super::symbol::{GlyphRun, FormulaSymbol, typeset};
+use super::formula::{FormulaFunction, PrintedFormula, digits};
+use super::symbol::{FormulaSymbol, GlyphRun, typeset};
 
 impl PrintedFormula {
     /// As the content of a `math` element.
@@ -128,7 +128,12 @@ fn glyphs(one: &GlyphRun) -> String {
     }
 }
 
-fn write_fenced(out: &mut MathmlWriter, open: &str, close: &str, body: impl FnOnce(&mut MathmlWriter)) {
+fn write_fenced(
+    out: &mut MathmlWriter,
+    open: &str,
+    close: &str,
+    body: impl FnOnce(&mut MathmlWriter),
+) {
     write_fenced_power(out, open, close, None, body);
 }
 
@@ -210,20 +215,29 @@ fn write(out: &mut MathmlWriter, formula: &PrintedFormula, tight: bool) {
 
 fn power(out: &mut MathmlWriter, base: &PrintedFormula, n: u32) {
     match base {
-        PrintedFormula::Apply(f @ (FormulaFunction::Sin | FormulaFunction::Cos | FormulaFunction::Tanh), operands) => {
+        PrintedFormula::Apply(
+            f @ (FormulaFunction::Sin | FormulaFunction::Cos | FormulaFunction::Tanh),
+            operands,
+        ) => {
             apply(out, *f, Some(n), operands);
         }
         PrintedFormula::Symbol(symbol) => out.push_str(&symbol.mathml_power(Some(n))),
-        PrintedFormula::Indexed(..) | PrintedFormula::Apply(FormulaFunction::Abs, _) => out.write_unbroken(|out| {
-            out.push_str("<msup><mrow>");
-            write(out, base, true);
-            _ = write!(out, "</mrow><mn>{n}</mn></msup>");
-        }),
+        PrintedFormula::Indexed(..) | PrintedFormula::Apply(FormulaFunction::Abs, _) => out
+            .write_unbroken(|out| {
+                out.push_str("<msup><mrow>");
+                write(out, base, true);
+                _ = write!(out, "</mrow><mn>{n}</mn></msup>");
+            }),
         other => write_fenced_power(out, "(", ")", Some(n), |out| write(out, other, false)),
     }
 }
 
-fn apply(out: &mut MathmlWriter, function: FormulaFunction, exponent: Option<u32>, operands: &[PrintedFormula]) {
+fn apply(
+    out: &mut MathmlWriter,
+    function: FormulaFunction,
+    exponent: Option<u32>,
+    operands: &[PrintedFormula],
+) {
     let arguments = |out: &mut MathmlWriter| {
         for (i, operand) in operands.iter().enumerate() {
             if i > 0 {
@@ -258,7 +272,9 @@ fn apply(out: &mut MathmlWriter, function: FormulaFunction, exponent: Option<u32
         None => out.push_str(&name),
     }
     match operands {
-        [PrintedFormula::Symbol(_)] if matches!(function, FormulaFunction::Sin | FormulaFunction::Cos) => {
+        [PrintedFormula::Symbol(_)]
+            if matches!(function, FormulaFunction::Sin | FormulaFunction::Cos) =>
+        {
             out.push_str("<mo lspace=\"0\" rspace=\"0.17em\">&#x2061;</mo>");
             arguments(out);
         }
@@ -309,7 +325,12 @@ fn magnitude(out: &mut MathmlWriter, formula: &PrintedFormula) {
 }
 
 /// A product on one line; a fraction's line encloses what stands alone on it, other products are `tight`.
-fn write_product_line(out: &mut MathmlWriter, number: &str, factors: &[PrintedFormula], tight: bool) {
+fn write_product_line(
+    out: &mut MathmlWriter,
+    number: &str,
+    factors: &[PrintedFormula],
+    tight: bool,
+) {
     let with_number = number != "1" || factors.is_empty();
     if with_number {
         _ = write!(out, "<mn>{number}</mn>");

@@ -19,7 +19,7 @@ mod text;
 #[cfg(test)]
 pub(crate) mod tests;
 
-pub use formula::{PrintedFormula, FormulaFunction};
+pub use formula::{FormulaFunction, PrintedFormula};
 pub use from_exact::{angle_formula, exact_formula, exact_formula_at, length_formula};
 pub(crate) use from_graph::angle_sum_formula;
 pub use from_graph::{atom, formula, tree_size};

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::expr::{AtomAngleSum, Atom, EvaluationDomain, Rational, Unary};
+use crate::expr::{Atom, AtomAngleSum, EvaluationDomain, Rational, Unary};
 
 /// What was read.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,7 +1,7 @@
 //! What a person sees at once in a sum or product that is printed: like terms, squares of a sine and a cosine that make one,
 //! squares of roots.
 
-use super::{PrintedFormula, FormulaFunction};
+use super::{FormulaFunction, PrintedFormula};
 use crate::expr::Rational;
 
 /// A term as a number times factors over factors.
@@ -30,12 +30,17 @@ impl SplitTerm {
     }
 
     /// The same without the square of a sine or cosine, with whose it is.
-    fn without_squares(&self) -> impl Iterator<Item = (FormulaFunction, &PrintedFormula, Vec<PrintedFormula>)> {
+    fn without_squares(
+        &self,
+    ) -> impl Iterator<Item = (FormulaFunction, &PrintedFormula, Vec<PrintedFormula>)> {
         self.above.iter().enumerate().filter_map(|(i, factor)| {
             let PrintedFormula::Power(base, 2) = factor else {
                 return None;
             };
-            let PrintedFormula::Apply(function @ (FormulaFunction::Sin | FormulaFunction::Cos), operands) = &**base
+            let PrintedFormula::Apply(
+                function @ (FormulaFunction::Sin | FormulaFunction::Cos),
+                operands,
+            ) = &**base
             else {
                 return None;
             };
@@ -142,17 +147,28 @@ mod tests {
     #[test]
     fn what_a_person_sees_is_done() {
         let root = || PrintedFormula::apply(FormulaFunction::Sqrt, PrintedFormula::integer(3));
-        let product = |factors: Vec<PrintedFormula>| PrintedFormula::product(Rational::ONE, factors);
+        let product =
+            |factors: Vec<PrintedFormula>| PrintedFormula::product(Rational::ONE, factors);
         let sum = PrintedFormula::sum([name("R"), product(vec![name("R"), root(), root()])]);
         let quarter = PrintedFormula::product(Rational::new(1, 4), [sum]);
         assert_eq!(quarter, name("R"));
 
         let square = |f| PrintedFormula::apply(f, name("x")).power(2);
         let stroke = |f| PrintedFormula::product(Rational::MINUS_ONE, [name("stroke"), square(f)]);
-        let sum = PrintedFormula::sum([stroke(FormulaFunction::Sin), name("a"), stroke(FormulaFunction::Cos)]);
-        assert_eq!(sum, PrintedFormula::sum([name("a"), name("stroke").negate()]));
+        let sum = PrintedFormula::sum([
+            stroke(FormulaFunction::Sin),
+            name("a"),
+            stroke(FormulaFunction::Cos),
+        ]);
+        assert_eq!(
+            sum,
+            PrintedFormula::sum([name("a"), name("stroke").negate()])
+        );
 
-        let difference = PrintedFormula::sum([square(FormulaFunction::Cos), square(FormulaFunction::Sin).negate()]);
+        let difference = PrintedFormula::sum([
+            square(FormulaFunction::Cos),
+            square(FormulaFunction::Sin).negate(),
+        ]);
         assert!(matches!(difference, PrintedFormula::Sum(terms) if terms.len() == 2));
         assert!(PrintedFormula::sum([name("a"), name("a").negate()]).is_zero());
     }

@@ -7,8 +7,8 @@ use modelmill_spec::Mechanism;
 use proptest::prelude::*;
 
 use super::parse::parse;
-use super::{PrintedFormula, FormulaFunction, FormulaSymbol, atom, formula};
-use crate::expr::{AtomAngleSum, Atom, ExprId, FieldPoint, Graph, Rational, EvaluationTape, Unary};
+use super::{FormulaFunction, FormulaSymbol, PrintedFormula, atom, formula};
+use crate::expr::{Atom, AtomAngleSum, EvaluationTape, ExprId, FieldPoint, Graph, Rational, Unary};
 
 /// How to build an expression.
 #[derive(Clone, Debug)]
@@ -248,8 +248,14 @@ fn names_are_typeset_as_engineers_write_them() {
     ] {
         assert_eq!(FormulaSymbol::new(plain).latex(), latex, "{plain}");
     }
-    assert_eq!(FormulaSymbol::time_derivative("theta1", 2).text(), "theta1_dd");
-    assert_eq!(FormulaSymbol::time_derivative("theta1", 2).latex(), "\\ddot{\\theta}_{1}");
+    assert_eq!(
+        FormulaSymbol::time_derivative("theta1", 2).text(),
+        "theta1_dd"
+    );
+    assert_eq!(
+        FormulaSymbol::time_derivative("theta1", 2).latex(),
+        "\\ddot{\\theta}_{1}"
+    );
 }
 
 #[test]

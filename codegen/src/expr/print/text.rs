@@ -29,12 +29,16 @@ impl fmt::Display for PrintedFormula {
 fn write_at(f: &mut dyn Write, formula: &PrintedFormula, level: TextPrecedence) -> fmt::Result {
     let enclosed = match formula {
         PrintedFormula::Sum(_) => level > TextPrecedence::Sum,
-        PrintedFormula::Number(n) => level > TextPrecedence::Sum && (n.is_negative() || !n.is_integer()),
+        PrintedFormula::Number(n) => {
+            level > TextPrecedence::Sum && (n.is_negative() || !n.is_integer())
+        }
         PrintedFormula::Term { factor, .. } => {
             level > TextPrecedence::Factor || (level > TextPrecedence::Sum && factor.is_negative())
         }
         PrintedFormula::Power(..) => level > TextPrecedence::Factor,
-        PrintedFormula::Symbol(_) | PrintedFormula::Indexed(..) | PrintedFormula::Apply(..) => false,
+        PrintedFormula::Symbol(_) | PrintedFormula::Indexed(..) | PrintedFormula::Apply(..) => {
+            false
+        }
     };
     if enclosed {
         f.write_char('(')?;
@@ -110,7 +114,12 @@ fn magnitude(f: &mut dyn Write, formula: &PrintedFormula) -> fmt::Result {
     }
 }
 
-fn term(f: &mut dyn Write, factor: &Rational, above: &[PrintedFormula], below: &[PrintedFormula]) -> fmt::Result {
+fn term(
+    f: &mut dyn Write,
+    factor: &Rational,
+    above: &[PrintedFormula],
+    below: &[PrintedFormula],
+) -> fmt::Result {
     let (n, d) = digits(factor);
     let mut divisors = Vec::new();
     if above.is_empty() {

@@ -8,7 +8,7 @@ use modelmill_spec::Mechanism;
 use nalgebra::DMatrix;
 
 use super::loads::CutLoop;
-use crate::expr::{Atom, ExprId, FloatDomain, Graph, EvaluationTape};
+use crate::expr::{Atom, EvaluationTape, ExprId, FloatDomain, Graph};
 use crate::loops::numeric_poses::{NumericLoops, uniform_symmetric};
 use crate::regressor::UnreducedEquations;
 
@@ -51,8 +51,12 @@ pub(super) fn determined_components(
             let seed = stream.next_bits();
             let drawn = |atom: Atom| match atom {
                 Atom::Pi => std::f64::consts::PI,
-                Atom::Constant(i) => 0.5 + uniform_symmetric(&mut RandomStream::new(seed ^ (2 * i as u64 + 1))),
-                Atom::Coordinate(i) => 0.5 + uniform_symmetric(&mut RandomStream::new(seed ^ (2 * i as u64 + 2))),
+                Atom::Constant(i) => {
+                    0.5 + uniform_symmetric(&mut RandomStream::new(seed ^ (2 * i as u64 + 1)))
+                }
+                Atom::Coordinate(i) => {
+                    0.5 + uniform_symmetric(&mut RandomStream::new(seed ^ (2 * i as u64 + 2)))
+                }
                 _ => 0.0,
             };
             let Some(found) = reach(free, &drawn) else {

@@ -2,13 +2,15 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use modelmill_spec::{FrameAxis, DriveKind, Mechanism, PointIdx};
+use modelmill_spec::{DriveKind, FrameAxis, Mechanism, PointIdx};
 
 use super::force_through_point;
 use crate::DeriveError;
 use crate::expr::vector::{self, AxisRotation, SymbolicVector, push_rotation};
 use crate::expr::{Atom, ExprId, Graph};
-use crate::loops::stretch::{PointPairPath, fixed_rotations, inverse_rotations, local_position, sum_segments};
+use crate::loops::stretch::{
+    PointPairPath, fixed_rotations, inverse_rotations, local_position, sum_segments,
+};
 use crate::newton_euler::{JointLoad, SymbolicWrench, rotate_into_inner};
 use crate::regressor::UnreducedEquations;
 use crate::regressor::mechanics::point_forces;
@@ -60,12 +62,19 @@ fn paths_from_common_link(
         common: shared.checked_sub(1).map(|last| a[last]),
         links: [a[shared..].to_vec(), b[shared..].to_vec()],
         of_points,
-        at: [local_position(graph, points[0])?, local_position(graph, points[1])?],
+        at: [
+            local_position(graph, points[0])?,
+            local_position(graph, points[1])?,
+        ],
     })
 }
 
 /// Turns along a path of links, behind others.
-fn rotations_along(tree: &KinematicTree, start: &[AxisRotation], links: &[usize]) -> Vec<AxisRotation> {
+fn rotations_along(
+    tree: &KinematicTree,
+    start: &[AxisRotation],
+    links: &[usize],
+) -> Vec<AxisRotation> {
     let mut turns = Vec::new();
     let of_links = links.iter().map(|i| &tree.links[*i]);
     let along = of_links.flat_map(|link| link.pre.iter().chain([&link.joint]));
@@ -133,7 +142,8 @@ pub(super) fn cut_loops(
         };
         let sides = [side(0), side(1)];
         // Points stay in one plane, and their frames turn about its normal alone.
-        let is_planar = gap[2] == Graph::ZERO && sides.iter().all(|s| is_rotation_about_z(&s.turns));
+        let is_planar =
+            gap[2] == Graph::ZERO && sides.iter().all(|s| is_rotation_about_z(&s.turns));
         cuts.push(CutLoop {
             name: closed.name.clone(),
             gap,

@@ -13,7 +13,7 @@ mod loads;
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use modelmill_spec::{FrameAxis, Mechanism, EffectPlace};
+use modelmill_spec::{EffectPlace, FrameAxis, Mechanism};
 use nalgebra::DMatrix;
 
 use crate::expr::vector::SymbolicVector;
@@ -96,7 +96,8 @@ fn reactions(
     let mut all = body_wrenches(graph, equations, &value);
     let on_tree = required_forces(graph, mechanism, equations, &value, &all)?;
     let drives = equations.projection.drive_forces(graph, &on_tree)?;
-    let closing_forces = loop_closure_forces(graph, mechanism, equations, &cuts, &on_tree, &drives)?;
+    let closing_forces =
+        loop_closure_forces(graph, mechanism, equations, &cuts, &on_tree, &drives)?;
     all.extend(loads::drive_loads(graph, mechanism, equations, &drives)?);
     all.extend(loads::effect_loads(graph, mechanism, equations, &value)?);
     for cut in &cuts {
@@ -115,7 +116,8 @@ fn reactions(
         components.push(cut.reported_force(graph, tree));
     }
     let components: Vec<ExprId> = components.concat();
-    let determined = determined::determined_components(graph, mechanism, equations, &cuts, &components);
+    let determined =
+        determined::determined_components(graph, mechanism, equations, &cuts, &components);
 
     // What is not determined may be anything, so it may be nothing.
     let known = loads::known_values(graph, &cuts, &closing_forces.of_gap);
@@ -160,7 +162,10 @@ fn reactions(
 }
 
 /// Every product of parameters as an expression.
-fn product_values(graph: &mut Graph, equations: &UnreducedEquations) -> BTreeMap<ParameterMonomial, ExprId> {
+fn product_values(
+    graph: &mut Graph,
+    equations: &UnreducedEquations,
+) -> BTreeMap<ParameterMonomial, ExprId> {
     let products = equations.products.iter();
     products
         .map(|m| (m.clone(), base::product_expression(graph, m)))
@@ -174,7 +179,8 @@ fn body_wrenches(
     value: &dyn Fn(&ParameterMonomial) -> ExprId,
 ) -> Vec<JointLoad> {
     let tree = &equations.tree;
-    let motion = newton_euler::forward_recursion(graph, tree, &equations.gravity, RecursionStyle::PLAIN);
+    let motion =
+        newton_euler::forward_recursion(graph, tree, &equations.gravity, RecursionStyle::PLAIN);
     let inertia = equations.inertia.total_inertias(graph, value);
     let loads = inertia.into_iter().map(|(link, inertia)| JointLoad {
         link,
@@ -197,7 +203,13 @@ fn required_forces(
         .iter()
         .map(|load| (load.link, newton_euler::JointSide::Moving, load.wrench))
         .collect();
-    let on_tree = newton_euler::backward_recursion(graph, &equations.tree, RecursionStyle::PLAIN, n, wrenches);
+    let on_tree = newton_euler::backward_recursion(
+        graph,
+        &equations.tree,
+        RecursionStyle::PLAIN,
+        n,
+        wrenches,
+    );
     let effects = equations.effect_forces(graph, mechanism, value)?;
     Ok(on_tree
         .iter()
@@ -341,7 +353,11 @@ fn link_names(mechanism: &Mechanism, tree: &KinematicTree) -> Vec<String> {
 }
 
 /// All joints but those of free bodies, which only count coordinates and transmit nothing.
-fn reaction_joints(mechanism: &Mechanism, equations: &UnreducedEquations, free: &BTreeSet<usize>) -> Vec<ReactionJoint> {
+fn reaction_joints(
+    mechanism: &Mechanism,
+    equations: &UnreducedEquations,
+    free: &BTreeSet<usize>,
+) -> Vec<ReactionJoint> {
     let tree = &equations.tree;
     let names = link_names(mechanism, tree);
     let joints = (0..tree.links.len()).filter(|i| tree.links[*i].is_moving() && !free.contains(i));
@@ -388,7 +404,11 @@ fn free_links(mechanism: &Mechanism, equations: &UnreducedEquations) -> BTreeSet
 }
 
 /// A force through a point: its moment about the origin goes with it.
-fn force_through_point(graph: &mut Graph, at: &SymbolicVector, force: SymbolicVector) -> SymbolicWrench {
+fn force_through_point(
+    graph: &mut Graph,
+    at: &SymbolicVector,
+    force: SymbolicVector,
+) -> SymbolicWrench {
     let moment = graph.cross(at, &force);
     SymbolicWrench { force, moment }
 }

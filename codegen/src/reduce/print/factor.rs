@@ -3,7 +3,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::super::rational_function::{TrigonometricPolynomial, PowerProduct, FactorVariable};
+use super::super::rational_function::{FactorVariable, PowerProduct, TrigonometricPolynomial};
 use super::{content, ordered_terms};
 use crate::expr::Rational;
 
@@ -130,7 +130,10 @@ fn leading_term(p: &TrigonometricPolynomial) -> Option<(&PowerProduct, &Rational
 }
 
 /// The exact quotient, if there is one.
-fn exact_quotient(p: &TrigonometricPolynomial, by: &TrigonometricPolynomial) -> Option<TrigonometricPolynomial> {
+fn exact_quotient(
+    p: &TrigonometricPolynomial,
+    by: &TrigonometricPolynomial,
+) -> Option<TrigonometricPolynomial> {
     let (lead, k) = leading_term(by)?;
     let inverse = k.recip();
     let mut rest = p.clone();
@@ -161,7 +164,8 @@ pub(super) struct SumSquare {
 /// Squares of sums of several variables that a polynomial contains term by term.
 pub(super) fn find_squares(p: &TrigonometricPolynomial) -> Vec<SumSquare> {
     let coefficient = |powers: &PowerProduct| p.get(powers).cloned().unwrap_or(Rational::ZERO);
-    let cross = |u: FactorVariable, v: FactorVariable| coefficient(&vec![(u.min(v), 1), (u.max(v), 1)]);
+    let cross =
+        |u: FactorVariable, v: FactorVariable| coefficient(&vec![(u.min(v), 1), (u.max(v), 1)]);
     let mut variables: Vec<FactorVariable> = p
         .keys()
         .filter_map(|powers| match powers.as_slice() {

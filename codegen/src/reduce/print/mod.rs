@@ -7,9 +7,11 @@ use std::collections::BTreeMap;
 
 use modelmill_spec::Mechanism;
 
-use super::rational_function::{TrigonometricPolynomial, PowerProduct, RationalFunction, FactorVariable};
+use super::rational_function::{
+    FactorVariable, PowerProduct, RationalFunction, TrigonometricPolynomial,
+};
 use crate::expr::Rational;
-use crate::expr::print::{PrintedFormula, FormulaFunction};
+use crate::expr::print::{FormulaFunction, PrintedFormula};
 
 impl FactorVariable {
     /// As it is printed: the constant's name, or its sine or cosine.
@@ -19,14 +21,20 @@ impl FactorVariable {
             Self::Constant(i) => name(i),
             Self::Cos(i) => PrintedFormula::apply(FormulaFunction::Cos, name(i)),
             Self::Sin(i) => PrintedFormula::apply(FormulaFunction::Sin, name(i)),
-            Self::Root(n) => PrintedFormula::apply(FormulaFunction::Sqrt, PrintedFormula::integer(n)),
+            Self::Root(n) => {
+                PrintedFormula::apply(FormulaFunction::Sqrt, PrintedFormula::integer(n))
+            }
         }
     }
 }
 
 impl RationalFunction {
     /// As a sum of plain terms, each times `factors`: what a script reads.
-    pub fn expanded_terms(&self, mechanism: &Mechanism, factors: &[PrintedFormula]) -> Vec<PrintedFormula> {
+    pub fn expanded_terms(
+        &self,
+        mechanism: &Mechanism,
+        factors: &[PrintedFormula],
+    ) -> Vec<PrintedFormula> {
         let below = match self.denominator.first_key_value() {
             Some((powers, k)) if self.denominator.len() == 1 => {
                 let mut below = power_factors(powers, mechanism);
@@ -132,14 +140,17 @@ fn compare_powers(a: &PowerProduct, b: &PowerProduct) -> Ordering {
 
 fn expand_polynomial(p: &TrigonometricPolynomial, mechanism: &Mechanism) -> PrintedFormula {
     PrintedFormula::sum(
-        ordered_terms(p)
-            .into_iter()
-            .map(|(powers, k)| PrintedFormula::product(k.clone(), power_factors(powers, mechanism))),
+        ordered_terms(p).into_iter().map(|(powers, k)| {
+            PrintedFormula::product(k.clone(), power_factors(powers, mechanism))
+        }),
     )
 }
 
 /// A number and the factors of a polynomial.
-fn polynomial_factors(p: &TrigonometricPolynomial, mechanism: &Mechanism) -> (Rational, Vec<PrintedFormula>) {
+fn polynomial_factors(
+    p: &TrigonometricPolynomial,
+    mechanism: &Mechanism,
+) -> (Rational, Vec<PrintedFormula>) {
     let factor::FactoredPolynomial {
         number,
         monomial,
@@ -165,7 +176,10 @@ fn gather_squares(p: &TrigonometricPolynomial, mechanism: &Mechanism) -> Printed
                 .iter()
                 .map(|(v, k)| PrintedFormula::product(k.clone(), [v.formula(mechanism)])),
         );
-        squares.insert(first, PrintedFormula::product(square.number, [sum.power(2)]));
+        squares.insert(
+            first,
+            PrintedFormula::product(square.number, [sum.power(2)]),
+        );
         for used in &square.terms {
             rest.remove(used);
         }

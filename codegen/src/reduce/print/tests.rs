@@ -6,7 +6,9 @@ use modelmill_algebra::field::{FieldElement, RandomStream};
 
 use proptest::prelude::*;
 
-use super::super::rational_function::{TrigonometricPolynomial, PowerProduct, RationalFunction, FactorVariable};
+use super::super::rational_function::{
+    FactorVariable, PowerProduct, RationalFunction, TrigonometricPolynomial,
+};
 use crate::expr::print::parse::parse;
 use crate::expr::{Atom, FieldPoint, Rational};
 use crate::review::tests::model;
@@ -108,7 +110,11 @@ proptest! {
 }
 
 /// Constants of the model are d1, d3, b, dA, Bx, ... in this order.
-fn check(numerator: &TrigonometricPolynomial, denominator: &TrigonometricPolynomial, expected: &str) {
+fn check(
+    numerator: &TrigonometricPolynomial,
+    denominator: &TrigonometricPolynomial,
+    expected: &str,
+) {
     let mechanism = model("spidermill-paper");
     let function = RationalFunction::new(numerator.clone(), denominator.clone());
     assert_eq!(function.formula(&mechanism).text(), expected);
@@ -157,7 +163,11 @@ fn squares_and_their_differences_are_seen() {
 /// The same at random points, with fewer terms where even powers of a cosine make up one of the sine.
 #[test]
 fn even_powers_of_cosines_become_sines_where_that_is_shorter() {
-    let (length, cosine, sine) = (FactorVariable::Constant(0), FactorVariable::Cos(1), FactorVariable::Sin(1));
+    let (length, cosine, sine) = (
+        FactorVariable::Constant(0),
+        FactorVariable::Cos(1),
+        FactorVariable::Sin(1),
+    );
     let one = Rational::ONE;
     let numerator = TrigonometricPolynomial::from([
         (vec![(length, 2)], one.clone()),
@@ -168,7 +178,8 @@ fn even_powers_of_cosines_become_sines_where_that_is_shorter() {
         (vec![(cosine, 2)], Rational::integer(-2)),
         (vec![(cosine, 4)], one.clone()),
     ]);
-    let kept = TrigonometricPolynomial::from([(vec![(cosine, 2)], one.clone()), (vec![(sine, 1)], one)]);
+    let kept =
+        TrigonometricPolynomial::from([(vec![(cosine, 2)], one.clone()), (vec![(sine, 1)], one)]);
     for (p, n_terms, power_of_sine) in [(numerator, 1, 2), (quartic, 1, 4), (kept, 2, 1)] {
         let written = RationalFunction {
             numerator: p.clone(),
@@ -182,8 +193,12 @@ fn even_powers_of_cosines_become_sines_where_that_is_shorter() {
         for _ in 0..4 {
             let mut point = FieldPoint::<FieldElement>::default();
             for i in 0..2 {
-                point.values.insert(Atom::Constant(i), stream.next_element());
-                point.angles.insert(Atom::Constant(i), stream.next_circle_point());
+                point
+                    .values
+                    .insert(Atom::Constant(i), stream.next_element());
+                point
+                    .angles
+                    .insert(Atom::Constant(i), stream.next_circle_point());
             }
             assert_eq!(found.value(&point), written.value(&point));
         }

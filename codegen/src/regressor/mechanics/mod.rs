@@ -3,7 +3,7 @@
 mod rod;
 mod strut;
 
-use modelmill_spec::{ModelEffect, Mechanics, Mechanism, PointIdx};
+use modelmill_spec::{Mechanics, Mechanism, ModelEffect, PointIdx};
 
 use crate::DeriveError;
 use crate::expr::vector::SymbolicVector;

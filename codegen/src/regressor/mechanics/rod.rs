@@ -6,7 +6,7 @@
 //! `du'(Jr u'' + Sr (a'' - g)) + da'(Sr u'' + mr (a'' - g))` with the moments `Jr`, `Sr` and `mr` of second, first and
 //! no order of the mass along the rod.
 
-use modelmill_spec::{DriveIdx, DriveKind, ModelEffect, Mechanism, EffectPlace, PointIdx};
+use modelmill_spec::{DriveIdx, DriveKind, EffectPlace, Mechanism, ModelEffect, PointIdx};
 
 use crate::DeriveError;
 use crate::expr::vector::SymbolicVector;

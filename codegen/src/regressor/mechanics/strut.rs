@@ -3,7 +3,7 @@
 //! With the points `a` and `b`, `d = b - a` and `l = |d|`, the pull `F0 + k l + Fv l'` needs `(F0 + k l + Fv l') dl/dq`
 //! (virtual power), where `l dl/dq = d . dd/dq` and `l l' = d . d'`.
 
-use modelmill_spec::{ModelEffect, Mechanism, EffectPlace, PointIdx};
+use modelmill_spec::{EffectPlace, Mechanism, ModelEffect, PointIdx};
 
 use crate::DeriveError;
 use crate::expr::vector::SymbolicVector;

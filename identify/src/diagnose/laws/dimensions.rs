@@ -117,19 +117,32 @@ mod tests {
             unit(1, None, &[(Rate, LawShape::integer_power(2, true))]),
             "N m s^2/rad^2"
         );
-        assert_eq!(unit(0, None, &[(Load, LawShape::integer_power(2, false))]), "1/N");
         assert_eq!(
-            unit(1, None, &[(Load, LawShape::MAGNITUDE), (Rate, LawShape::SIGN)]),
+            unit(0, None, &[(Load, LawShape::integer_power(2, false))]),
+            "1/N"
+        );
+        assert_eq!(
+            unit(
+                1,
+                None,
+                &[(Load, LawShape::MAGNITUDE), (Rate, LawShape::SIGN)]
+            ),
             "1"
         );
         assert_eq!(
             unit(
                 1,
                 None,
-                &[(Position, LawShape::LINEAR), (Acceleration, LawShape::LINEAR)]
+                &[
+                    (Position, LawShape::LINEAR),
+                    (Acceleration, LawShape::LINEAR)
+                ]
             ),
             "N m s^2/rad^2"
         );
-        assert_eq!(unit(0, None, &[(Position, LawShape::integer_power(3, true))]), "N/m^3");
+        assert_eq!(
+            unit(0, None, &[(Position, LawShape::integer_power(3, true))]),
+            "N/m^3"
+        );
     }
 }

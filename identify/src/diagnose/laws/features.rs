@@ -52,7 +52,8 @@ impl LawProduct {
     /// How much it takes to write it down: factors, constants that are sought, parameters.
     pub(crate) fn description_length(&self) -> usize {
         let of = |factor: &LawFactor| {
-            let is_plain = matches!(factor.shape, LawShape::Power { halves, .. } if halves % 2 == 0);
+            let is_plain =
+                matches!(factor.shape, LawShape::Power { halves, .. } if halves % 2 == 0);
             1 + factor.shape.freedoms() + usize::from(!is_plain)
         };
         self.factors.iter().map(of).sum::<usize>() + usize::from(self.other.is_some())
@@ -79,13 +80,16 @@ impl LawProduct {
                 {
                     true
                 }
-                (LawVariable::Rate, shape) if [LawShape::SIGN, LawShape::integer_power(2, true)].contains(shape) => {
+                (LawVariable::Rate, shape)
+                    if [LawShape::SIGN, LawShape::integer_power(2, true)].contains(shape) =>
+                {
                     true
                 }
                 (LawVariable::Rate, LawShape::Fading { halves: 4, .. }) => true,
-                (LawVariable::Position, LawShape::Wave { .. } | LawShape::Memory { curve: 1, .. }) => {
-                    site.channel.is_some()
-                }
+                (
+                    LawVariable::Position,
+                    LawShape::Wave { .. } | LawShape::Memory { curve: 1, .. },
+                ) => site.channel.is_some(),
                 _ => false,
             },
             [load, way] => {
@@ -180,7 +184,10 @@ impl TravelExtent {
 
     fn hinge_shapes(&self, power: i32) -> impl Iterator<Item = LawShape> {
         ENDS.into_iter().flat_map(move |part| {
-            let ends = [(1.0, self.position_at(1.0 - part)), (-1.0, self.position_at(part))];
+            let ends = [
+                (1.0, self.position_at(1.0 - part)),
+                (-1.0, self.position_at(part)),
+            ];
             ends.map(|(side, from)| LawShape::Hinge { from, side, power })
         })
     }
@@ -255,16 +262,29 @@ pub(crate) fn own_factors(position: &[f64], rate: &[f64], load: Option<&[f64]>) 
         side,
         power: 1,
     });
-    let powers = [LawShape::LINEAR, LawShape::integer_power(2, false), LawShape::integer_power(3, true)];
+    let powers = [
+        LawShape::LINEAR,
+        LawShape::integer_power(2, false),
+        LawShape::integer_power(3, true),
+    ];
     let mut menu = FactorCatalog::default();
     let alone = &mut menu.single_factors;
     alone.extend(factors_of(Position, powers));
-    alone.extend(factors_of(Position, extent.shifted_powers(2).chain(extent.shifted_powers(3))));
-    alone.extend(factors_of(Position, extent.hinge_shapes(1).chain(extent.hinge_shapes(2))));
+    alone.extend(factors_of(
+        Position,
+        extent.shifted_powers(2).chain(extent.shifted_powers(3)),
+    ));
+    alone.extend(factors_of(
+        Position,
+        extent.hinge_shapes(1).chain(extent.hinge_shapes(2)),
+    ));
     alone.extend(factors_of(Position, extent.wave_shapes()));
     alone.extend(factors_of(Position, extent.local_shapes(bump, &WIDTHS)));
     alone.extend(factors_of(Position, extent.local_shapes(detent, &WIDTHS)));
-    alone.extend(factors_of(Position, extent.local_shapes(step, &WIDTHS[..1])));
+    alone.extend(factors_of(
+        Position,
+        extent.local_shapes(step, &WIDTHS[..1]),
+    ));
     alone.extend(factors_of(Position, extent.memory_shapes()));
     let speeds = [
         LawShape::SIGN,
@@ -289,7 +309,10 @@ pub(crate) fn own_factors(position: &[f64], rate: &[f64], load: Option<&[f64]>) 
         let slow = SCALES.map(|part| make(0.0, part * extent.fastest));
         alone.extend(factors_of(Rate, slow));
     }
-    alone.extend(factors_of(Acceleration, [LawShape::LINEAR, LawShape::MAGNITUDE]));
+    alone.extend(factors_of(
+        Acceleration,
+        [LawShape::LINEAR, LawShape::MAGNITUDE],
+    ));
     // Friction and damping that differ from place to place, and mass that does.
     let ways = [
         LawShape::LINEAR,
@@ -300,14 +323,21 @@ pub(crate) fn own_factors(position: &[f64], rate: &[f64], load: Option<&[f64]>) 
         extent.step_shapes()[4],
     ];
     let some = [LawShape::LINEAR, LawShape::integer_power(2, false)].into_iter();
-    let some = some.chain(extent.shifted_powers(2)).chain(extent.hinge_shapes(1));
+    let some = some
+        .chain(extent.shifted_powers(2))
+        .chain(extent.hinge_shapes(1));
     let some = some.chain(extent.local_shapes(bump, &WIDTHS[1..]));
-    menu.pairs.push([factors_of(Position, some), factors_of(Rate, ways)]);
+    menu.pairs
+        .push([factors_of(Position, some), factors_of(Rate, ways)]);
     let few = [LawShape::LINEAR, LawShape::SIGN, LawShape::MAGNITUDE];
-    menu.pairs
-        .push([factors_of(Position, extent.wave_shapes()), factors_of(Rate, few)]);
-    menu.pairs
-        .push([simple_positions(), factors_of(Acceleration, [LawShape::LINEAR])]);
+    menu.pairs.push([
+        factors_of(Position, extent.wave_shapes()),
+        factors_of(Rate, few),
+    ]);
+    menu.pairs.push([
+        simple_positions(),
+        factors_of(Acceleration, [LawShape::LINEAR]),
+    ]);
     if let Some(load) = load {
         add_loads(&mut menu, &extent, load);
     }
@@ -338,23 +368,36 @@ fn add_loads(menu: &mut FactorCatalog, extent: &TravelExtent, load: &[f64]) {
             power: 1,
         })
     });
-    menu.single_factors.extend(factors_of(Load, loads.iter().copied()));
+    menu.single_factors
+        .extend(factors_of(Load, loads.iter().copied()));
     menu.single_factors.extend(factors_of(Load, cut));
     let mut speeds = vec![LawShape::LINEAR, LawShape::SIGN, LawShape::MAGNITUDE];
     speeds.extend(extent.step_shapes());
     speeds.extend(extent.fading_shapes(4));
+    menu.pairs.push([
+        factors_of(Load, loads.iter().copied()),
+        factors_of(Rate, speeds),
+    ]);
     menu.pairs
-        .push([factors_of(Load, loads.iter().copied()), factors_of(Rate, speeds)]);
-    menu.pairs.push([factors_of(Load, loads), simple_positions()]);
+        .push([factors_of(Load, loads), simple_positions()]);
 }
 
 /// What is tried of another place, alone and with what the place does by itself.
-pub(crate) fn factors_with_other(own_rate: &[f64], position: &[f64], rate: &[f64], is_angle: bool) -> FactorCatalog {
+pub(crate) fn factors_with_other(
+    own_rate: &[f64],
+    position: &[f64],
+    rate: &[f64],
+    is_angle: bool,
+) -> FactorCatalog {
     use LawVariable::{Acceleration, OtherPosition, OtherRate, Position, Rate};
     let [low, high] = range(position);
     let (fastest, own_fastest) = (largest_magnitude(rate), largest_magnitude(own_rate));
     let travel = high - low;
-    let mut places = vec![LawShape::LINEAR, LawShape::integer_power(2, false), LawShape::integer_power(3, true)];
+    let mut places = vec![
+        LawShape::LINEAR,
+        LawShape::integer_power(2, false),
+        LawShape::integer_power(3, true),
+    ];
     places.extend(MIDDLES.map(|part| LawShape::Shifted {
         centre: low + part * travel,
         power: 2,
@@ -406,8 +449,14 @@ pub(crate) fn factors_with_other(own_rate: &[f64], position: &[f64], rate: &[f64
     let few = [LawShape::LINEAR, LawShape::SIGN, LawShape::MAGNITUDE];
     FactorCatalog {
         pairs: vec![
-            [factors_of(OtherPosition, places[..3].iter().copied()), own()],
-            [factors_of(OtherPosition, places[3..].iter().copied()), own()],
+            [
+                factors_of(OtherPosition, places[..3].iter().copied()),
+                own(),
+            ],
+            [
+                factors_of(OtherPosition, places[3..].iter().copied()),
+                own(),
+            ],
             [factors_of(OtherRate, rates.iter().copied()), own()],
             [
                 factors_of(OtherPosition, places[..2].iter().copied()),

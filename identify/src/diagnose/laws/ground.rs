@@ -3,7 +3,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::features::{LawFactor, FactorCatalog, LawProduct, LawSite, own_factors, range, factors_with_other};
+use super::features::{
+    FactorCatalog, LawFactor, LawProduct, LawSite, factors_with_other, own_factors, range,
+};
 use super::shapes::LawVariable;
 use crate::diagnose::bench::{EffectSelector, SelectedEffect};
 
@@ -84,7 +86,12 @@ impl<'a> LawSamples<'a> {
     }
 
     /// A factor along the samples.
-    fn factor_columns(&self, site: usize, other: Option<usize>, factor: &LawFactor) -> Vec<Vec<f64>> {
+    fn factor_columns(
+        &self,
+        site: usize,
+        other: Option<usize>,
+        factor: &LawFactor,
+    ) -> Vec<Vec<f64>> {
         if !factor.shape.has_memory() {
             let track = self.track(site, other, factor.variable);
             return factor.shape.values(track, &[0]);
@@ -103,7 +110,10 @@ impl<'a> LawSamples<'a> {
             let shapes = self.factor_columns(site, product.other, factor);
             columns = pairwise_products(&columns, &shapes);
         }
-        columns.iter().map(|one| self.drive_forces(site, one)).collect()
+        columns
+            .iter()
+            .map(|one| self.drive_forces(site, one))
+            .collect()
     }
 
     /// What the drives must supply for a force at a place, channel after channel, in units of the noise.
@@ -123,7 +133,11 @@ impl<'a> LawSamples<'a> {
     }
 
     /// What is tried at a place: by itself, and with each other place that `wanted` names.
-    fn factor_catalogs(&self, site: usize, wanted: &dyn Fn(usize) -> bool) -> Vec<(Option<usize>, FactorCatalog)> {
+    fn factor_catalogs(
+        &self,
+        site: usize,
+        wanted: &dyn Fn(usize) -> bool,
+    ) -> Vec<(Option<usize>, FactorCatalog)> {
         let [position, rate, _, _] = &self.tracks[site];
         let load = self.loads[site].as_ref().map(|_| &self.tracks[site][3][..]);
         let mut menus = vec![(None, own_factors(position, rate, load))];
@@ -240,7 +254,12 @@ impl LawProjection {
     }
 
     /// The same beside a product at a place.
-    pub(crate) fn conditional_on_product(&self, samples: &LawSamples<'_>, site: usize, product: &LawProduct) -> Self {
+    pub(crate) fn conditional_on_product(
+        &self,
+        samples: &LawSamples<'_>,
+        site: usize,
+        product: &LawProduct,
+    ) -> Self {
         let mut more = self.clone();
         let n = self.samples;
         let channels = samples.channels(site);
@@ -381,7 +400,12 @@ impl ProductBatch {
     }
 
     /// Scores those that wait if there are so many.
-    fn score_batch(&mut self, part: &SiteProjection, least: usize, scored: &mut Vec<ScoredProduct>) {
+    fn score_batch(
+        &mut self,
+        part: &SiteProjection,
+        least: usize,
+        scored: &mut Vec<ScoredProduct>,
+    ) {
         if self.columns.len() < least {
             return;
         }

@@ -115,7 +115,12 @@ impl BlockValidation {
     }
 
     /// A law of some products at a place, fitted and held out.
-    pub(crate) fn validate_law(&self, samples: &LawSamples<'_>, site: usize, terms: &[LawProduct]) -> ValidatedLaw {
+    pub(crate) fn validate_law(
+        &self,
+        samples: &LawSamples<'_>,
+        site: usize,
+        terms: &[LawProduct],
+    ) -> ValidatedLaw {
         let channels = samples.channels(site);
         let own: Vec<Vec<f64>> = (terms.iter())
             .flat_map(|term| samples.columns(site, term))
@@ -141,7 +146,8 @@ impl BlockValidation {
                         whole[(place(i), n + a)] += product;
                     }
                     for (b, other) in own.iter().enumerate().take(a + 1) {
-                        let product = product_on_block(block, values, &other[part * k..(part + 1) * k]);
+                        let product =
+                            product_on_block(block, values, &other[part * k..(part + 1) * k]);
                         whole[(n + a, n + b)] += product;
                         if a != b {
                             whole[(n + b, n + a)] += product;

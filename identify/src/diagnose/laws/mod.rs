@@ -25,9 +25,9 @@ use super::aliases::MIN_DISTINCTION;
 use super::bench::{EffectSelector, SelectedEffect};
 use super::evidence::LEAST_GAIN;
 use super::pool::{FitScope, dot};
-use super::problem::{LocatedEffect, CandidateNature, ColumnProvider};
+use super::problem::{CandidateNature, ColumnProvider, LocatedEffect};
 use features::ProductForm;
-use ground::{LawProjection, SiteProjection, LawSamples, ScoredProduct};
+use ground::{LawProjection, LawSamples, ScoredProduct, SiteProjection};
 use held_out::{BlockValidation, ValidatedLaw};
 
 /// A term of a law: a product, and the parameter or two that it is multiplied by.
@@ -121,7 +121,13 @@ impl LawBaseline {
         }
     }
 
-    fn add_law(&mut self, few: &LawSamples<'_>, many: &LawSamples<'_>, site: usize, terms: &[LawProduct]) {
+    fn add_law(
+        &mut self,
+        few: &LawSamples<'_>,
+        many: &LawSamples<'_>,
+        site: usize,
+        terms: &[LawProduct],
+    ) {
         for term in terms {
             self.ground = self.ground.conditional_on_product(few, site, term);
         }
@@ -158,7 +164,12 @@ impl ResidualView<'_> {
     }
 
     /// Part of the squares per sample of some channels, in units of the noise.
-    fn squares_over_noise(&self, channels: &[usize], deviations: &[f64], part: &dyn Fn(usize) -> f64) -> f64 {
+    fn squares_over_noise(
+        &self,
+        channels: &[usize],
+        deviations: &[f64],
+        part: &dyn Fn(usize) -> f64,
+    ) -> f64 {
         let scaled = channels
             .iter()
             .map(|d| part(*d) * self.squares_per_sample(*d) / deviations[*d].powi(2));
@@ -178,7 +189,8 @@ impl ResidualView<'_> {
     /// depends on few things of many may come again where no flexible function of all of them does.
     fn open_channels(&self, noise: &[f64]) -> Vec<usize> {
         let is_suspicious = |d: &usize| {
-            !self.unexplained.contains(d) && self.squares_per_sample(*d) > SUSPICIOUS * noise[*d].powi(2)
+            !self.unexplained.contains(d)
+                && self.squares_per_sample(*d) > SUSPICIOUS * noise[*d].powi(2)
         };
         let others = (0..self.residual.len()).filter(is_suspicious);
         self.unexplained.iter().copied().chain(others).collect()
@@ -211,7 +223,8 @@ pub(crate) fn propose_laws(
     let deviations = left.non_repeatable_deviations(&bench.problem.noise);
     let few = LawSamples::new(bench, &sites, &loads, &deviations, SCREENED);
     let many = LawSamples::new(bench, &sites, &loads, &deviations, VALIDATION_SAMPLES);
-    let base = |picks: Vec<SelectedEffect>| LawBaseline::new(bench, picks, &few, &many, &deviations);
+    let base =
+        |picks: Vec<SelectedEffect>| LawBaseline::new(bench, picks, &few, &many, &deviations);
     let mut bases = vec![base(picks.to_vec())];
     let fewer = drop_effects_on(bench, picks, &open);
     if fewer.len() < picks.len() {
@@ -223,7 +236,8 @@ pub(crate) fn propose_laws(
         let is_felt = |site: &usize| few.channels(*site).contains(&channel);
         let felt: Vec<usize> = (0..sites.len()).filter(is_felt).collect();
         let squares = |samples: &LawSamples<'_>, site: usize, of: &dyn Fn(usize) -> f64| {
-            samples.picked.len() as f64 * left.squares_over_noise(&samples.channels(site), &deviations, of)
+            samples.picked.len() as f64
+                * left.squares_over_noise(&samples.channels(site), &deviations, of)
         };
         // What a law must take off of all that is left there.
         let least = |site: usize| {
@@ -260,7 +274,8 @@ pub(crate) fn propose_laws(
             let (off, deviation) = without.excess_over(&one.validation);
             gain >= least(one.site) && off > deviation && by_chance < CHANCE
         };
-        let Some((chosen, near_ties)) = select_law(tried, &without, &many, &is_one, &scatter) else {
+        let Some((chosen, near_ties)) = select_law(tried, &without, &many, &is_one, &scatter)
+        else {
             continue;
         };
         let law = |one: &LawTrial| {
@@ -302,7 +317,11 @@ fn try_laws(
         for (site, terms) in best_laws_by_form(&base.ground, few, sites, is_hopeful) {
             tried.push(LawTrial {
                 validation: base.held_out.validate_law(many, site, &terms),
-                size: beside + terms.iter().map(|term| 1 + term.description_length()).sum::<usize>(),
+                size: beside
+                    + terms
+                        .iter()
+                        .map(|term| 1 + term.description_length())
+                        .sum::<usize>(),
                 base: k,
                 site,
                 terms,
@@ -324,7 +343,11 @@ fn without_motion(site: LawSite) -> LawSite {
 
 /// Effects without those that act where something is open: what was found may be no more than what of the law an effect of the
 /// library is like.
-fn drop_effects_on(bench: &EffectSelector<'_>, picks: &[SelectedEffect], open: &[usize]) -> Vec<SelectedEffect> {
+fn drop_effects_on(
+    bench: &EffectSelector<'_>,
+    picks: &[SelectedEffect],
+    open: &[usize],
+) -> Vec<SelectedEffect> {
     let stays = |pick: &&SelectedEffect| {
         let channels = bench.affected_channels(std::slice::from_ref(*pick));
         bench.candidate(pick).nature == CandidateNature::Disturbance
@@ -335,7 +358,11 @@ fn drop_effects_on(bench: &EffectSelector<'_>, picks: &[SelectedEffect], open: &
 
 /// The products of a law with their parameters.
 fn law_terms(one: &LawTrial) -> Vec<LawTerm> {
-    let mut parameters = one.validation.values.iter().zip(&one.validation.standard_deviations);
+    let mut parameters = one
+        .validation
+        .values
+        .iter()
+        .zip(&one.validation.standard_deviations);
     let term = |product: &LawProduct| {
         let own = parameters.by_ref().take(product.parameters());
         let (values, deviations) = own.unzip();
@@ -369,7 +396,8 @@ fn best_laws_by_form(
     single.sort_by(|a, b| b.score.total_cmp(&a.score));
     let mut laws: Vec<(usize, Vec<LawProduct>)> = Vec::new();
     for first in single.iter().take(FIRST_TERMS) {
-        let part = (ground.conditional_on_product(samples, first.site, &first.product)).project_at_site(samples, first.site);
+        let part = (ground.conditional_on_product(samples, first.site, &first.product))
+            .project_at_site(samples, first.site);
         let screened = part.screen_products(samples, &|other| first.product.other == Some(other));
         for second in best_of_forms(screened.into_iter(), SECOND_TERMS) {
             let second = refine_constants(&part, samples, second);
@@ -399,7 +427,11 @@ fn best_of_forms(scored: impl Iterator<Item = ScoredProduct>, most: usize) -> Ve
 }
 
 /// The same form with the constants that take most off, found by smaller and smaller steps.
-fn refine_constants(part: &SiteProjection, samples: &LawSamples<'_>, mut best: ScoredProduct) -> ScoredProduct {
+fn refine_constants(
+    part: &SiteProjection,
+    samples: &LawSamples<'_>,
+    mut best: ScoredProduct,
+) -> ScoredProduct {
     let [mut step, last] = STEPS;
     for _ in 0..MOST_ROUNDS {
         if step <= last {
@@ -446,7 +478,8 @@ fn select_law(
         terms.any(|term| !term.is_in_library(&samples.sites[one.site]))
     };
     let all = tried.into_iter().filter(is_new);
-    let (mut laws, double): (Vec<LawTrial>, Vec<LawTrial>) = all.partition(|one| one.terms.len() == 1);
+    let (mut laws, double): (Vec<LawTrial>, Vec<LawTrial>) =
+        all.partition(|one| one.terms.len() == 1);
     let least = |all: &[LawTrial]| -> Option<usize> {
         let totals = all.iter().map(|one| one.validation.total()).enumerate();
         totals.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(k, _)| k)

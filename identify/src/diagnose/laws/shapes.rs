@@ -215,7 +215,12 @@ impl LawShape {
 
     /// The same shape with a constant moved, by parts of what is usual for a variable that goes from `low` to `high`. There are
     /// [`Self::freedoms`] constants.
-    pub(crate) fn with_moved_constant(self, which: usize, step: f64, [low, high]: [f64; 2]) -> Self {
+    pub(crate) fn with_moved_constant(
+        self,
+        which: usize,
+        step: f64,
+        [low, high]: [f64; 2],
+    ) -> Self {
         let travel = high - low;
         let along = |x: f64| x + step * travel;
         // What is wider than all of the range is another shape.

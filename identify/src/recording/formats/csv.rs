@@ -55,7 +55,8 @@ impl RecordingFormat for CsvFormat {
         let mut stream = input.stream();
         let (mut reader, _, header_line) = open(&mut stream, Rc::default())?;
         let names = names(&mut reader, header_line)?;
-        let time = likely_time_column(&names).and_then(|time| names.iter().position(|name| name == time));
+        let time =
+            likely_time_column(&names).and_then(|time| names.iter().position(|name| name == time));
         let mut record = csv::ByteRecord::new();
         let (mut samples, mut span) = (0, None);
         let mut kinds = vec!["number"; names.len()];
@@ -66,7 +67,9 @@ impl RecordingFormat for CsvFormat {
                     *kind = "text";
                 }
             }
-            if let Some(SampleField::Number(t)) = time.and_then(|place| record.get(place)).map(parse) {
+            if let Some(SampleField::Number(t)) =
+                time.and_then(|place| record.get(place)).map(parse)
+            {
                 span = Some((span.map_or(t, |(first, _)| first), t));
             }
         }
@@ -85,7 +88,11 @@ impl RecordingFormat for CsvFormat {
     }
 }
 
-fn read(stream: impl Read, file: &str, options: &ReadOptions) -> Result<SignalRecording, RecordingFault> {
+fn read(
+    stream: impl Read,
+    file: &str,
+    options: &ReadOptions,
+) -> Result<SignalRecording, RecordingFault> {
     let since = Rc::new(Cell::new(0));
     let (mut reader, separator, header_line) = open(stream, since.clone())?;
     let theirs = names(&mut reader, header_line)?;

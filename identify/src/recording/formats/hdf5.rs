@@ -100,7 +100,11 @@ fn open(input: RecordingInput<'_>) -> Result<File, RecordingFault> {
     opened.map_err(|error| unreadable_fault(&error))
 }
 
-fn read(opened: &File, file: &str, options: &ReadOptions) -> Result<SignalRecording, RecordingFault> {
+fn read(
+    opened: &File,
+    file: &str,
+    options: &ReadOptions,
+) -> Result<SignalRecording, RecordingFault> {
     let columns = HdfColumns::new(opened)?;
     let mut intake = SampleIntake::new(columns.names(), options)?;
     if !columns.others.is_empty() {
@@ -198,7 +202,8 @@ impl HdfColumns {
             }
             let is_upright = rows == samples;
             let n = if is_upright { width } else { rows };
-            if columns.consistent.len() as u64 + n * one.numbers.len() as u64 > MOST_COLUMNS as u64 {
+            if columns.consistent.len() as u64 + n * one.numbers.len() as u64 > MOST_COLUMNS as u64
+            {
                 return Err(format_fault("it has more columns than any recording"));
             }
             for k in 0..n {
@@ -275,7 +280,9 @@ fn collect_datasets(
             others.push(name);
             continue;
         }
-        let chunk = dataset.chunk_shape().map_err(|error| unreadable_fault(&error))?;
+        let chunk = dataset
+            .chunk_shape()
+            .map_err(|error| unreadable_fault(&error))?;
         let size = chunk
             .unwrap_or_default()
             .iter()
@@ -298,7 +305,9 @@ fn collect_datasets(
         if MATLAB_GROUPS.contains(&inner.as_str()) {
             continue;
         }
-        let within = group.group(&inner).map_err(|error| unreadable_fault(&error))?;
+        let within = group
+            .group(&inner)
+            .map_err(|error| unreadable_fault(&error))?;
         collect_datasets(
             &within,
             &format!("{path}/{inner}"),
@@ -345,7 +354,10 @@ impl HdfColumn {
             }
         }
         if values.len() != samples {
-            return Err(format_fault(format!("`{}` is shorter than it says", self.name)));
+            return Err(format_fault(format!(
+                "`{}` is shorter than it says",
+                self.name
+            )));
         }
         Ok(values)
     }
@@ -425,7 +437,13 @@ impl HdfNumber {
                     .fold(1_u64, |n, d| n.saturating_mul(u64::from(*d)));
                 for k in 0..n.min(MOST_COLUMNS as u64) {
                     let at = at.saturating_add(k * u64::from(base_type.type_size()));
-                    Self::collect_numbers(base_type, format!("{name}_{}", k + 1), at, element, numbers);
+                    Self::collect_numbers(
+                        base_type,
+                        format!("{name}_{}", k + 1),
+                        at,
+                        element,
+                        numbers,
+                    );
                 }
                 return;
             }

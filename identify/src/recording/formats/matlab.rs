@@ -68,13 +68,21 @@ impl RecordingFormat for Matlab5Format {
                 stream.rewind().ok()?;
                 read(&mut stream, "", &ReadOptions::single_column(name)).ok()
             }),
-            remark: (!columns.others.is_empty())
-                .then(|| format!("left aside, of another length: {}", backquoted_list(&columns.others))),
+            remark: (!columns.others.is_empty()).then(|| {
+                format!(
+                    "left aside, of another length: {}",
+                    backquoted_list(&columns.others)
+                )
+            }),
         }])
     }
 }
 
-fn read(stream: impl Read + Seek, file: &str, options: &ReadOptions) -> Result<SignalRecording, RecordingFault> {
+fn read(
+    stream: impl Read + Seek,
+    file: &str,
+    options: &ReadOptions,
+) -> Result<SignalRecording, RecordingFault> {
     let mut arrays = open(stream)?;
     let columns = MatlabColumns::new(&arrays)?;
     let mut intake = SampleIntake::new(columns.names(), options)?;
@@ -110,7 +118,9 @@ fn read(stream: impl Read + Seek, file: &str, options: &ReadOptions) -> Result<S
     let mut values = Vec::new();
     for (array, wanted) in arrays.arrays.clone().iter().zip(wanted) {
         values.push(if wanted {
-            arrays.read_numbers(array).map_err(|error| unreadable_fault(&error))?
+            arrays
+                .read_numbers(array)
+                .map_err(|error| unreadable_fault(&error))?
         } else {
             Vec::new()
         });

@@ -78,7 +78,9 @@ impl<R: Read + Seek> MatlabArrayFile<R> {
                     length,
                     is_compressed,
                 };
-                arrays.extend(place.open(&mut stream, is_little, |element| element.read_array(&place))?);
+                arrays.extend(
+                    place.open(&mut stream, is_little, |element| element.read_array(&place))?,
+                );
             }
             at += if is_compressed {
                 length
@@ -262,7 +264,8 @@ impl<'a> MatlabElementReader<'a> {
 
     /// The numbers of an element, whatever type they are kept as.
     fn read_numbers(&mut self, tag: &MatlabTag) -> io::Result<Vec<f64>> {
-        let width = number_width(tag.kind).ok_or_else(|| io::Error::other("it holds no numbers"))?;
+        let width =
+            number_width(tag.kind).ok_or_else(|| io::Error::other("it holds no numbers"))?;
         let mut numbers = Vec::new();
         let mut left = tag.length as usize;
         let mut chunk = vec![0; CHUNK.min(left)];

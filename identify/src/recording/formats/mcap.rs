@@ -51,7 +51,9 @@ impl RecordingFormat for McapFormat {
 }
 
 /// Shows the messages of a file, which can be done once.
-fn replay_once(input: RecordingInput<'_>) -> impl FnMut(&mut BagCollector<'_>) -> Result<(), RecordingFault> + use<'_> {
+fn replay_once(
+    input: RecordingInput<'_>,
+) -> impl FnMut(&mut BagCollector<'_>) -> Result<(), RecordingFault> + use<'_> {
     let mut stream = Some(input.stream());
     move |bag| match stream.take() {
         Some(stream) => replay_messages(stream, bag),
@@ -79,7 +81,10 @@ fn replay_messages(stream: impl Read, bag: &mut BagCollector<'_>) -> Result<(), 
         match kind[0] {
             // What follows the end of the data repeats it, for those who go to and fro.
             McapRecordKind::DATA_END | McapRecordKind::FOOTER => return Ok(()),
-            McapRecordKind::CHUNK | McapRecordKind::SCHEMA | McapRecordKind::CHANNEL | McapRecordKind::MESSAGE => {
+            McapRecordKind::CHUNK
+            | McapRecordKind::SCHEMA
+            | McapRecordKind::CHANNEL
+            | McapRecordKind::MESSAGE => {
                 if length > LARGEST {
                     return Err(format_fault("a record in it is larger than 128 MB"));
                 }
@@ -127,7 +132,12 @@ struct McapFileState {
 }
 
 impl McapFileState {
-    fn take_record(&mut self, kind: u8, bytes: &[u8], bag: &mut BagCollector<'_>) -> Result<(), RecordingFault> {
+    fn take_record(
+        &mut self,
+        kind: u8,
+        bytes: &[u8],
+        bag: &mut BagCollector<'_>,
+    ) -> Result<(), RecordingFault> {
         let mut fields = McapFieldReader(bytes);
         match kind {
             McapRecordKind::SCHEMA => {
@@ -181,12 +191,17 @@ impl McapFileState {
                 };
                 self.packed += length;
                 self.unpacked = self.unpacked.saturating_add(unpacked);
-                check_growth(self.packed, self.unpacked).map_err(|error| unreadable_fault(&error))?;
+                check_growth(self.packed, self.unpacked)
+                    .map_err(|error| unreadable_fault(&error))?;
                 match packing {
                     None => self.take_chunk(fields.0, sum, bag)?,
                     Some(packing) => {
                         let bytes = packing.decompress(fields.0, unpacked);
-                        self.take_chunk(&bytes.map_err(|error| unreadable_fault(&error))?, sum, bag)?;
+                        self.take_chunk(
+                            &bytes.map_err(|error| unreadable_fault(&error))?,
+                            sum,
+                            bag,
+                        )?;
                     }
                 }
             }
@@ -195,12 +210,19 @@ impl McapFileState {
         Ok(())
     }
 
-    fn take_chunk(&mut self, bytes: &[u8], sum: u32, bag: &mut BagCollector<'_>) -> Result<(), RecordingFault> {
+    fn take_chunk(
+        &mut self,
+        bytes: &[u8],
+        sum: u32,
+        bag: &mut BagCollector<'_>,
+    ) -> Result<(), RecordingFault> {
         if sum != 0 {
             let mut crc = flate2::Crc::new();
             crc.update(bytes);
             if crc.sum() != sum {
-                return Err(format_fault("the sum over a chunk is not the one that it says"));
+                return Err(format_fault(
+                    "the sum over a chunk is not the one that it says",
+                ));
             }
         }
         let mut records = McapFieldReader(bytes);
@@ -261,7 +283,9 @@ fn format_fault(says: impl Into<String>) -> RecordingFault {
 
 fn unreadable_fault(error: &io::Error) -> RecordingFault {
     if error.kind() == io::ErrorKind::UnexpectedEof {
-        return format_fault("it ends before its data do; copy it again, or mend it with `mcap recover`");
+        return format_fault(
+            "it ends before its data do; copy it again, or mend it with `mcap recover`",
+        );
     }
     format_fault(format!("it cannot be read: {error}"))
 }

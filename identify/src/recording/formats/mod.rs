@@ -62,8 +62,12 @@ pub(crate) trait RecordingFormat: Sync {
     fn has_signature(&self, first: &[u8]) -> bool;
 
     /// Reads a recording; `file` is what messages call it.
-    fn read(&self, input: RecordingInput<'_>, file: &str, options: &ReadOptions)
-    -> Result<SignalRecording, RecordingFault>;
+    fn read(
+        &self,
+        input: RecordingInput<'_>,
+        file: &str,
+        options: &ReadOptions,
+    ) -> Result<SignalRecording, RecordingFault>;
 
     /// Names of the columns as the file has them.
     fn names(&self, input: RecordingInput<'_>) -> Result<Vec<String>, RecordingFault>;

@@ -11,7 +11,9 @@ use ruzstd::decoding::errors::{FrameDecoderError, ReadFrameHeaderError};
 use ruzstd::decoding::{BlockDecodingStrategy, FrameDecoder};
 
 use crate::recording::error::RecordingFault;
-use crate::recording::formats::{RecordingFormat, RecordingInput, SIGNATURE_BYTES, TableInfo, format_of};
+use crate::recording::formats::{
+    RecordingFormat, RecordingInput, SIGNATURE_BYTES, TableInfo, format_of,
+};
 use crate::recording::{ReadOptions, SignalRecording};
 
 /// The longest stretch of bytes that zstd may look back over; its own program allows as much.
@@ -197,7 +199,10 @@ impl CompressedFormat {
     }
 
     /// What is in the file, by its first bytes, and all of them.
-    fn open_content<'a>(&self, input: RecordingInput<'a>) -> Result<(&'static dyn RecordingFormat, RecordingInput<'a>), RecordingFault> {
+    fn open_content<'a>(
+        &self,
+        input: RecordingInput<'a>,
+    ) -> Result<(&'static dyn RecordingFormat, RecordingInput<'a>), RecordingFault> {
         let packed = Rc::new(Cell::new(0));
         let mut stream = BoundedReader {
             unpacked: self.0.decompressing_reader(CountingReader {

@@ -74,8 +74,12 @@ impl RecordingFormat for ParquetFormat {
     fn tables(&self, input: RecordingInput<'_>) -> Result<Vec<TableInfo>, RecordingFault> {
         match input {
             RecordingInput::File(stream) => tables_of(SharedChunkReader(Arc::new(stream))),
-            RecordingInput::Bytes(bytes) => tables_of(SharedChunkReader(Arc::new(Bytes::copy_from_slice(bytes)))),
-            RecordingInput::Stream(stream) => tables_of(SharedChunkReader(Arc::new(Bytes::from(read_all(stream)?)))),
+            RecordingInput::Bytes(bytes) => {
+                tables_of(SharedChunkReader(Arc::new(Bytes::copy_from_slice(bytes))))
+            }
+            RecordingInput::Stream(stream) => {
+                tables_of(SharedChunkReader(Arc::new(Bytes::from(read_all(stream)?))))
+            }
         }
     }
 }
@@ -86,7 +90,8 @@ fn read(
     options: &ReadOptions,
 ) -> Result<SignalRecording, RecordingFault> {
     let bytes = Arc::new(stream);
-    let reader = SerializedFileReader::new(SharedChunkReader(bytes.clone())).map_err(parquet_fault)?;
+    let reader =
+        SerializedFileReader::new(SharedChunkReader(bytes.clone())).map_err(parquet_fault)?;
     let schema = reader.metadata().file_metadata().schema_descr_ptr();
     let width = schema.num_columns();
     let mut intake = SampleIntake::new(names(&reader), options)?;
@@ -101,7 +106,8 @@ fn read(
             )));
         }
     }
-    let is_read = |i: usize| intake.is_place_needed(i) && !matches!(kinds[i], ParquetValueKind::Unusable);
+    let is_read =
+        |i: usize| intake.is_place_needed(i) && !matches!(kinds[i], ParquetValueKind::Unusable);
     let wanted: Vec<bool> = (0..width).map(is_read).collect();
     // As many samples at once as keep the fields of all columns few.
     let n_read = wanted.iter().filter(|is_read| **is_read).count();
@@ -135,7 +141,9 @@ fn read(
                     *field = match fields[i].get(k) {
                         Some(field) => *field,
                         // A column that nobody reads, or that holds no numbers.
-                        None if columns[i].is_none() && !intake.is_place_needed(i) => SampleField::Number(0.0),
+                        None if columns[i].is_none() && !intake.is_place_needed(i) => {
+                            SampleField::Number(0.0)
+                        }
                         None => SampleField::Text,
                     };
                 }
@@ -174,7 +182,8 @@ fn column_reader<R: ChunkReader + 'static>(
         .build()
         .map_err(parquet_fault)?;
     let rows = usize::try_from(group.metadata().num_rows()).unwrap_or(0);
-    let pages = SerializedPageReader::new(bytes.clone(), &as_stored, rows, None).map_err(parquet_fault)?;
+    let pages =
+        SerializedPageReader::new(bytes.clone(), &as_stored, rows, None).map_err(parquet_fault)?;
     let pages = UnpackedPages { pages, packing };
     Ok(get_column_reader(column.clone(), Box::new(pages)))
 }
@@ -248,7 +257,9 @@ impl<R: ChunkReader> ChunkReader for SharedChunkReader<R> {
 }
 
 /// The one table of a file.
-fn tables_of(stream: SharedChunkReader<impl ChunkReader + 'static>) -> Result<Vec<TableInfo>, RecordingFault> {
+fn tables_of(
+    stream: SharedChunkReader<impl ChunkReader + 'static>,
+) -> Result<Vec<TableInfo>, RecordingFault> {
     let reader = SerializedFileReader::new(stream.clone()).map_err(parquet_fault)?;
     let schema = reader.metadata().file_metadata().schema_descr_ptr();
     let info = |column: &ColumnDescPtr| ColumnInfo {
@@ -271,7 +282,10 @@ fn tables_of(stream: SharedChunkReader<impl ChunkReader + 'static>) -> Result<Ve
 
 /// Type of a column, in the words of the others.
 fn kind_of(column: &ColumnDescriptor) -> String {
-    let kind = match (ParquetValueKind::from_column(column), column.physical_type()) {
+    let kind = match (
+        ParquetValueKind::from_column(column),
+        column.physical_type(),
+    ) {
         (ParquetValueKind::Ticks { .. }, _) | (_, Type::INT96) => "time",
         (ParquetValueKind::Decimal(_), _) => "decimal",
         (ParquetValueKind::Unusable, _) => "no number",
@@ -288,7 +302,9 @@ fn kind_of(column: &ColumnDescriptor) -> String {
 
 /// Names of the columns; those of nested ones hold points.
 fn names_of(stream: impl ChunkReader + 'static) -> Result<Vec<String>, RecordingFault> {
-    Ok(names(&SerializedFileReader::new(stream).map_err(parquet_fault)?))
+    Ok(names(
+        &SerializedFileReader::new(stream).map_err(parquet_fault)?,
+    ))
 }
 
 fn names<R: ChunkReader + 'static>(reader: &SerializedFileReader<R>) -> Vec<String> {
@@ -376,17 +392,21 @@ fn per_second(unit: TimeUnit) -> f64 {
 }
 
 /// The next `n` fields of a column.
-fn read_batch(column: &mut ColumnReader, kind: &mut ParquetValueKind, n: usize) -> Result<Vec<SampleField>, RecordingFault> {
+fn read_batch(
+    column: &mut ColumnReader,
+    kind: &mut ParquetValueKind,
+    n: usize,
+) -> Result<Vec<SampleField>, RecordingFault> {
     match column {
         ColumnReader::BoolColumnReader(reader) => read_values(reader, n, |value| {
             SampleField::Number(f64::from(u8::from(*value)))
         }),
-        ColumnReader::Int32ColumnReader(reader) => {
-            read_values(reader, n, |value| SampleField::finite(kind.convert_short_integer(*value)))
-        }
-        ColumnReader::Int64ColumnReader(reader) => {
-            read_values(reader, n, |value| SampleField::finite(kind.convert_integer(*value)))
-        }
+        ColumnReader::Int32ColumnReader(reader) => read_values(reader, n, |value| {
+            SampleField::finite(kind.convert_short_integer(*value))
+        }),
+        ColumnReader::Int64ColumnReader(reader) => read_values(reader, n, |value| {
+            SampleField::finite(kind.convert_integer(*value))
+        }),
         ColumnReader::Int96ColumnReader(reader) => {
             let mut ticks = ParquetValueKind::Ticks {
                 per_second: 1e9,

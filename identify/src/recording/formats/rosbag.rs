@@ -7,7 +7,7 @@ use crate::recording::error::RecordingFault;
 use crate::recording::formats::bag::{self, BagCollector, BagEncoding};
 use crate::recording::formats::packing::CompressionMethod;
 use crate::recording::formats::sqlite::{self, SqliteDatabase, SqliteValue};
-use crate::recording::formats::{RecordingFormat, RecordingInput, ReadSeek, TableInfo};
+use crate::recording::formats::{ReadSeek, RecordingFormat, RecordingInput, TableInfo};
 use crate::recording::{ReadOptions, SignalRecording};
 
 /// The longest message that was packed by itself.
@@ -52,7 +52,10 @@ impl RecordingFormat for Rosbag2Format {
     }
 }
 
-fn replay_messages(stream: &mut dyn ReadSeek, bag: &mut BagCollector<'_>) -> Result<(), RecordingFault> {
+fn replay_messages(
+    stream: &mut dyn ReadSeek,
+    bag: &mut BagCollector<'_>,
+) -> Result<(), RecordingFault> {
     let mut database = SqliteDatabase::open(stream).map_err(|error| unreadable_fault(&error))?;
     let mut definitions = BTreeMap::new();
     let columns = ["topic_type", "encoding", "encoded_message_definition"];
@@ -71,13 +74,17 @@ fn replay_messages(stream: &mut dyn ReadSeek, bag: &mut BagCollector<'_>) -> Res
     let has_topics = database
         .visit_rows("topics", &columns, &mut |row| {
             if let [SqliteValue::Integer(id), name, kind, form] = &row[..] {
-                let (definition, text) = definitions.get(kind.as_text()).cloned().unwrap_or_default();
+                let (definition, text) =
+                    definitions.get(kind.as_text()).cloned().unwrap_or_default();
                 let encoding = BagEncoding {
                     messages: form.as_text(),
                     definition: &definition,
                     text: &text,
                 };
-                topics.insert(*id, bag.register_topic(name.as_text(), kind.as_text(), &encoding));
+                topics.insert(
+                    *id,
+                    bag.register_topic(name.as_text(), kind.as_text(), &encoding),
+                );
             }
             Ok(())
         })

@@ -31,5 +31,8 @@ pub(super) fn refine(found: &mut WeightedEstimate, nominal: &[f64]) -> Outcome<R
         .map(|(std, classical)| deviations.samples as f64 * (classical / std).powi(2))
         .collect();
     deviations.std = kept.std;
-    Ok(RefinementResult::Essential(kept.dropped, kept.residual_rise))
+    Ok(RefinementResult::Essential(
+        kept.dropped,
+        kept.residual_rise,
+    ))
 }

@@ -9,7 +9,7 @@ mod prior;
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{OptionName, Remedy};
-use modelmill_identify::estimate::{DroppedParameter, WeightedEstimate, PhysicalParameters};
+use modelmill_identify::estimate::{DroppedParameter, PhysicalParameters, WeightedEstimate};
 
 use crate::error::{Error, Outcome};
 use crate::model::Model;

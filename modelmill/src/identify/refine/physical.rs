@@ -2,11 +2,11 @@
 //! physical ones.
 
 use modelmill_identify::estimate::{
-    BaseMap, BodyMatrix, WeightedEstimate, PhysicalParameters, physical_parameters, planar_pseudo_inertia,
-    pseudo_inertia,
+    BaseMap, BodyMatrix, PhysicalParameters, WeightedEstimate, physical_parameters,
+    planar_pseudo_inertia, pseudo_inertia,
 };
-use modelmill_identify::{ParameterUncertainty, RegressionSolution, RFactor};
-use modelmill_spec::{ExactExpression, PartInertia, Mechanism, Sign, ModelSymbol};
+use modelmill_identify::{ParameterUncertainty, RFactor, RegressionSolution};
+use modelmill_spec::{ExactExpression, Mechanism, ModelSymbol, PartInertia, Sign};
 use nalgebra::{DMatrix, DVector};
 
 use super::RefinementResult;
@@ -14,7 +14,11 @@ use crate::error::{Error, Outcome};
 use crate::model::Model;
 
 /// Takes the physical parameters that bodies can have and that fit the recordings best.
-pub(super) fn refine(model: &Model, found: &mut WeightedEstimate, unknown: &[usize]) -> Outcome<RefinementResult> {
+pub(super) fn refine(
+    model: &Model,
+    found: &mut WeightedEstimate,
+    unknown: &[usize],
+) -> Outcome<RefinementResult> {
     let WeightedEstimate {
         solution,
         uncertainty: deviations,
@@ -29,7 +33,11 @@ pub(super) fn refine(model: &Model, found: &mut WeightedEstimate, unknown: &[usi
     // Nominal values say what the recordings do not.
     solution.undetermined.clear();
     solution.determined = physical.base.iter().map(|_| true).collect();
-    Ok(RefinementResult::Physical(Box::new(physical), bodies, before))
+    Ok(RefinementResult::Physical(
+        Box::new(physical),
+        bodies,
+        before,
+    ))
 }
 
 /// Physical parameters that bodies can have, with the names of the bodies.

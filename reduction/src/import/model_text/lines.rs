@@ -7,7 +7,7 @@ use modelmill_boundary::message;
 use super::super::chain::FrameChain;
 use super::super::closing::LoopSolution;
 use super::super::description::StraightDrive;
-use super::{ModelTextBuilder, ImportCoordinate, round_to_15_digits};
+use super::{ImportCoordinate, ModelTextBuilder, round_to_15_digits};
 use crate::write::toml_float;
 
 /// A line that is a drive of the model, with the names that it and its points have there.

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use modelmill_boundary::files::MemoryFiles;
-use modelmill_rig::{Rig, CoordinateSamples, RigState, RigTracker, Trajectory, forces};
+use modelmill_rig::{CoordinateSamples, Rig, RigState, RigTracker, Trajectory, forces};
 
 fn workspace(path: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(path)

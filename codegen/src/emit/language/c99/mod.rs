@@ -8,9 +8,9 @@ mod self_test;
 mod source;
 mod statements;
 
-use super::{EmittedFile, EmissionRequest};
+use super::{EmissionRequest, EmittedFile};
 use crate::emit::identifier::module_identifier;
-use crate::emit::tree::{PrecomputedValues, StatementRoutine, NameScope, reads_passive, uses_load};
+use crate::emit::tree::{NameScope, PrecomputedValues, StatementRoutine, reads_passive, uses_load};
 use crate::lower::StraightLineProgram;
 use crate::programs::PassivePosition;
 
@@ -110,19 +110,20 @@ impl<'a> TranslationUnit<'a> {
         let programs = &derivation.programs;
         let (active, passive) = derivation.coordinates();
         let of_coordinate = |i: &usize| mechanism.coordinates[*i].name.clone();
-        let function = |program: &'a StraightLineProgram, name, doc: String, result, outputs: Vec<String>| {
-            let routine = StatementRoutine::new(program, &scope, &outputs);
-            let follows = reads_passive(derivation, program);
-            CFunction {
-                program,
-                name,
-                doc,
-                result,
-                routine,
-                follows,
-                is_public: true,
-            }
-        };
+        let function =
+            |program: &'a StraightLineProgram, name, doc: String, result, outputs: Vec<String>| {
+                let routine = StatementRoutine::new(program, &scope, &outputs);
+                let follows = reads_passive(derivation, program);
+                CFunction {
+                    program,
+                    name,
+                    doc,
+                    result,
+                    routine,
+                    follows,
+                    is_public: true,
+                }
+            };
         let each = |letter: &str, suffix: &str| -> Vec<String> {
             let drives = mechanism.drives.iter();
             drives

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use crate::emit::language::syntax::LanguageSyntax;
-use crate::emit::tree::{PoseCheck, CodeStatement};
+use crate::emit::tree::{CodeStatement, PoseCheck};
 use crate::expr::Unary;
 
 /// The syntax of C, with functions that begin with the name of the module.
@@ -199,7 +199,8 @@ impl CSyntax<'_> {
                 ));
             }
             CodeStatement::Angles(angles) => {
-                let mut values: Vec<String> = angles.iter().map(|a| self.operand_text(&a.value)).collect();
+                let mut values: Vec<String> =
+                    angles.iter().map(|a| self.operand_text(&a.value)).collect();
                 // They are computed in pairs.
                 if values.len() % 2 == 1 {
                     values.extend(values.last().cloned());

@@ -7,14 +7,16 @@ use quote::{format_ident, quote};
 
 use super::functions::{inverse_dynamics, is_newton, model};
 use super::program::single_value;
-use super::statements::{RustSyntax, fill_lines, line_tokens, number_token as signed, verbatim_tokens};
+use super::statements::{
+    RustSyntax, fill_lines, line_tokens, number_token as signed, verbatim_tokens,
+};
 use crate::Derivation;
 use crate::emit::identifier::field_identifier;
 use crate::emit::language::syntax::LanguageSyntax;
 use crate::emit::tree::{BaseParameterCode, CodeExpression, NameScope, inputs_of_state, uses_load};
 use crate::expr::Atom;
 use crate::expr::coordinates_of;
-use crate::lower::{OperationCount, StraightLineProgram, ProgramStage};
+use crate::lower::{OperationCount, ProgramStage, StraightLineProgram};
 
 /// What the module says of itself.
 pub(super) fn module_doc(derivation: &Derivation) -> String {
@@ -263,7 +265,8 @@ fn base_parameters(derivation: &Derivation, scope: &NameScope) -> TokenStream {
     };
     let geometry = argument("geometry", |atom| matches!(atom, Atom::Constant(_)));
     let parameters = argument("parameters", |atom| matches!(atom, Atom::Parameter(_)));
-    let given = super::program::parameter_bindings(derivation, scope, &read, &geometry, &parameters, "");
+    let given =
+        super::program::parameter_bindings(derivation, scope, &read, &geometry, &parameters, "");
     let names: Vec<_> = (0..n_base)
         .map(|k| field_identifier(scope.input_name(Atom::Base(k))))
         .collect();

@@ -3,8 +3,8 @@
 use proc_macro2::{Literal, TokenStream};
 use quote::quote;
 
-use super::items::{operation_count, nominal_values, loop_scale};
-use super::program::{ProgramMethod, ExtraItems, ProgramStateInputs};
+use super::items::{loop_scale, nominal_values, operation_count};
+use super::program::{ExtraItems, ProgramMethod, ProgramStateInputs};
 use crate::Derivation;
 use crate::emit::tree::NameScope;
 use crate::programs::PassivePosition;

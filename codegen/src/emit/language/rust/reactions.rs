@@ -4,7 +4,10 @@ use proc_macro2::{Literal, TokenStream};
 use quote::quote;
 
 use super::items::operation_count;
-use super::program::{ProgramMethod, PreparationInputs, ExtraItems, ProgramStruct, ResultConversion, ProgramStateInputs};
+use super::program::{
+    ExtraItems, PreparationInputs, ProgramMethod, ProgramStateInputs, ProgramStruct,
+    ResultConversion,
+};
 use crate::emit::tree::NameScope;
 use crate::{Derivation, ReactionPrograms};
 

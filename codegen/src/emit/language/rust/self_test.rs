@@ -3,8 +3,10 @@
 use proc_macro2::{Literal, TokenStream};
 use quote::quote;
 
-use super::items::{nominal_values, loop_scale};
-use super::program::{ProgramMethod, PreparationInputs, ExtraItems, ProgramStruct, ProgramStateInputs};
+use super::items::{loop_scale, nominal_values};
+use super::program::{
+    ExtraItems, PreparationInputs, ProgramMethod, ProgramStateInputs, ProgramStruct,
+};
 use crate::Derivation;
 use crate::derive::self_test::self_test_reach;
 use crate::emit::identifier::field_identifier;
@@ -58,16 +60,19 @@ pub(super) fn self_test(derivation: &Derivation, scope: &NameScope) -> TokenStre
     let scale = loop_scale(derivation, scope);
     let scaled = scale.as_ref().map(|_| quote! { scale });
     let nominal = nominal_values(derivation, &active, scaled.as_ref());
-    let reach = active.iter().zip(self_test_reach(derivation)).map(|(i, reach)| {
-        let scale = scaled
-            .as_ref()
-            .filter(|_| mechanism.coordinates[*i].motion.is_length());
-        let (scaled, reach) = (
-            scale.map(|s| quote! { #s * }),
-            Literal::f64_unsuffixed(reach),
-        );
-        quote! { #scaled #reach }
-    });
+    let reach = active
+        .iter()
+        .zip(self_test_reach(derivation))
+        .map(|(i, reach)| {
+            let scale = scaled
+                .as_ref()
+                .filter(|_| mechanism.coordinates[*i].motion.is_length());
+            let (scaled, reach) = (
+                scale.map(|s| quote! { #s * }),
+                Literal::f64_unsuffixed(reach),
+            );
+            quote! { #scaled #reach }
+        });
     // Slides of a small machine are slow, so that no column is lost beside others.
     let units = active.iter().map(|i| {
         let scale = scaled

@@ -100,7 +100,11 @@ impl RosNumberType {
 /// The definition of the message `name` in `text`, with those that it needs.
 ///
 /// Fails when one of them is missing or cannot be read.
-pub(super) fn parse_definition(name: &str, text: &str, ros: RosVersion) -> Result<Rc<RosMessageDefinition>, String> {
+pub(super) fn parse_definition(
+    name: &str,
+    text: &str,
+    ros: RosVersion,
+) -> Result<Rc<RosMessageDefinition>, String> {
     let own = short_type_name(name);
     let mut texts = BTreeMap::new();
     let (mut current, mut lines) = (own.clone(), Vec::new());
@@ -139,7 +143,11 @@ struct RosDefinitionParser<'a> {
 }
 
 impl RosDefinitionParser<'_> {
-    fn parse_message(&mut self, name: &str, depth: usize) -> Result<Rc<RosMessageDefinition>, String> {
+    fn parse_message(
+        &mut self,
+        name: &str,
+        depth: usize,
+    ) -> Result<Rc<RosMessageDefinition>, String> {
         if let Some(done) = self.done.get(name) {
             return Ok(done.clone());
         }
@@ -176,14 +184,22 @@ impl RosDefinitionParser<'_> {
             if end == 0 {
                 return Err(format!("the line `{line}` of `{name}` cannot be read"));
             }
-            fields.push((rest[..end].to_owned(), self.parse_field_type(kind, name, depth)?));
+            fields.push((
+                rest[..end].to_owned(),
+                self.parse_field_type(kind, name, depth)?,
+            ));
         }
         let definition = Rc::new(RosMessageDefinition { fields });
         self.done.insert(name.to_owned(), definition.clone());
         Ok(definition)
     }
 
-    fn parse_field_type(&mut self, text: &str, within: &str, depth: usize) -> Result<RosFieldType, String> {
+    fn parse_field_type(
+        &mut self,
+        text: &str,
+        within: &str,
+        depth: usize,
+    ) -> Result<RosFieldType, String> {
         if let Some((of, length)) = text
             .strip_suffix(']')
             .and_then(|text| text.rsplit_once('['))

@@ -5,7 +5,7 @@
 
 use std::rc::Rc;
 
-use super::definition::{RosMessageDefinition, RosNumberType, RosVersion, RosFieldType};
+use super::definition::{RosFieldType, RosMessageDefinition, RosNumberType, RosVersion};
 
 /// The longest list of numbers that become columns; what is longer is a picture or a scan.
 const MOST_ELEMENTS: usize = 256;
@@ -36,10 +36,11 @@ pub(super) struct RosMessageReader {
 
 impl RosMessageReader {
     pub(super) fn new(definition: Rc<RosMessageDefinition>, ros: RosVersion) -> Self {
-        let is_time =
-            |field: &(String, RosFieldType)| matches!(field, (name, RosFieldType::Time { .. }) if name == "stamp");
+        let is_time = |field: &(String, RosFieldType)| matches!(field, (name, RosFieldType::Time { .. }) if name == "stamp");
         let stamp = definition.fields.iter().position(|field| match field {
-            (name, RosFieldType::Message(header)) if name == "header" => header.fields.iter().any(is_time),
+            (name, RosFieldType::Message(header)) if name == "header" => {
+                header.fields.iter().any(is_time)
+            }
             other => is_time(other),
         });
         Self {
@@ -145,13 +146,18 @@ enum RosValue<'a> {
     Skipped,
 }
 
-fn value_of<'a>(kind: &'a RosFieldType, bytes: &mut RosByteReader<'_>) -> Result<RosValue<'a>, String> {
+fn value_of<'a>(
+    kind: &'a RosFieldType,
+    bytes: &mut RosByteReader<'_>,
+) -> Result<RosValue<'a>, String> {
     Ok(match kind {
         RosFieldType::Number(number) => {
             bytes.read_number(*number)?;
             RosValue::Number(number.name())
         }
-        RosFieldType::Text => RosValue::Text(String::from_utf8_lossy(bytes.read_text()?).into_owned()),
+        RosFieldType::Text => {
+            RosValue::Text(String::from_utf8_lossy(bytes.read_text()?).into_owned())
+        }
         RosFieldType::Time { is_signed } => {
             bytes.read_time(*is_signed)?;
             RosValue::Number("time")
@@ -268,7 +274,9 @@ impl<'a> RosByteReader<'a> {
                     "it is encoded in the form {a:02x}{b:02x} of CDR, which is not read"
                 ));
             }
-            (RosVersion::Two, _) => return Err("it is shorter than its first four bytes".to_owned()),
+            (RosVersion::Two, _) => {
+                return Err("it is shorter than its first four bytes".to_owned());
+            }
         };
         Ok(Self {
             all: bytes,

@@ -118,7 +118,12 @@ impl<'a> BagCollector<'a> {
     }
 
     /// A topic, to which [`Bag::message`] refers by the number that comes back.
-    pub(super) fn register_topic(&mut self, name: &str, kind: &str, encoding: &BagEncoding<'_>) -> usize {
+    pub(super) fn register_topic(
+        &mut self,
+        name: &str,
+        kind: &str,
+        encoding: &BagEncoding<'_>,
+    ) -> usize {
         let ros = match (encoding.messages, encoding.definition) {
             ("cdr", "ros2msg" | "") => Ok(RosVersion::Two),
             ("ros1", "ros1msg") => Ok(RosVersion::One),
@@ -150,7 +155,12 @@ impl<'a> BagCollector<'a> {
     /// Takes a message that arrived at `log`, ns.
     ///
     /// Fails when it cannot be read although others of its topic could, and when more numbers would be kept than allowed.
-    pub(super) fn take_message(&mut self, topic: usize, log: i64, bytes: &[u8]) -> Result<(), RecordingFault> {
+    pub(super) fn take_message(
+        &mut self,
+        topic: usize,
+        log: i64,
+        bytes: &[u8],
+    ) -> Result<(), RecordingFault> {
         let topic = &mut self.topics[topic];
         topic.count += 1;
         let Ok(reader) = &topic.reader else {
@@ -325,10 +335,15 @@ impl BagTopic {
 }
 
 /// Shows all messages of a log to a [`Bag`].
-pub(super) type BagReplay<'a> = &'a mut dyn FnMut(&mut BagCollector<'_>) -> Result<(), RecordingFault>;
+pub(super) type BagReplay<'a> =
+    &'a mut dyn FnMut(&mut BagCollector<'_>) -> Result<(), RecordingFault>;
 
 /// The recording of a log: the columns that are needed, joined on time.
-pub(super) fn read(show: BagReplay<'_>, file: &str, options: &ReadOptions) -> Result<SignalRecording, RecordingFault> {
+pub(super) fn read(
+    show: BagReplay<'_>,
+    file: &str,
+    options: &ReadOptions,
+) -> Result<SignalRecording, RecordingFault> {
     let is_kept = |name: &str| options.is_column_needed(name);
     let mut bag = BagCollector::new(&is_kept, options.max_numbers);
     show(&mut bag)?;
