@@ -66,7 +66,7 @@ impl StepSpelling for CommandLineSpelling {
     fn spell_effect(&self, model: &Model, effect: &NewEffect) -> String {
         let mut add_command = add_command(&model.path, effect);
         add_command.push_str(&library_flags_of_model(model));
-        command
+        add_command
     }
 
     fn spell_effect_of_library(&self, model: &Model, effect: &NewEffect, library: &str) -> String {

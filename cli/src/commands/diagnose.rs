@@ -13,7 +13,7 @@ use crate::terminal;
 pub(crate) fn run(host: &Host, args: &DiagnoseArgs) -> CommandOutcome {
     let flags = CommandLineSpelling::from_args(&args.diagnosis);
     let question = DiagnosisOptions {
-        fixed: args.diagnosis.fixed(),
+        fixed: args.diagnosis.fixed_parameters(),
         ..DiagnosisOptions::default()
     };
     let findings = commands::diagnose(host, &args.diagnosis, question)?;

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use modelmill::Host;
-use modelmill::export::{DescriptionFormat, description};
+use modelmill::export::{Format as DescriptionFormat, description};
 
 use crate::args::ExportArgs;
 use crate::failure::{CommandFailure, CommandOutcome};
