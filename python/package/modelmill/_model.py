@@ -631,7 +631,7 @@ class Model:
 
     @property
     def reaction_names(self) -> list[str]:
-        """Names of the columns of :meth:`reactions`, such as ``elbow.Fx``, without statically indeterminate ones."""
+        """Names of the columns of :meth:`reactions`, such as ``elbow.Fx``; no statically indeterminate ones."""
         return self._core.reaction_names()[0]
 
     def reactions(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, *, load: ArrayLike | None = None) -> Floats:
