@@ -1,4 +1,9 @@
 //! What is published can stand alone: metadata, licences, and no file from outside a crate's own folder.
+//!
+//! Decision: a published crate holds what it is built from and nothing else. Tests and benchmarks read models,
+//! recordings and fixtures of other crates, so they stay in the workspace (`include` in each `Cargo.toml`). A text
+//! that several crates need has one owner: models and the schema belong to `model-spec`, recordings to a crate of
+//! texts.
 
 use std::fs;
 use std::path::{Path, PathBuf};
