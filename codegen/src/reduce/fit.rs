@@ -10,7 +10,7 @@ use super::oracle::{ConstantOccurrence, PrimeFieldOracle};
 use super::rational_function::{
     FactorVariable, PowerProduct, RationalFunction, TrigonometricPolynomial, monomial_value,
 };
-use super::support::nonzero_monomials;
+use super::support::{PartialSamples, nonzero_monomials};
 use crate::DeriveError;
 use crate::expr::{FieldPoint, Rational};
 
@@ -154,6 +154,7 @@ impl FunctionShape {
     pub(super) fn fit_function<O: PrimeFieldOracle>(
         &self,
         fields: &mut PrimeFields<O>,
+        partial: &mut PartialSamples,
         oracle: &mut O,
         origin: &FieldPoint,
         function: usize,
@@ -210,6 +211,7 @@ impl FunctionShape {
                 let variables: Vec<ConstantOccurrence> = self.degrees.keys().copied().collect();
                 let all = [numerator.as_slice(), denominator.as_slice()];
                 let found = nonzero_monomials(
+                    partial,
                     oracle,
                     origin,
                     function,

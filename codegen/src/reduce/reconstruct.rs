@@ -11,6 +11,7 @@ use modelmill_algebra::univariate;
 use super::fit::{FunctionShape, PrimeFields};
 use super::oracle::{ConstantOccurrence, PrimeFieldOracle};
 use super::rational_function::RationalFunction;
+use super::support::PartialSamples;
 use crate::DeriveError;
 use crate::expr::{Atom, FieldPoint};
 
@@ -41,6 +42,7 @@ pub(super) struct DependenceSurvey<O> {
     moved: Vec<VariedConstant>,
     shapes: Vec<FunctionShape>,
     fields: PrimeFields<O>,
+    partial: PartialSamples,
 }
 
 impl<O: PrimeFieldOracle> DependenceSurvey<O> {
@@ -71,6 +73,7 @@ impl<O: PrimeFieldOracle> DependenceSurvey<O> {
             moved,
             shapes,
             fields: PrimeFields::new(),
+            partial: PartialSamples::new(constants),
         })
     }
 
@@ -100,6 +103,7 @@ impl<O: PrimeFieldOracle> DependenceSurvey<O> {
         for (k, is_needed) in wanted {
             let function = shapes[*k].fit_function(
                 &mut self.fields,
+                &mut self.partial,
                 oracle,
                 origin,
                 *k,

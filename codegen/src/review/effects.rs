@@ -34,11 +34,12 @@ pub(super) fn effects(page: &mut PageDocument, mechanism: &Mechanism) {
     ]);
     let is_coupled = |effect: &ModelEffect| {
         let mut terms = effect.terms.iter();
-        effect.other.is_none() && terms.any(|term| {
-            term.expression.mentions(
+        effect.other.is_none()
+            && terms.any(|term| {
+                term.expression.mentions(
                 &|symbol| matches!(symbol, modelmill_spec::ModelSymbol::Place(q) if q.is_other()),
             )
-        })
+            })
     };
     if mechanism.effects.iter().any(is_coupled) {
         page.paragraph([
