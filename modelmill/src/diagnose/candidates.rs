@@ -1,5 +1,5 @@
-//! Every effect that may be missing, as the entry that `add` would write, in variants of the model: their derivation gives
-//! the columns of all.
+//! All candidates: every kind of the library at every possible place, as entries that `add` would write. They are derived together in
+//! three variants of the model, which give their columns.
 
 use modelmill_codegen::{Derivation, Guard, Monomial};
 use modelmill_spec::{
@@ -12,17 +12,20 @@ use crate::model::Model;
 
 use super::places::{Spot, fits, sets, spots};
 
-/// Values of a constant that are tried where the search has no scale of its own.
+/// Values of a constant that are tried on an even grid.
 const TRIED: usize = 15;
-/// Values of a rate that are tried.
+/// Values of a positive constant that are tried on a logarithmic grid.
 const RATES: usize = 14;
-/// Wavelengths that are tried at most.
+/// Wavelengths that are tried at most for a periodic effect.
 const WAVES: usize = 120;
 
 /// An effect as one entry of a model file.
 pub(crate) struct Single {
+    /// Index of its kind.
     pub kind: usize,
+    /// Its places.
     pub spots: Vec<Spot>,
+    /// How often its columns are evaluated.
     pub sort: Sort,
     /// Symbols of its parameters with their positions among those of its variant.
     pub parameters: Vec<(String, usize)>,
@@ -41,27 +44,33 @@ impl Single {
     }
 }
 
-/// A candidate: entries whose columns add up, since they share their parameters.
+/// A candidate: the sum of entries that share their parameters.
 pub(crate) struct Entry {
+    /// Indices of the entries.
     pub singles: Vec<usize>,
 }
 
-/// A kind that is a change of the model rather than columns of its own.
+/// A kind that changes the model instead of adding columns: tilt or delay.
 pub(crate) struct Change {
+    /// Index of the kind.
     pub kind: usize,
+    /// Its place.
     pub spot: Spot,
 }
 
 /// All candidates of a model, derived.
 pub(crate) struct Candidates {
+    /// Kinds of the libraries.
     pub kinds: Vec<EffectKind>,
+    /// Effects as single entries of a model file.
     pub singles: Vec<Single>,
+    /// Candidates, each the sum of single entries.
     pub entries: Vec<Entry>,
     /// Effects whose constants are known.
     pub known: Derivation,
-    /// Effects with constants that are searched for, whose columns are evaluated again and again.
+    /// Effects with constants that are searched for; their columns are evaluated for each value.
     pub searched: Derivation,
-    /// Effects that depend on what the drives carry.
+    /// Effects that depend on the load of the drives, such as load-dependent friction.
     pub carried: Derivation,
     /// The base columns as functions of a tilt about x, y and z, whose constants are the last three; with its kind.
     pub tilt: Option<(Change, Derivation)>,
@@ -76,7 +85,7 @@ pub(crate) enum Sort {
     Known,
     /// For every value of a constant.
     Searched,
-    /// Whenever a fit says anew what the drives carry.
+    /// Again after each fit, since they depend on the load of the drives.
     Carried,
 }
 
@@ -108,7 +117,7 @@ pub(crate) fn candidates(model: &Model) -> Outcome<Candidates> {
             }
             continue;
         }
-        // What must be known and is not cannot be tried.
+        // A kind with a constant that is neither known nor searched for cannot be tried.
         if kind
             .constants
             .iter()
@@ -204,16 +213,19 @@ pub(crate) fn uses_load(kind: &EffectKind) -> bool {
     words.any(|word| word == "load")
 }
 
-/// The model with effects besides.
+/// The model with further effects.
 #[derive(Default)]
 pub(crate) struct Variant {
+    /// Constants of the effects, with names of their own.
     constants: Vec<Constant>,
+    /// The effects.
     effects: Vec<AddedEffect>,
-    /// Which candidates it holds, in order.
+    /// Indices of their single entries, in the same order.
     singles: Vec<usize>,
 }
 
 impl Variant {
+    /// Adds an entry as candidate `number`; its parameters and constants get names with that number.
     pub(crate) fn add(
         &mut self,
         mechanism: &Mechanism,
@@ -273,7 +285,7 @@ impl Variant {
             |product: &Monomial| product.0.iter().any(|(p, n)| *n == 1 && wanted.contains(p));
         let mut derivation = modelmill_codegen::derive_columns(mechanism, &is_wanted)
             .map_err(|error| Error::derivation(&model.path, error))?;
-        // One candidate without a finite value somewhere must not stop the others: who looks at the columns leaves it out.
+        // One candidate without a finite value must not stop the others: it is left out when its columns are checked.
         let guards = &mut derivation.programs.regressor.guards;
         guards.retain(|guard| !matches!(guard, Guard::Finite(_)));
         Ok(derivation)
@@ -306,6 +318,7 @@ pub(crate) fn tilted(model: &Model) -> Outcome<Derivation> {
         .map_err(|error| Error::derivation(&model.path, error))
 }
 
+/// A constant of a variant.
 fn named_constant(name: &str, value: f64, unit: &str) -> Constant {
     Constant {
         name: name.to_owned(),
@@ -316,8 +329,8 @@ fn named_constant(name: &str, value: f64, unit: &str) -> Constant {
     }
 }
 
-/// Values that are tried for the constant that a candidate searches for, given the largest rate and the travel of its place;
-/// one where there is none.
+/// Values that are tried for the constant of a candidate, for a largest rate (per s) and a travel of its place; one value without such a
+/// constant.
 pub(crate) fn grid(single: &Single, [rate, travel]: [f64; 2]) -> Vec<f64> {
     for (_, _, search) in &single.constants {
         let Search::Range { from, to, of } = *search else {
@@ -336,9 +349,9 @@ pub(crate) fn grid(single: &Single, [rate, travel]: [f64; 2]) -> Vec<f64> {
             continue;
         }
         return match of {
-            // Waves differ by how often they fit into the travel.
+            // The grid is even in the number of waves per travel, since that is what distinguishes them.
             Scale::Travel if from > 0.0 => {
-                // So many that neighbours differ by less than half a wave over the travel.
+                // Neighbours differ by less than 0.4 waves over the travel, so that no wavelength is missed between them.
                 let (few, many) = (1.0 / to, 1.0 / from);
                 let count = (2..WAVES).find(|n| (many - few) / (*n as f64) < 0.4);
                 let waves = evenly(count.unwrap_or(WAVES), few, many);

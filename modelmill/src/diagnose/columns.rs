@@ -1,4 +1,4 @@
-//! Columns of all candidates along the recordings, for every choice of their constants.
+//! Columns (forces per unit of a parameter) of all candidates along the recordings, for every value of their constants.
 
 use modelmill_codegen::Evaluator;
 use modelmill_identify::diagnose::{
@@ -17,20 +17,20 @@ use super::places::Spot;
 use super::tilt::{TILTS, tilt};
 use crate::regressors::{Runs, regressor_of};
 
-/// The kind that is a force of one times its parameter.
+/// The kind whose column is a constant force of one.
 const CONSTANT: &str = "force_offset";
 
-/// Candidates with their columns; where each comes from is said in the same order.
+/// Candidates with their columns, and the origin of each in the same order.
 pub(crate) fn columns(candidates: &Candidates, model: &Model, all: &Runs<'_>) -> Outcome<Made> {
     let is_linear = |single: &Single| single.constants.iter().any(|c| c.2 == Search::Linear);
     let grids = grids(candidates, model, all)?;
-    // Nothing changes in a second round where no constant does.
+    // Without linear constants one evaluation of the known effects is enough.
     let of_known = if candidates.singles.iter().any(is_linear) {
         2
     } else {
         1
     };
-    // `found[single][round]`; columns that are linear in a constant are looked at for its values 0 and 1.
+    // `found[single][round]`; columns that are linear in a constant are evaluated at its values 0 and 1.
     let longest = grids.iter().map(Vec::len).max().unwrap_or(1);
     let rounds = (0..of_known)
         .map(|round| (Sort::Known, round))
@@ -75,7 +75,7 @@ pub(crate) fn columns(candidates: &Candidates, model: &Model, all: &Runs<'_>) ->
             undefined.push(effect(candidates, entry));
         }
     }
-    // They are in the candidates now.
+    // The candidates have copies, so this memory can be freed before the tilt is computed.
     drop(found);
     if let Some((change, derivation)) = &candidates.tilt {
         let tilt = tilt(derivation, model, all)?;
@@ -133,7 +133,7 @@ fn is_finite(column: &Column) -> bool {
     values.all(|x| x.is_finite())
 }
 
-/// What an entry would add, and where.
+/// Kind and places of an entry.
 fn effect(candidates: &Candidates, entry: &Entry) -> Effect {
     let first = &candidates.singles[entry.singles[0]];
     let singles = entry.singles.iter().map(|k| &candidates.singles[*k]);
@@ -144,8 +144,8 @@ fn effect(candidates: &Candidates, entry: &Entry) -> Effect {
     }
 }
 
-/// Largest rate and travel of the place of each single candidate. Places that may share a constant look for it on one grid,
-/// that of the place that moves most.
+/// Largest rate and travel of the place of each single candidate. Places that may share a constant use one grid, that of the place that
+/// moves most.
 fn shared_scales(candidates: &Candidates, motions: &Motions) -> Vec<[f64; 2]> {
     let own = |single: &Single| motions.scale(single.spots[0].place);
     let mut scales: Vec<[f64; 2]> = candidates.singles.iter().map(own).collect();
@@ -166,9 +166,9 @@ fn shared_scales(candidates: &Candidates, motions: &Motions) -> Vec<[f64; 2]> {
 
 /// Candidates in numbers.
 pub(crate) struct Made {
-    /// Those that have columns.
+    /// Candidates with at least one column that is not zero.
     pub(crate) candidates: Vec<Candidate>,
-    /// Where each comes from, in the same order.
+    /// Their origins, in the same order.
     pub(crate) origins: Vec<Origin>,
     /// Effects whose expressions have no finite value somewhere along the recordings.
     pub(crate) undefined: Vec<Effect>,
@@ -180,6 +180,7 @@ pub(crate) struct Made {
 /// where it changes the model rather than adds columns.
 pub(crate) type Origin = Option<(usize, Vec<bool>)>;
 
+/// A candidate that changes the model instead of adding columns.
 fn changed(
     candidates: &Candidates,
     change: &Change,
@@ -235,7 +236,7 @@ fn singles(
         parameters.any(|(_, parameter)| holds(reduction.retained[k], *parameter))
     };
     let columns = regressor_of(all, &evaluator, model, &wanted)?;
-    // Where a parameter stands in products, as a mass whose place is one, the others have their nominal values.
+    // In products with other parameters, such as a mass at an unknown place, the others have their nominal values.
     let of = |(_, parameter): &(String, usize)| -> Column {
         let mut sum = Column(vec![None; model.drives().len()]);
         for (k, product) in reduction.retained.iter().enumerate() {
@@ -257,7 +258,7 @@ fn singles(
         .collect())
 }
 
-/// What the drives must supply for a force or torque of one at each place where the library puts a constant one.
+/// Forces of the drives for a constant force or torque of one at each place where the library has a force offset.
 pub(crate) fn unit_forces(
     candidates: &Candidates,
     model: &Model,
@@ -355,7 +356,7 @@ fn candidate(
     if choices.is_empty() {
         return None;
     }
-    // Parameters without any effect, such as a mass on the base, are none.
+    // Parameters without any effect, such as a mass on the base, are left out.
     let felt: Vec<bool> = (0..parameters.len())
         .map(|p| choices.iter().any(|choice| !choice.columns[p].is_zero()))
         .collect();
@@ -381,13 +382,13 @@ fn candidate(
     Some((candidate, felt))
 }
 
-/// Whether what a kind adds is part of what the drives carry.
+/// Whether the force of a kind is part of the load of the drives.
 fn is_part_of_load(kind: &EffectKind) -> bool {
     (kind.mechanics).map_or(kind.on.contains(&ActsOn::Point), Mechanics::is_part_of_load)
 }
 
-/// Columns of candidates that depend on what the drives carry, of all or of one entry, for loads that are stacked and decimated
-/// like the forces, and for some values of each single candidate's constant.
+/// Columns of candidates that depend on the load of the drives, of all or of one entry. Loads are stacked and decimated like the forces;
+/// `tried` gives the values of the constant of each single candidate.
 pub(crate) fn carried(
     candidates: &Candidates,
     model: &Model,
@@ -460,7 +461,7 @@ pub(crate) fn carried(
                     column.add(1.0, more);
                 }
             }
-            // Along these loads it says nothing.
+            // A column without finite values for these loads counts as zero.
             if !columns.iter().all(is_finite) {
                 columns.fill(Column(vec![None; model.drives().len()]));
             }
@@ -477,7 +478,7 @@ pub(crate) fn carried(
     Ok(made)
 }
 
-/// Values between samples of which every n-th was kept.
+/// Linear interpolation between samples of which every `factor`-th was kept.
 fn between(kept: &[f64], factor: usize, samples: usize) -> Vec<f64> {
     let last = kept.len().saturating_sub(1);
     let at = |i: usize| {

@@ -1,7 +1,6 @@
-//! Encoders that err: by a zero that is not the model's, or as they turn, since an eccentric disc reads the position too large
-//! and too small once or several times a turn; and the model takes that for motion. What forces change by with each reading, its
-//! rate and its acceleration is had by central differences of the fitted model, so that any error along the motion is a sum of
-//! three products.
+//! Candidates for errors of encoders: a wrong zero, or an eccentric disc whose error repeats once or several times per turn. The
+//! derivatives of the forces by position, rate and acceleration come from central differences of the fitted model. The force of any
+//! small error of the motion is then a sum of three products.
 
 use modelmill_identify::changes::Moments;
 use modelmill_identify::diagnose::{
@@ -15,18 +14,16 @@ use crate::stretch::Stretch;
 use super::numbers::stack;
 use super::places::is_free;
 use super::problem::Held;
+use super::thresholds::{ENCODER_WAVE_SAMPLES, SLOPE_JUMP_MEDIANS};
 use crate::regressors::Runs;
 
-/// How often an error may come again in a turn, or along the travel of a coordinate that slides.
+/// How often an error may repeat per turn, or along the travel of a prismatic coordinate.
 const TIMES: [u32; 16] = [1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 30, 36, 48, 60];
 /// Steps of the differences, as parts of the largest value.
 const STEP: f64 = 1e-5;
-/// Samples that an error must take at least for each of its waves.
-const SAMPLES_PER_WAVE: f64 = 12.0;
-/// Beyond so many times its middle size a difference has met a sign that jumped.
-const JUMPED: f64 = 100.0;
 
-/// What forces change by with position, rate and acceleration of every active coordinate, for base parameters.
+/// Derivatives of the forces by position, rate and acceleration of every active coordinate, for given base parameters; `None` if the
+/// forces cannot be evaluated next to the recorded motion.
 pub(crate) fn sensitivities(
     model: &Model,
     all: &Runs<'_>,
@@ -38,7 +35,7 @@ pub(crate) fn sensitivities(
         .collect()
 }
 
-/// What the positions of each encoder read too much throughout; a free body has none.
+/// Candidates for a constant offset of each encoder; a free body has no encoder.
 pub(crate) fn zeros(model: &Model, slopes: &[Option<[Column; 3]>]) -> Vec<Candidate> {
     let (active, _) = model.derivation.coordinates();
     let has_encoder = |i: &usize| !is_free(&model.derivation.mechanism, *i);
@@ -82,7 +79,7 @@ fn disturbance(kind: &str, name: String, symbols: &[&str], is_angle: bool) -> Ca
     }
 }
 
-/// An error of each encoder with sine and cosine of its angle, for each number of waves that may be.
+/// Candidates for an error of each encoder with sine and cosine of its angle, for each possible number of waves per turn.
 pub(crate) fn encoders(
     model: &Model,
     all: &Runs<'_>,
@@ -120,7 +117,7 @@ pub(crate) fn encoders(
         };
         let choice = |times: u32| {
             let k = std::f64::consts::TAU * f64::from(times) / turn;
-            if k * fastest * step > std::f64::consts::TAU / SAMPLES_PER_WAVE {
+            if k * fastest * step > std::f64::consts::TAU / ENCODER_WAVE_SAMPLES {
                 return None;
             }
             let wave = |phase: f64| {
@@ -165,7 +162,7 @@ pub(crate) fn encoders(
     candidates
 }
 
-/// Base parameters by least squares, drives weighed alike; those that are held keep their nominal values.
+/// Base parameters by least squares, with each drive weighted by its squared force; fixed ones keep their nominal values.
 pub(crate) fn values(model: &Model, problem: &Problem, held: Held) -> Vec<f64> {
     let mut all = Moments::new(problem.base.len());
     for (d, measured) in problem.measured.0.iter().enumerate() {
@@ -191,8 +188,8 @@ pub(crate) fn values(model: &Model, problem: &Problem, held: Held) -> Vec<f64> {
         .collect()
 }
 
-/// What forces change by with a position, its rate and its acceleration, decimated; `None` where the model does not hold
-/// beside the recording.
+/// Derivatives of the forces by a position, its rate and its acceleration, decimated; `None` if the forces cannot be evaluated next to
+/// the recorded motion.
 fn sensitivity(
     model: &Model,
     all: &Runs<'_>,
@@ -226,7 +223,7 @@ fn sensitivity(
             let mut slope: Vec<f64> = ahead.iter().zip(&back).map(|(a, b)| a - b).collect();
             let mut sizes: Vec<f64> = slope.iter().map(|x| x.abs()).collect();
             sizes.sort_by(f64::total_cmp);
-            let bound = JUMPED * sizes.get(sizes.len() / 2).copied().unwrap_or(0.0);
+            let bound = SLOPE_JUMP_MEDIANS * sizes.get(sizes.len() / 2).copied().unwrap_or(0.0);
             for x in slope.iter_mut().filter(|x| x.abs() > bound) {
                 *x = 0.0;
             }

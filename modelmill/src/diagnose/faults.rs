@@ -1,5 +1,5 @@
-//! What is known to be wrong with recordings before anything is looked for: pushes, coarse readings, and what another recording
-//! of the machine does not share. All of it is told, and none of it is left to be taken for an effect.
+//! Faults of recordings that are known before the search: contacts, coarse quantisation, and differences between recordings of the
+//! machine. All are reported and subtracted or left out, so that none is mistaken for an effect.
 
 use modelmill_identify::changes::Moments;
 use modelmill_identify::diagnose::{Disturbance, Problem, Quantity, step_of_values};
@@ -9,20 +9,13 @@ use crate::model::Model;
 use crate::recording::Recording;
 use crate::runs::{Difference, What, differences};
 
+use super::thresholds::{
+    CONTACT_GAP_S, CONTACT_MARGIN_S, CONTACT_SHORTEST_S, REPEATED_PLACE_FEWEST_SAMPLES,
+    REPEATED_PLACE_MOST_RESIDUAL,
+};
 use crate::regressors::Runs;
 
-/// About a push so long is left out on either side, s.
-const MARGIN: f64 = 0.15;
-/// A push that lasts less is none, s.
-const SHORTEST: f64 = 0.18;
-/// Pushes closer together are one, s.
-const TOGETHER: f64 = 0.3;
-/// Samples beyond a place at other times that say whether a force comes again there.
-const FEWEST_BEYOND: usize = 10;
-/// A law of a place, found during an event, leaves less than this part of squares at other times.
-const COMES_AGAIN: f64 = 0.5;
-
-/// What later recordings do not share with the first one; nothing where that cannot be said.
+/// Differences of later recordings from the first one; none if they cannot be compared.
 pub(crate) fn between_runs(model: &Model, recordings: &[&Recording]) -> Vec<Difference> {
     if recordings.len() < 2 {
         return Vec::new();
@@ -30,7 +23,7 @@ pub(crate) fn between_runs(model: &Model, recordings: &[&Recording]) -> Vec<Diff
     differences(model, recordings).unwrap_or_default()
 }
 
-/// Takes what is known off a problem, and tells it there.
+/// Subtracts known faults from the measured forces of a problem, and adds them to its disturbances.
 pub(crate) fn take_off(
     problem: &mut Problem,
     model: &Model,
@@ -52,7 +45,7 @@ pub(crate) fn take_off(
             }
             problem.removed[d] += force.iter().map(|f| f * f).sum::<f64>() / samples;
         }
-        problem.disturbances.push(told(one));
+        problem.disturbances.push(difference(one));
     }
     coarse(problem, model, all)?;
     pushes(problem, all);
@@ -78,8 +71,8 @@ pub(crate) fn take_off(
     Ok(())
 }
 
-/// A difference of two recordings by name.
-fn told(one: &Difference) -> Disturbance {
+/// A difference of two recordings as a disturbance.
+fn difference(one: &Difference) -> Disturbance {
     let (_, at, values) = one.changed.what.parts(one.changed.unit);
     let kind = match one.changed.what {
         What::Payload { .. } => "payload_change",
@@ -99,7 +92,7 @@ fn told(one: &Difference) -> Disturbance {
         recordings: vec![one.first.clone(), one.later.clone()],
         interval: None,
         says: Some(format!(
-            "{} differs between the recordings: in {} beside {}, {}",
+            "{} differs between the recordings, {} compared with {}: {}",
             match one.changed.what {
                 What::Payload { .. } => "the payload",
                 What::Friction { .. } => "the friction",
@@ -116,7 +109,7 @@ fn told(one: &Difference) -> Disturbance {
     }
 }
 
-/// Forces that are read in steps coarser than their noise: half a step either way is their noise.
+/// Forces with a quantisation step coarser than their noise. Uniform rounding then gives the noise, step / sqrt(12).
 fn coarse(problem: &mut Problem, model: &Model, all: &Runs<'_>) -> Outcome<()> {
     for (d, drive) in model.drives().iter().enumerate() {
         let mut recorded = Vec::new();
@@ -141,8 +134,8 @@ fn coarse(problem: &mut Problem, model: &Model, all: &Runs<'_>) -> Outcome<()> {
     Ok(())
 }
 
-/// Leaves out pushes: events that no place of a coordinate explains. A push does not come again where the state comes again; a
-/// stop does, in any of the recordings.
+/// Leaves out contacts and pushes: events that are not a function of a position. An end stop acts at every visit of its place, a push
+/// only once.
 fn pushes(problem: &mut Problem, all: &Runs<'_>) {
     let events: Vec<Disturbance> = merged(all);
     if events.is_empty() {
@@ -156,7 +149,11 @@ fn pushes(problem: &mut Problem, all: &Runs<'_>) {
         };
         for (i, time) in one.time().into_iter().enumerate() {
             inside.push(events.iter().any(|event| is_in(event, time, 0.0)));
-            about.push(events.iter().any(|event| is_in(event, time, MARGIN)));
+            about.push(
+                events
+                    .iter()
+                    .any(|event| is_in(event, time, CONTACT_MARGIN_S)),
+            );
             let at = i * one.decimation();
             positions.push(one.run.q.iter().map(|q| q[at]).collect::<Vec<f64>>());
         }
@@ -187,8 +184,8 @@ fn pushes(problem: &mut Problem, all: &Runs<'_>) {
     problem.disturbances.extend(events);
 }
 
-/// Whether the force of an event is one that acts beyond a place: the line over the depth that it follows during the event says it
-/// at other times too. Where there are no other times nothing speaks for an event. The model is fitted to what is neither.
+/// Whether the force of an event is that of a stop: the line over the depth, fitted during the event, also predicts the force beyond
+/// the place at other times. Without other times the event is not believed. The model is fitted to the samples before the place.
 fn acts_beyond(
     problem: &Problem,
     channel: usize,
@@ -224,7 +221,7 @@ fn acts_beyond(
             .collect()
     };
     let (during, otherwise) = (beyond(true), beyond(false));
-    if otherwise.len() < FEWEST_BEYOND {
+    if otherwise.len() < REPEATED_PLACE_FEWEST_SAMPLES {
         return true;
     }
     let Some(line) = line(&during) else {
@@ -232,7 +229,7 @@ fn acts_beyond(
     };
     let left: f64 = otherwise.iter().map(|(x, y)| (y - line(*x)).powi(2)).sum();
     let whole: f64 = otherwise.iter().map(|(_, y)| y * y).sum();
-    left < COMES_AGAIN * whole
+    left < REPEATED_PLACE_MOST_RESIDUAL * whole
 }
 
 /// The straight line through some points by least squares.
@@ -245,7 +242,7 @@ fn line(points: &[(f64, f64)]) -> Option<impl Fn(f64) -> f64 + use<>> {
     (spread > 0.0).then_some(move |at: f64| y + slope * (at - x))
 }
 
-/// Events of all recordings, those that are close together as one, without the short ones.
+/// Contact events of all recordings: close ones are joined, short ones are dropped.
 fn merged(all: &Runs<'_>) -> Vec<Disturbance> {
     let mut events: Vec<Disturbance> = Vec::new();
     let faults = all.iter().flat_map(|(one, _)| &one.faults);
@@ -254,7 +251,7 @@ fn merged(all: &Runs<'_>) -> Vec<Disturbance> {
         if let Some(last) = events.last_mut()
             && last.recordings == event.recordings
             && let Some(before) = &mut last.interval
-            && from - before[1] < TOGETHER
+            && from - before[1] < CONTACT_GAP_S
         {
             before[1] = to;
             for place in &event.at {
@@ -269,7 +266,7 @@ fn merged(all: &Runs<'_>) -> Vec<Disturbance> {
     events.retain(|event| {
         event
             .interval
-            .is_some_and(|[from, to]| to - from >= SHORTEST)
+            .is_some_and(|[from, to]| to - from >= CONTACT_SHORTEST_S)
     });
     events
 }

@@ -1,5 +1,5 @@
-//! What a diagnosis found, as values: the verdict, what is missing with estimates and doubles, the model with what was
-//! found beside the model as it is, and where errors live. Text, JSON and the page print them.
+//! Findings of a diagnosis as values: verdict, missing effects with estimates and alternatives, the model before and after the
+//! effects, and regions where the error is largest. Text, JSON and the page print them.
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{CommandName, Message, OptionName, Remedy};
@@ -24,42 +24,39 @@ use super::laws::{self, Hypothesis};
 use super::long;
 use super::off_nominal::{OffNominal, off_nominal, turned};
 use super::problem::{self, Answer, Asked, Held};
+use super::thresholds::{DIFFERENCE_LEAST_GAIN, MOST_VALIDATION_ERROR};
 use super::versions::Version;
 use super::words::{self, Judged};
 
-/// Fails where what is fitted to the recordings misses the forces of others by more than these are: nothing that is found in the
-/// fit holds then.
-fn foretells(answer: &Answer, judged: Judged) -> Outcome {
+/// Fails if the fitted model predicts validation data worse than a model without any force: findings of the fit are worthless then.
+fn check_prediction(answer: &Answer, judged: Judged) -> Outcome {
     let diagnosis = &answer.diagnosis;
     let last = diagnosis.ladder.last();
-    let Some(last) = last.filter(|last| last.check > 1.0) else {
+    let Some(last) = last.filter(|last| last.check > MOST_VALIDATION_ERROR) else {
         return Ok(());
     };
     if words::is_to_be_cleared_up(diagnosis) {
         return Ok(());
     }
     Err(Error::input(message!(
-        "what is fitted to these recordings ({} of the forces is left there) misses the forces {} by {}, more than a model without \
-         any force would: nothing can be said of what is missing. Record longer to fit to, with all drives moving far and fast \
-         ({}), or hold the parameters of an earlier run ({})",
-        percent(Some(last.fit)),
+        "the error {} is {} of the force ({} on the fitted data), more than that of a model without any force. So the fit is \
+         useless, and no effect can be found. Fit a longer recording in which all drives move far and fast ({}), or fix the \
+         parameters at those of an earlier fit ({})",
         judged.words(),
         percent(Some(last.check)),
+        percent(Some(last.fit)),
         Remedy::command(CommandName::Excite),
         Remedy::option(OptionName::Parameters)
     )))
 }
 
-/// Recordings that differ leave so many times as much where that is not said.
-const NO_WORSE: f64 = 1.5;
-
-/// What is asked of a diagnosis; [`Question::default`] identifies what the model file leaves open.
+/// Options of a diagnosis. [`Question::default`] estimates all parameters that are not known in the model file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Question {
     /// Which parameters keep their nominal values.
     pub held: Held,
-    /// Where base parameters come out off their nominal values, ask once more with all of them held: they may hide what is
-    /// missing.
+    /// Whether to diagnose again with all base parameters fixed, if estimates differ from their nominal values. Estimated
+    /// parameters may hide a missing effect.
     pub again_with_nominal: bool,
 }
 
@@ -72,39 +69,39 @@ impl Default for Question {
     }
 }
 
-/// What a diagnosis found.
+/// Findings of a diagnosis.
 pub struct Findings {
     /// Verdict, ladder, candidates with the reason of their refusal, and what is left unexplained.
     pub diagnosis: Diagnosis,
-    /// What is missing, with what is known of it.
+    /// Missing effects.
     pub missing: Vec<Missing>,
-    /// Laws that no library holds and that would explain what nobody explains: hypotheses.
+    /// Laws that are in no library and would explain the residual: hypotheses.
     pub laws: Vec<Hypothesis>,
-    /// What the recordings leave open.
+    /// Effects that the recordings can neither show nor exclude.
     pub untold: Vec<Untold>,
-    /// Base parameters of the bodies that are not what the file says, the farthest first.
+    /// Base parameters of the bodies that differ from the file, the one with the most standard deviations first.
     pub off_nominal: Vec<OffNominal>,
-    /// The same question with all parameters held at their nominal values, where some are off and it was asked for.
+    /// The diagnosis with all parameters fixed at their nominal values, if it was requested and some estimates differ.
     pub with_nominal: Option<WithNominal>,
-    /// Where the error sits that matters: what is left unexplained, or that of the model as it is.
+    /// Regions of the unexplained residual, or, without one, of the error of the model as it is.
     pub regions: Vec<Region>,
     /// The model as it is, along all recordings.
     pub before: Version,
-    /// The model with what was found, or why there is none; the reason is empty where nothing was found.
+    /// The model with the effects found, or why there is none; the reason is empty if no effect was found.
     pub after: Result<Version, Message>,
-    /// What was found, as entries of a model file.
+    /// The effects found, as entries of a model file.
     pub entries: Vec<NewEffect>,
-    /// The model file with them.
+    /// The model file with these entries.
     pub edited: Option<Added>,
-    /// Where the error of the model as it is lives.
+    /// Regions where the error of the model as it is is largest.
     pub places: Places,
-    /// Where what is left in the end lives.
+    /// Regions where the residual with the effects is largest.
     pub left: Option<Places>,
-    /// Where errors are judged.
+    /// The data on which errors are judged.
     pub judged: Judged,
-    /// Remarks on the recordings.
+    /// Notes on the recordings.
     pub notes: Vec<Note>,
-    /// What was asked and with which columns.
+    /// The problem and its solution, without the columns.
     pub(crate) answer: Answer,
     /// Variables on which errors may depend, along the recordings that are judged.
     pub(crate) variables: Vec<(String, Vec<f64>)>,
@@ -117,37 +114,37 @@ pub struct Missing {
     pub effect: Effect,
     /// Its parameters and constants.
     pub estimates: Vec<Estimate>,
-    /// How likely it is that it is there, between 0 and 1.
+    /// Probability that the effect is present, between 0 and 1.
     pub probability: f64,
-    /// What the recordings cannot tell it from.
+    /// Effects that explain the recordings equally well.
     pub indistinguishable_from: Vec<Effect>,
-    /// Which experiment tells it from these, as the library says.
+    /// Experiment that distinguishes it from these, by the text of the library.
     pub separate_by: Option<String>,
-    /// The motion that would tell it from these, if one can be sought.
+    /// Request for a motion that distinguishes it from these, if one can be planned.
     pub separation: Option<Separation>,
 }
 
-/// An effect that the recordings leave open.
+/// An effect that the recordings can neither show nor exclude.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Untold {
     /// Its kind and places.
     pub effect: Effect,
-    /// Why they do.
+    /// Why, as a sentence without the last full stop.
     pub says: String,
-    /// Which experiment would tell.
+    /// Experiment that would decide.
     pub separate_by: String,
 }
 
-/// Effects between which a motion is to decide.
+/// Request for a motion that distinguishes effects.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Separation {
     /// The effect that was found, with its values.
     pub effect: Named,
-    /// What it may be taken for.
+    /// Effects that it may be confused with.
     pub rivals: Vec<Effect>,
-    /// What is there in either case, with its constants.
+    /// Effects that are present in either case, with their constants.
     pub beside: Vec<Named>,
-    /// Noise of the forces, if it is known.
+    /// Noise of the forces, root mean square over the drives (N or N m), if it is known.
     pub noise: Option<f64>,
 }
 
@@ -158,17 +155,17 @@ pub struct Estimate {
     pub name: String,
     /// Its value.
     pub value: f64,
-    /// Standard deviation, where identification has the parameter by itself.
+    /// Standard deviation, if identification determines the parameter by itself.
     pub std: Option<f64>,
     /// Unit of the value.
     pub unit: String,
 }
 
-/// A diagnosis with all parameters held at their nominal values.
+/// A diagnosis with all parameters fixed at their nominal values.
 pub struct WithNominal {
     /// Verdict, ladder and candidates.
     pub diagnosis: Diagnosis,
-    /// What is missing then.
+    /// Missing effects with their estimates.
     pub missing: Vec<(Effect, Vec<Estimate>)>,
 }
 
@@ -182,14 +179,14 @@ impl Findings {
         }
     }
 
-    /// What is to be done where nothing, or not all, is to be added to the model file.
+    /// Advice if not all effects can be added to the model file: a doubtful recording, or a delayed force signal.
     pub(crate) fn beside_the_file(&self) -> Option<&'static str> {
         if self.missing.is_empty() {
             return None;
         }
         if words::is_to_be_cleared_up(&self.diagnosis) {
             return Some(
-                "First clear up what the verdict begins with: effects may only make up for it.",
+                "First check the fault that the verdict starts with: the effects may only compensate it.",
             );
         }
         let is_late = |found: &Missing| {
@@ -198,16 +195,16 @@ impl Findings {
                 && !self.entries.iter().any(is_its)
         };
         self.missing.iter().any(is_late).then_some(
-            "A force that is read late is mended where it is read: a model file has nothing for it.",
+            "Correct the delayed force signal where it is recorded: a model file has no entry for it.",
         )
     }
 }
 
 impl Model {
-    /// Finds which physical effect the model lacks: `fit` is what parameters are fitted to, errors are judged on `check`, or
-    /// by cross-validation if there is none.
+    /// Finds which physical effects the model lacks. Parameters are fitted to `fit`; errors are judged on the validation runs `check`,
+    /// or by cross-validation without any.
     ///
-    /// Fails when a recording is too short, holds no force, or leads where the mechanism cannot stand.
+    /// Fails if a recording is too short, has no forces, or has positions at which the loops of the mechanism cannot close.
     pub fn diagnose(
         &self,
         fit: &[&Recording],
@@ -224,7 +221,7 @@ impl Model {
         let held = question.held;
         let recordings: Vec<&Recording> = of_fit.into_iter().chain(of_check).collect();
         let between =
-            (self.host()).watched("holding the recordings against each other", 0, |_| {
+            (self.host()).watched("comparing the recordings with each other", 0, |_| {
                 faults::between_runs(self, &recordings)
             })?;
         let find = |between: &[Difference]| {
@@ -238,9 +235,9 @@ impl Model {
         let mut answer = find(&between)?;
         let mut between = between;
         if !between.is_empty() {
-            // What the model lacks may look as if the recordings differed.
+            // A missing effect may look like a difference between recordings.
             let without = find(&[])?;
-            if without.left() < NO_WORSE * answer.left() {
+            if without.left() < DIFFERENCE_LEAST_GAIN * answer.left() {
                 answer = without;
                 between.clear();
             }
@@ -251,7 +248,7 @@ impl Model {
             Judged::Check
         };
         if held == Held::Known {
-            foretells(&answer, judged)?;
+            check_prediction(&answer, judged)?;
         }
         let notes = data.iter().flatten().flat_map(Stretch::notes);
         let notes = self.caution().into_iter().chain(notes.cloned()).collect();
@@ -319,6 +316,7 @@ impl Findings {
     }
 }
 
+/// The model with the effects, identified. If a delay changed, recordings are prepared again, since forces then belong to earlier states.
 fn with_effects(
     model: &Model,
     edited: &Added,
@@ -347,12 +345,12 @@ fn with_effects(
         before.clone()
     };
     let host = model.host().clone();
-    host.watched("identifying with what was found", 0, |_| {
+    host.watched("identifying with the effects found", 0, |_| {
         Version::new(model, fit, check, held)
     })?
 }
 
-/// The same question with all parameters held at their nominal values.
+/// The diagnosis with all parameters fixed at their nominal values.
 fn with_nominal(findings: &Findings, between: &[Difference]) -> Outcome<WithNominal> {
     let version = &findings.before;
     let of = |is_check: bool| -> Vec<Stretch> {
@@ -376,6 +374,7 @@ fn with_nominal(findings: &Findings, between: &[Difference]) -> Outcome<WithNomi
     })
 }
 
+/// Missing effects with estimates, alternatives and the experiment that separates them.
 fn missing(findings: &Findings) -> Vec<Missing> {
     let found = findings.diagnosis.effects.iter();
     found
@@ -390,6 +389,7 @@ fn missing(findings: &Findings) -> Vec<Missing> {
         .collect()
 }
 
+/// Effects that the recordings can neither show nor exclude, with the reason and the experiment that would decide.
 fn untold(findings: &Findings) -> Vec<Untold> {
     let of = |effect: &Effect| {
         let mut kinds = findings.answer.candidates.kinds.iter();
@@ -397,12 +397,12 @@ fn untold(findings: &Findings) -> Vec<Untold> {
         let place = effect.at.join(" and ");
         let known = kind.map_or("", |kind| kind.doubles.as_str());
         let more = format!(
-            "A motion over more of the travel of {place}, at other speeds and with another load, tells it from what the model has."
+            "To decide, record a motion over more of the travel of {place}, at other speeds and with another load."
         );
         Untold {
             effect: effect.clone(),
-            says: "along these motions its force is all but a combination of forces that the model has, so that even one as large \
-                   as the drive's own is neither seen nor excluded"
+            says: "along these motions its force is almost a combination of forces that the model has, so even an effect as \
+                   large as the force of the drive can be neither shown nor excluded"
                 .to_owned(),
             separate_by: format!("{known} {more}").trim().to_owned(),
         }
@@ -424,7 +424,7 @@ fn unit_of_constant(findings: &Findings, found: &FoundEffect, name: &str) -> Str
     units.map_or_else(String::new, |(_, unit)| unit.clone())
 }
 
-/// Estimates as the search has them.
+/// Estimates of the search.
 fn of_search(parameters: &[EffectParameter], found: &FoundEffect) -> Vec<Estimate> {
     let values = found.estimates.iter().zip(&found.deviations);
     let of = |(p, (value, std)): (&EffectParameter, (&f64, &Option<f64>))| Estimate {
@@ -436,8 +436,8 @@ fn of_search(parameters: &[EffectParameter], found: &FoundEffect) -> Vec<Estimat
     parameters.iter().zip(values).map(of).collect()
 }
 
-/// Estimates of an effect with their deviations, from identification with everything that was found; where the model with
-/// the effects cannot say them apart, those of the search.
+/// Estimates of an effect with standard deviations, from identification with all effects found. If the model with the effects cannot
+/// separate them, those of the search.
 fn estimates(findings: &Findings, found: &FoundEffect) -> Vec<Estimate> {
     let parameters = &findings.answer.problem.candidates[found.candidate].parameters;
     let mut all = of_search(parameters, found);
@@ -451,7 +451,7 @@ fn estimates(findings: &Findings, found: &FoundEffect) -> Vec<Estimate> {
         |entry: &&NewEffect| entry.kind == found.effect.kind && entry.at == found.effect.at;
     if let Some(entry) = findings.entries.iter().find(is_its) {
         for estimate in &mut all {
-            // What is held at zero, since its sign would make no sense, stays there.
+            // A value that was fixed at zero, since it would have the wrong sign, stays zero.
             if estimate.value == 0.0 {
                 continue;
             }
@@ -459,7 +459,7 @@ fn estimates(findings: &Findings, found: &FoundEffect) -> Vec<Estimate> {
                 estimate.value = p.value;
                 estimate.std = p.std;
             } else if let Some((_, constant)) = estimate.name.clone().split_once('*') {
-                // A product of a parameter and a constant is told as the constant.
+                // A product of a parameter and a constant is reported as the constant.
                 let known = entry
                     .constants
                     .iter()
@@ -502,7 +502,7 @@ fn identified<'a>(
         .filter(|p| p.status == Status::Identified)
 }
 
-/// Which experiment tells an effect from its doubles, as the library says.
+/// Experiment that distinguishes an effect from its alternatives, by the text of the library.
 fn separate_by(findings: &Findings, found: &FoundEffect) -> Option<String> {
     if found.indistinguishable_from.is_empty() {
         return None;
@@ -512,12 +512,13 @@ fn separate_by(findings: &Findings, found: &FoundEffect) -> Option<String> {
     (!kind.doubles.is_empty()).then(|| kind.doubles.clone())
 }
 
-/// What a motion would have to decide. What only moves forces in time has no force of its own to be made large.
+/// The request for a motion that distinguishes an effect from its alternatives; `None` for a delay, which adds no force that a
+/// motion could make larger.
 fn separation(findings: &Findings, found: &FoundEffect) -> Option<Separation> {
     let is_force = |effect: &&Effect| {
         let kinds = findings.answer.candidates.kinds.iter();
         let mut kind = kinds.filter(|kind| kind.name == effect.kind);
-        // What no library holds has no columns along another motion.
+        // A kind that is in no library has no columns along another motion.
         kind.next()
             .is_some_and(|kind| kind.mechanics != Some(Mechanics::Delay))
     };
@@ -549,7 +550,7 @@ fn separation(findings: &Findings, found: &FoundEffect) -> Option<Separation> {
     })
 }
 
-/// Where the error sits that matters: what is left unexplained, or that of the model as it is.
+/// Regions of the unexplained residual, or, without one, of the error of the model as it is.
 fn regions(findings: &Findings) -> Vec<Region> {
     let diagnosis = &findings.answer.diagnosis;
     if diagnosis.verdict != Verdict::Unexplained {
@@ -569,7 +570,7 @@ fn regions(findings: &Findings) -> Vec<Region> {
     regions
 }
 
-/// A channel whose error sits nowhere in particular.
+/// The whole time as a region, for a drive whose residual is largest nowhere in particular.
 fn everywhere(findings: &Findings, channel: usize) -> Region {
     let name = findings.answer.problem.layout.channels[channel].clone();
     let version = findings.last();
@@ -581,7 +582,7 @@ fn everywhere(findings: &Findings, channel: usize) -> Region {
     let again = 100.0 * findings.answer.diagnosis.reproducible[channel];
     Region {
         says: format!(
-            "what is left of {name} is spread over all of the time, and {again:.0} % of its square comes again with the state"
+            "the residual of {name} is spread over the whole time, and {again:.0} % of its square is repeatable"
         ),
         channel: name,
         variable: modelmill_identify::TIME_COLUMN.to_owned(),
@@ -591,7 +592,7 @@ fn everywhere(findings: &Findings, channel: usize) -> Region {
     }
 }
 
-/// Where the error of a model lives on the recordings that are judged.
+/// Regions of the error of a model, on the recordings on which errors are judged.
 fn places(version: &Version) -> Outcome<Places> {
     let judged = version.judged();
     let (first, last) = (

@@ -1,5 +1,5 @@
-//! Laws that no library holds, by the names of a model: where they may act, what they say as formulas over its coordinates, drives
-//! and loads, and the entry of a library by which `add` takes them.
+//! Laws for the residual that are in no library, with the names of a model: the places where they may act, their formulas over
+//! coordinates, drives and loads, and the entry of a library with which `add` can add them.
 
 use std::fmt::Write as _;
 
@@ -123,34 +123,34 @@ fn slopes(values: &[f64], time: &[f64]) -> Vec<f64> {
     (0..values.len()).map(at).collect()
 }
 
-/// A law that would explain what nobody explains; a hypothesis.
+/// A law that would explain the residual; a hypothesis.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Law {
-    /// What it adds to the force of its place, over coordinates, rates (`_d`), lengths of drives (`_length`) and what drives carry
-    /// (by their names).
+    /// The force that it adds at its place, as a formula over coordinates, rates (`_d`), lengths of drives (`_length`) and loads of drives
+    /// (by the names of the drives).
     pub expression: String,
     /// The drive or coordinate on which it acts.
     pub at: String,
     /// Its parameters.
     pub parameters: Vec<Estimate>,
-    /// Share of the squared error on the drives that feel it that it takes off where it was not fitted.
+    /// Share of the squared residual that it explains on data that were not fitted, on the drives on which it has an effect.
     pub gain: f64,
-    /// Effects that were found and that it makes needless.
+    /// Effects found that become unnecessary with it.
     pub instead_of: Vec<Effect>,
-    /// How a model file takes it; `None` where the law remembers the way, which no formula says.
+    /// Its entry; `None` if the law depends on the earlier motion, which no formula can express.
     pub entry: Option<LawEntry>,
 }
 
-/// A law as a kind of effect of a library.
+/// A law as a kind of effect for a library.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LawEntry {
-    /// The table of the library.
+    /// The table of the library, as TOML.
     pub text: String,
-    /// The effect by which a model has it.
+    /// The effect that adds it to a model.
     pub effect: NewEffect,
 }
 
-/// A law with those that do as well.
+/// A law with others that explain the recordings equally well.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Hypothesis {
     /// The simplest.
@@ -178,6 +178,7 @@ pub(crate) fn hypotheses(model: &Model, diagnosis: &Diagnosis) -> Vec<Hypothesis
     diagnosis.laws.iter().map(one).collect()
 }
 
+/// A law of the search with the names of the model.
 fn law(model: &Model, sites: &[Site], law: &Proposed) -> Law {
     let site = &sites[law.site];
     let mut named = Formula::new(law);
@@ -238,7 +239,7 @@ fn word(variable: Variable) -> &'static str {
     }
 }
 
-/// The table of a library, and the effect that a model has by it.
+/// The table of a library for a law, and the effect that adds it to a model; `None` for a law that depends on the earlier motion.
 fn entry(sites: &[Site], law: &Proposed, parameters: &[Estimate]) -> Option<LawEntry> {
     let mut products = law.terms.iter().map(|term| &term.product);
     if products.any(Product::remembers) {
@@ -264,7 +265,7 @@ fn entry(sites: &[Site], law: &Proposed, parameters: &[Estimate]) -> Option<LawE
     }
     let _ = writeln!(
         text,
-        "expression = \"{expression}\"\nsays = \"A hypothesis that recordings suggest: no law of a machine until it is understood.\""
+        "expression = \"{expression}\"\nsays = \"A hypothesis that recordings suggest. It is no law of the machine until its cause is understood.\""
     );
     text.push_str("[effect_kind.parameters]\n");
     for parameter in parameters {
@@ -311,6 +312,7 @@ struct Formula {
 }
 
 impl Formula {
+    /// Symbols of the parameters: `k` for a term, `ks` and `kc` for sine and cosine, numbered if there are several terms.
     fn new(law: &Proposed) -> Self {
         let several = law.terms.len() > 1;
         let of_term = |(k, term): (usize, &Term)| {
@@ -333,6 +335,7 @@ impl Formula {
         }
     }
 
+    /// The formula of a law; `name` gives the name of each variable. Constants are collected on the way if they have symbols.
     fn text(&mut self, law: &Proposed, name: &dyn Fn(Variable, Option<usize>) -> String) -> String {
         let mut symbols = self.parameters.clone().into_iter();
         let mut terms = Vec::new();
@@ -472,6 +475,7 @@ impl Formula {
     }
 }
 
+/// `z` to a whole power, with the sign of `z` if `is_odd`.
 fn whole_power(z: &str, power: i32, is_odd: bool) -> String {
     match (power, is_odd) {
         (0, _) => format!("sign({z})"),

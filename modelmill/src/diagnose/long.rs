@@ -1,8 +1,8 @@
-//! Long recordings in fewer samples: where the parallel filter keeps few of many, states are picked and forces filtered before
-//! anything is made of them, so that memory and time are those of the samples that count.
+//! Long recordings in fewer samples. If the parallel filter keeps few samples, states are decimated and forces filtered before any column
+//! is computed. This saves memory and time.
 //!
-//! States that were smoothed change little between samples; after a first step as many are left for every one that is kept in
-//! the end as the parallel filter needs to filter regressor and forces alike.
+//! Smoothed states change little between samples. This first step leaves four samples for each one that the parallel filter keeps,
+//! which it needs to filter regressor and forces alike.
 
 use modelmill_identify::{LowPass, Note, PASSED_BY_DECIMATION, decimate_time};
 
@@ -11,30 +11,30 @@ use crate::model::Model;
 use crate::recording::Recording;
 use crate::stretch::Stretch;
 
-/// Shorter stretches stay as they are.
+/// Segments with fewer samples are not decimated here. By judgement.
 const LONG: usize = 150_000;
-/// Samples that are kept at most, where that leaves enough of the band in which forces follow the motion.
+/// Samples that are kept at most, if that leaves enough of the band in which forces follow the motion. By judgement.
 const KEPT: usize = 12_000;
-/// The parallel filter passes this part of the band: what many samples say of it is more than enough.
+/// The parallel filter must pass at least this part of the band of the motion. By judgement.
 const PART_OF_BAND: f64 = 0.25;
-/// Samples that are left for the parallel filter to keep one of.
+/// Samples that are left for each one that the parallel filter keeps.
 const LEFT: usize = 4;
 /// Order of the low-pass of the forces. It is Butterworth's, which is flat where the parallel filter passes: one with ripples
 /// would change forces that are held against states as they were.
 const ORDER: usize = 4;
 
 impl Recording {
-    /// The recording with long stretches in the fewer samples that a diagnosis looks at: for those who need it for nothing else,
-    /// since it takes less memory so.
+    /// The recording with long segments in the fewer samples that a diagnosis uses. Use it to save memory if the recording is needed for
+    /// nothing else.
     ///
-    /// Fails when a stretch cannot be filtered.
+    /// Fails if a segment cannot be filtered.
     pub fn for_diagnosis(&self, model: &Model) -> Outcome<Self> {
         let stretches = self.stretches.iter().map(|one| thinned(model, one));
         Ok(self.with(stretches.collect::<Outcome<_>>()?))
     }
 }
 
-/// A stretch in fewer samples, if it is long and the parallel filter keeps few of them.
+/// A segment in fewer samples, if it is long and the parallel filter keeps few of them.
 pub(crate) fn thinned(model: &Model, stretch: &Stretch) -> Outcome<Stretch> {
     let (samples, every) = (stretch.samples(), stretch.decimation());
     let time = &stretch.run.time;
@@ -43,7 +43,7 @@ pub(crate) fn thinned(model: &Model, stretch: &Stretch) -> Outcome<Stretch> {
         _ => return Ok(stretch.clone()),
     };
     let kept = samples.div_ceil(every);
-    // Beyond, the parallel filter would take too much of what tells effects apart.
+    // With more decimation the parallel filter would remove too much of the band in which effects differ.
     let most = (stretch.run.prepared.band_hz).map_or(every as f64, |band| {
         PASSED_BY_DECIMATION / (PART_OF_BAND * band * step)
     });
@@ -68,7 +68,7 @@ pub(crate) fn thinned(model: &Model, stretch: &Stretch) -> Outcome<Stretch> {
         };
         all.iter().map(one).collect()
     };
-    // A force has heard of its neighbours through the filter.
+    // The filter mixes neighbouring forces, so a kept sample is left out if any of them is.
     let heard = |out: &Vec<bool>| -> Vec<bool> {
         let about = |k: usize| {
             let from = (factor * k).saturating_sub(factor - 1);
@@ -99,8 +99,8 @@ pub(crate) fn thinned(model: &Model, stretch: &Stretch) -> Outcome<Stretch> {
     thinned.run.prepared.decimate = LEFT;
     let passed = PASSED_BY_DECIMATION / (step * (factor * LEFT) as f64);
     let says = format!(
-        "{} is long: the diagnosis looks at one in {} of its {samples} samples, after the parallel filter, which passes what \
-         is below {} Hz.",
+        "{} is long: the diagnosis uses every {}th of its {samples} samples, after a low-pass at {} Hz on forces and \
+         regressor.",
         run.file,
         factor * LEFT,
         crate::text::table::significant(passed, 3)

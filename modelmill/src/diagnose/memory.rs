@@ -1,5 +1,5 @@
-//! Friction that remembers where it reversed (P. R. Dahl, AIAA Journal 14, 1976): over a length after each reversal it grows to
-//! its bound, as bristles that bend before they slip. It depends on the way that was gone, so no term of a model file says it.
+//! Candidates for Dahl friction (P. R. Dahl, AIAA Journal 14, 1976): after each reversal it builds up over a distance, like bristles
+//! that bend before they slip. It depends on the earlier motion, so a model file cannot contain it.
 
 use modelmill_codegen::Evaluator;
 use modelmill_identify::diagnose::{
@@ -14,7 +14,7 @@ use crate::stretch::Stretch;
 use super::numbers::stack;
 use crate::regressors::Runs;
 
-/// Lengths that are tried, as parts of the travel.
+/// Distances that are tried, as parts of the travel of the drive.
 const LENGTHS: [f64; 12] = [
     0.001, 0.002, 0.004, 0.007, 0.012, 0.02, 0.035, 0.06, 0.1, 0.17, 0.3, 0.5,
 ];
@@ -77,7 +77,8 @@ pub(crate) fn memories(model: &Model, all: &Runs<'_>) -> Outcome<Vec<Candidate>>
     Ok(candidates)
 }
 
-/// The state of the bristles along a position, between minus and plus one: `dz/dx = (sign - z) / length`.
+/// The state of the bristles along a position, between -1 and 1, by `dz/dx = (sign - z) / length`. Each step uses the exact solution of
+/// this equation, so large steps are stable.
 fn states(position: &[f64], length: f64) -> Vec<f64> {
     let mut state = 0.0_f64;
     let mut before = position.first().copied().unwrap_or(0.0);

@@ -1,4 +1,5 @@
-//! Numbers along all recordings of a diagnosis: regressors, motions of places, each channel stacked and decimated alike.
+//! Values along all recordings of a diagnosis: forces, variables and motions of places. Recordings are stacked one after the other, and
+//! all columns are decimated alike.
 
 use modelmill_codegen::Evaluator;
 use modelmill_identify::diagnose::{Layout, Stretch as LaidOut};
@@ -10,7 +11,7 @@ use crate::model::Model;
 use crate::regressors::Runs;
 use crate::stretch::Stretch;
 
-/// Names of the channels and lengths of the stretches.
+/// Names of the channels, lengths of the segments, and samples that are left out.
 pub(crate) fn layout(model: &Model, all: &Runs<'_>) -> Layout {
     let stretch = |(one, is_check): &(&Stretch, bool)| {
         let time = one.time();
@@ -58,7 +59,7 @@ pub(crate) fn stack(
     Ok(stacked)
 }
 
-/// Variables on which an unknown force may depend.
+/// Variables on which an unknown force may depend: position, rate and acceleration of each active coordinate.
 pub(crate) fn variables(model: &Model, all: &Runs<'_>) -> Vec<(String, Vec<f64>)> {
     let mut variables = Vec::new();
     for (i, name) in model.active().into_iter().enumerate() {
@@ -79,16 +80,22 @@ pub(crate) fn variables(model: &Model, all: &Runs<'_>) -> Vec<(String, Vec<f64>)
     variables
 }
 
-/// Largest rate and travel of a place; zero where it has none.
+/// Motions of drives and coordinates along all recordings.
 pub(crate) struct Motions {
+    /// Positions of the drives, then their rates, then derivatives by the active coordinates.
     drives: Vec<Vec<f64>>,
+    /// Indices of the active coordinates.
     active: Vec<usize>,
+    /// Their positions and rates.
     active_motion: Vec<[Vec<f64>; 2]>,
+    /// Indices of the passive coordinates.
     passive: Vec<usize>,
+    /// Their positions, then their rates.
     passive_motion: Vec<Vec<f64>>,
 }
 
 impl Motions {
+    /// Evaluates all motions once.
     pub(crate) fn new(model: &Model, all: &Runs<'_>) -> Outcome<Self> {
         let evaluator = Evaluator::new(&model.derivation);
         let (active, passive) = model.derivation.coordinates();
@@ -113,7 +120,7 @@ impl Motions {
         })
     }
 
-    /// Largest rate and travel.
+    /// Largest rate (per s) and travel of a place; zero for a place that does not move.
     pub(crate) fn scale(&self, place: Place) -> [f64; 2] {
         let n = self.drives.len() / (2 + self.active.len()).max(1);
         let found = match place {
@@ -141,6 +148,7 @@ impl Motions {
     }
 }
 
+/// Values of a function of the states along all recordings, one after the other, without decimation.
 fn states(
     all: &Runs<'_>,
     model: &Model,

@@ -1,5 +1,5 @@
-//! A further body on every body of the model: a tool, a workpiece, a forgotten cover. Beside free base parameters it is no
-//! effect, since these take it up; where they are held, as from an unloaded run, its columns are known.
+//! Candidates for a payload on every body of the model: a tool, a workpiece, a forgotten cover. They are tried only if base
+//! parameters are fixed, as from an unloaded run; estimated base parameters would absorb a payload.
 
 use modelmill_codegen::Evaluator;
 use modelmill_identify::diagnose::{
@@ -12,6 +12,8 @@ use crate::model::Model;
 use crate::regressors::{Runs, regressor};
 use crate::runs::payload::{Payloads, TEN};
 
+use super::thresholds::PAYLOAD_LEAST_EFFECT;
+
 /// Symbols of the parameters, their units, and the sign that is possible.
 const PARAMETERS: [(&str, &str, Sign); 7] = [
     ("mass", "kg", Sign::Positive),
@@ -22,39 +24,37 @@ const PARAMETERS: [(&str, &str, Sign); 7] = [
     ("syy", "kg m^2", Sign::Positive),
     ("szz", "kg m^2", Sign::Positive),
 ];
-/// Those of a mass at a place; the others say how it spreads.
+/// The first of them belong to a point mass; the others are second moments.
 const OF_A_MASS: usize = 4;
-/// A column whose largest value is below this part of the largest of all says nothing.
-const NOTHING: f64 = 1e-9;
 
-/// A mass at a place of every body, and the same with what it spreads about that place.
+/// For every body a point mass, and the same with second moments.
 pub(crate) fn payloads(model: &Model, all: &Runs<'_>) -> Outcome<Vec<Candidate>> {
     let payloads = Payloads::new(model)?;
     let columns = regressor(all, &Evaluator::new(&payloads.derivation), model)?;
     let reach = reach(&model.derivation.mechanism);
     let largest = columns.iter().map(size).fold(0.0, f64::max);
     let mut candidates = Vec::new();
-    // The farthest body first: of two that carry alike it is the one that tools are put on.
+    // The last body first: of two with the same effect it is the one that carries tools.
     for (frame, which) in payloads.frames.iter().zip(&payloads.columns).rev() {
         let of = |k: &Option<usize>| -> Column {
             let column = k.map(|k| &columns[k]);
-            let column = column.filter(|column| size(column) > NOTHING * largest);
+            let column = column.filter(|column| size(column) > PAYLOAD_LEAST_EFFECT * largest);
             column.map_or_else(|| Column(vec![None; model.drives().len()]), Clone::clone)
         };
         let ten: [Column; TEN] = which.each_ref().map(of);
-        let is_felt = |k: &usize| match *k {
+        let has_effect = |k: &usize| match *k {
             k @ 0..OF_A_MASS => !ten[k].is_zero(),
             k => {
                 let across = [[7, 9], [4, 9], [4, 7]][k - OF_A_MASS];
                 across.iter().any(|entry| !ten[*entry].is_zero())
             }
         };
-        // Without weight or leverage it is another inertia of the drive.
-        if !(0..OF_A_MASS).any(|k| is_felt(&k)) {
+        // Without weight and leverage it is the same as an inertia of the drive.
+        if !(0..OF_A_MASS).any(|k| has_effect(&k)) {
             continue;
         }
         for (most, refines) in [(OF_A_MASS, "point_mass"), (PARAMETERS.len(), "payload")] {
-            let free: Vec<usize> = (0..most).filter(is_felt).collect();
+            let free: Vec<usize> = (0..most).filter(has_effect).collect();
             let parameter = |k: &usize| {
                 let (symbol, unit, sign) = PARAMETERS[*k];
                 EffectParameter {
@@ -85,12 +85,13 @@ pub(crate) fn payloads(model: &Model, all: &Runs<'_>) -> Outcome<Vec<Candidate>>
     Ok(candidates)
 }
 
+/// Largest magnitude of a column.
 fn size(column: &Column) -> f64 {
     let values = column.0.iter().flatten().flatten();
     values.fold(0.0_f64, |most, x| most.max(x.abs()))
 }
 
-/// The largest distance between two frames in the nominal pose, m: nothing that a machine carries is farther away.
+/// Largest distance between two frames in the nominal pose, m; it bounds the distance of a payload from its frame.
 pub(crate) fn reach(mechanism: &Mechanism) -> f64 {
     let nominal: Vec<f64> = mechanism.coordinates.iter().map(|c| c.nominal).collect();
     let poses = Kinematics::new(mechanism).poses(&nominal);

@@ -1,4 +1,5 @@
-//! A diagnosis from a model and its recordings: the problem is posed in numbers, and solved.
+//! States the search for missing effects in numbers and solves it. Input are a model and recordings, output is an [`Answer`] with
+//! the problem, the diagnosis and the candidates.
 
 use modelmill_codegen::Evaluator;
 use modelmill_identify::diagnose::{
@@ -25,22 +26,20 @@ use super::laws::sites;
 use super::memory::memories;
 use super::numbers::{layout, stack, variables};
 use super::payloads::payloads;
+use super::thresholds::FEWEST_SAMPLES;
 use super::words;
 use crate::regressors::{Runs, regressor};
 
-/// Which parameters keep their nominal values.
+/// Which parameters are fixed at their nominal values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Held {
-    /// Those that are numbers of the file.
+    /// Those that are marked as known in the model file.
     Known,
     /// All.
     All,
 }
 
-/// Samples that each recording must have.
-const FEWEST: usize = 60;
-
-/// What was asked and what was found.
+/// The problem, its solution and the candidates.
 pub(crate) struct Answer {
     pub problem: Problem,
     pub diagnosis: Diagnosis,
@@ -48,7 +47,7 @@ pub(crate) struct Answer {
 }
 
 impl Answer {
-    /// What is left of all forces in the mean square, each drive relative to its own.
+    /// Sum of the squared residuals of all drives, each relative to the squared force of the drive (1).
     pub(crate) fn left(&self) -> f64 {
         let parts = self.diagnosis.budgets.iter().map(|budget| {
             let squares = budget.noise.powi(2) + budget.model.powi(2);
@@ -58,19 +57,19 @@ impl Answer {
     }
 }
 
-/// What is asked.
+/// Options of the search.
 #[derive(Clone, Copy)]
 pub(crate) struct Asked<'a> {
     /// Which parameters keep their nominal values.
     pub held: Held,
-    /// Whether all is looked for that may explain something: not while a model file's own values are only held against those that
-    /// were found, where every wrong value of a body would be a further body, and nobody is told of laws and doubles.
+    /// Whether to search for payloads, laws and alternatives too. Not in the second diagnosis with nominal values: there every wrong
+    /// value of a body would look like a payload.
     pub in_full: bool,
-    /// What the recordings do not share.
+    /// Differences between the recordings.
     pub between: &'a [Difference],
 }
 
-/// Finds what a model lacks.
+/// Finds the effects that a model lacks; `fit` are the fitted recordings, `check` the validation runs.
 pub(crate) fn find(
     model: &Model,
     fit: &[Stretch],
@@ -80,14 +79,14 @@ pub(crate) fn find(
     let held = asked.held;
     let candidates = model
         .host()
-        .watched("writing down what may be missing", 0, |_| candidates(model))??;
+        .watched("deriving all candidates", 0, |_| candidates(model))??;
     let all: Vec<(&Stretch, bool)> = (fit.iter().map(|one| (one, false)))
         .chain(check.iter().map(|one| (one, true)))
         .collect();
     let (mut problem, made) =
         model
             .host()
-            .watched("computing what each would add", 0, |_| {
+            .watched("computing the forces of all candidates", 0, |_| {
                 problem(&candidates, model, &all)
             })??;
     let mut origins = made.origins;
@@ -115,7 +114,7 @@ pub(crate) fn find(
         further.extend(payloads(model, &all)?);
     }
     problem.candidates.extend(further);
-    // None of these is an entry of a model file.
+    // None of these can be an entry of a model file.
     origins.resize(problem.candidates.len(), None);
     let supply = Made {
         candidates: &candidates,
@@ -126,7 +125,7 @@ pub(crate) fn find(
     };
     let mut diagnosis = model
         .host()
-        .watched("looking for what is missing", 0, |_| {
+        .watched("searching for missing effects", 0, |_| {
             diagnose(&mut problem, &supply)
         })?;
     for one in &mut diagnosis.disturbances {
@@ -147,7 +146,7 @@ pub(crate) fn find(
     })
 }
 
-/// Gives a disturbance the units of its place, and words.
+/// Completes a disturbance: the units of its place, and a sentence.
 fn tell(one: &mut Disturbance, model: &Model) {
     let drives = model.drives();
     let place = one.at.first();
@@ -162,7 +161,7 @@ fn tell(one: &mut Disturbance, model: &Model) {
     }
 }
 
-/// Columns that are made while the search goes on.
+/// Computes columns that the search requests while it runs.
 struct Made<'a> {
     candidates: &'a Candidates,
     origins: &'a [Origin],
@@ -213,7 +212,7 @@ impl Supply for Made<'_> {
     }
 }
 
-/// The middle of a grid: near enough to see whether anything is there, and no more columns to make than without a constant.
+/// The middle of a grid: close enough to detect an effect, at the cost of one value.
 fn middle(grid: &[f64]) -> Vec<f64> {
     grid.get(grid.len() / 2).copied().into_iter().collect()
 }
@@ -233,10 +232,10 @@ fn problem(
     }
     for (one, _) in all {
         let samples = one.time().len();
-        if samples < FEWEST {
+        if samples < FEWEST_SAMPLES {
             return Err(Error::input(format!(
-                "{}: {} to be looked at, too few to tell effects from chance; give a longer recording or decimate less, \
-                 so that at least {FEWEST} are left",
+                "{}: {} after decimation, too few to distinguish effects from chance. Give a longer recording or decimate less: \
+                 at least {FEWEST_SAMPLES} are needed",
                 one.run.file,
                 count(samples, "sample is left", "samples are left"),
             )));
@@ -273,8 +272,8 @@ fn is_held(model: &Model, held: Held, k: usize) -> bool {
     held == Held::All || model.is_known(k)
 }
 
-/// Takes what is not free off the measured forces. What a fit knows to its own deviations stays in the base, and is expected
-/// to be off by no more than these.
+/// Subtracts the forces of fixed parameters from the measured ones. Parameters of an earlier fit stay in the base, with their standard
+/// deviations as prior.
 fn hold(problem: &mut Problem, model: &Model, held: Held) {
     let is_held = |k: usize| is_held(model, held, k);
     let fitted: Vec<usize> = (0..model.base.len())
@@ -317,7 +316,7 @@ fn hold(problem: &mut Problem, model: &Model, held: Held) {
     }
 }
 
-/// Viscous and dry friction and an offset of every drive by itself.
+/// Columns of viscous friction, dry friction and an offset of every drive, in this order.
 fn friction(model: &Model, all: &Runs<'_>) -> Outcome<Vec<Column>> {
     let rates = stack(all, |one| drive_rates(model, one))?;
     let mut friction = Vec::new();
@@ -333,7 +332,7 @@ fn friction(model: &Model, all: &Runs<'_>) -> Outcome<Vec<Column>> {
     Ok(friction)
 }
 
-/// White noise of each force. Where few samples are kept motion passes for noise: it is no more than that of the recorded ones.
+/// White noise of each force, N or N m. After decimation motion may look like noise, so the noise of all recorded samples bounds it.
 fn noises(measured: &[Vec<f64>], all: &Runs<'_>) -> Outcome<Vec<f64>> {
     let mut noises = Vec::with_capacity(measured.len());
     for (d, kept) in measured.iter().enumerate() {
@@ -346,7 +345,7 @@ fn noises(measured: &[Vec<f64>], all: &Runs<'_>) -> Outcome<Vec<f64>> {
     Ok(noises)
 }
 
-/// White noise of a force, but not less than what rounding leaves of it.
+/// White noise of a force, at least the rounding of its numbers.
 fn noise(force: &[f64]) -> f64 {
     let squares = force.iter().map(|f| f * f).sum::<f64>();
     let size = (squares / force.len().max(1) as f64).sqrt();

@@ -1,4 +1,4 @@
-//! What a recording holds, as JSON and for people.
+//! Contents of a recording (tables, columns, sample rates), as JSON for scripts and as text for people.
 
 use std::fmt::Write as _;
 

@@ -1,4 +1,4 @@
-//! An edit of a model file: its difference, and the effect that was added.
+//! An edit of a model file: its difference as text, and the added effect as JSON.
 
 use modelmill_spec::edit::NewEffect;
 use serde_json::{Value, json};
@@ -6,7 +6,7 @@ use similar::TextDiff;
 
 use crate::text::Style;
 
-/// Lines around a change that the difference shows.
+/// Unchanged lines that the difference shows before and after a change.
 const CONTEXT: usize = 3;
 
 /// The change as a unified diff.

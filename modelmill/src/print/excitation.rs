@@ -1,4 +1,4 @@
-//! An excitation as JSON and for people.
+//! An exciting trajectory, as JSON for scripts and as text for people: condition number, limits, coefficients.
 
 use modelmill_identify::excite::Criterion;
 use serde_json::{Map, Value, json};
@@ -10,6 +10,7 @@ use crate::text::Style;
 use crate::text::table::{Align, count, number, significant, table};
 
 impl Excited {
+    /// Number of limits that the trajectory exceeds.
     fn violations(&self) -> usize {
         let margins = self.found.margins.iter();
         margins.filter(|margin| margin.excess > 0.0).count()
@@ -80,11 +81,11 @@ impl Excited {
         lines.join("\n")
     }
 
-    /// What the trajectory is worth for the base parameters.
+    /// How well the trajectory determines the base parameters.
     fn conditions(&self) -> Vec<String> {
         let found = &self.found;
         let mut lines = vec![format!(
-            "  condition number {}, against {} of the best of {} ({} times better)",
+            "  condition number {}; {} for the best of {} ({} times better)",
             number(found.condition_number),
             number(found.start),
             count(
@@ -96,7 +97,7 @@ impl Excited {
         )];
         if let Some(scaled) = self.scaled {
             lines.push(format!(
-                "  {} with columns of equal norm; the regressor was evaluated for {}",
+                "  {} after scaling the columns to equal norm; {} evaluated",
                 number(scaled),
                 count(found.evaluations, "trajectory", "trajectories")
             ));

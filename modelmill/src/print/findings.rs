@@ -1,4 +1,5 @@
-//! What a diagnosis found as JSON and for people.
+//! Findings of a diagnosis, as JSON for scripts and as text for people: verdict, errors after each step, effects, disturbances,
+//! rejected candidates and next steps.
 
 use modelmill_identify::diagnose::{Rung, Verdict};
 use serde_json::{Map, Value, json};
@@ -9,11 +10,14 @@ use crate::print::{OptionName, Remedy, StepSpelling, notes};
 use crate::text::Style;
 use crate::text::table::{Align, number, percent, significant, table};
 
-/// Candidates that the text names.
+/// Rejected candidates that the text names at most.
 const NAMED: usize = 6;
+/// Least share of the squared error that a rejected candidate must explain alone to be named. By judgement.
+const NAMED_LEAST_SHARE: f64 = 0.01;
 
 impl Findings {
-    /// All that was found as one JSON object; `spelling` says how its reader asks for what it advises.
+    /// All findings as one JSON object; `spelling` writes commands or calls for its reader. Forces are in N or N m, errors are
+    /// relative to the force.
     pub fn json(&self, spelling: &dyn StepSpelling) -> Value {
         let diagnosis = &self.diagnosis;
         let channels = self.channels();
@@ -117,7 +121,7 @@ impl Findings {
             .map(|line| style.bold(line))
             .collect();
         lines.push(String::new());
-        lines.push(style.bold("the ladder: relative error, step by step"));
+        lines.push(style.bold("Error after each added effect, relative to the force (nrms)"));
         let rows: Vec<Vec<String>> = (diagnosis.ladder.iter())
             .map(|rung| {
                 vec![
@@ -141,14 +145,17 @@ impl Findings {
         self.disturbances_text(style, &mut lines);
         lines.push(String::new());
         lines.push(style.bold(if diagnosis.verdict == Verdict::Unexplained {
-            "where what is left sits"
+            "Where the residual is largest"
         } else {
-            "where the error of the model as it is sits"
+            "Where the error of the model as it is is largest"
         }));
         let places = &self.regions;
         lines.extend(places.iter().map(|region| format!("  {}.", region.says)));
         if places.is_empty() {
-            lines.push("  No region of coordinates, rates, loads or time stands out.".to_owned());
+            lines.push(
+                "  Nowhere in particular: no range of a coordinate, rate, load or time stands out."
+                    .to_owned(),
+            );
         }
         lines.extend(laws::text(&self.laws, &self.before.model, style, spelling));
         self.refused_text(style, &mut lines);
@@ -160,34 +167,34 @@ impl Findings {
         next.extend(self.beside_the_file().map(str::to_owned));
         if !next.is_empty() {
             lines.push(String::new());
-            lines.push(style.bold("how to go on"));
+            lines.push(style.bold("Next steps"));
             lines.extend(next.iter().map(|line| format!("  {line}")));
         }
         if let Err(says) = &self.after
             && !says.is_empty()
         {
             lines.push(format!(
-                "  The model with what was found cannot be made: {}",
+                "  The model with the added effects cannot be built: {}",
                 says.spell(spelling)
             ));
         }
         lines
     }
 
-    /// What the recordings have besides, and where the error that is left comes from.
+    /// Disturbances of the recordings, and the parts of the residual of each drive.
     fn disturbances_text(&self, style: Style, lines: &mut Vec<String>) {
         let diagnosis = &self.diagnosis;
         if !diagnosis.disturbances.is_empty() {
             lines.push(String::new());
-            lines.push(style.bold("what the recordings have besides, and the model does not lack"));
+            lines.push(style.bold("Disturbances in the recordings (not model errors)"));
             for one in &diagnosis.disturbances {
                 let says = format!("{}.", one.says.as_deref().unwrap_or_default());
-                let told = words::lines(&says, 98);
-                lines.extend(told.iter().map(|line| format!("  {line}")));
+                let wrapped = words::lines(&says, 98);
+                lines.extend(wrapped.iter().map(|line| format!("  {line}")));
             }
         }
         lines.push(String::new());
-        lines.push(style.bold("what is left of each drive, as a part of its force"));
+        lines.push(style.bold("Remaining error of each drive, % of its force (rms)"));
         let part = |x: f64, force: f64| percent((force > 0.0).then(|| x / force));
         let rows: Vec<Vec<String>> = (self.channels().iter().zip(&diagnosis.budgets))
             .map(|(channel, budget)| {
@@ -205,21 +212,26 @@ impl Findings {
             &[
                 ("drive", Align::Left),
                 ("noise", Align::Right),
-                ("not repeating", Align::Right),
-                ("model", Align::Right),
+                ("not repeatable", Align::Right),
+                ("unexplained by the model", Align::Right),
             ],
             &rows,
         ));
     }
 
-    /// What was found, with values and doubles.
+    /// Missing effects with their estimates, and effects that explain the recordings equally well. What a kind means and how to
+    /// separate it are printed once, at its first place.
     fn missing_text(&self, style: Style, spelling: &dyn StepSpelling, lines: &mut Vec<String>) {
         if self.missing.is_empty() {
             return;
         }
         lines.push(String::new());
-        lines.push(style.bold("what is missing"));
+        lines.push(style.bold("Missing effects"));
+        let mut explained: Vec<&str> = Vec::new();
         for found in &self.missing {
+            let name = found.effect.kind.as_str();
+            let is_first = !explained.contains(&name);
+            explained.push(name);
             let values: Vec<String> = (found.estimates.iter())
                 .map(|e| {
                     let std = e
@@ -241,43 +253,40 @@ impl Findings {
                 || words::meaning(&found.effect.kind),
                 |kind| Some(kind.says.as_str()),
             );
-            if let Some(meaning) = meaning {
+            if let Some(meaning) = meaning.filter(|_| is_first) {
                 lines.push(style.dim(&format!("    {meaning}")));
             }
             if !found.indistinguishable_from.is_empty() {
                 lines.push(format!(
-                    "    These recordings cannot tell it from {}.",
+                    "    With these recordings it is not distinguishable from {}.",
                     words::effects(&found.indistinguishable_from)
                 ));
-                if let Some(says) = &found.separate_by {
+                if let Some(says) = found.separate_by.as_ref().filter(|_| is_first) {
                     let wrapped = words::lines(says, 96);
                     lines.extend(wrapped.iter().map(|line| style.dim(&format!("    {line}"))));
                 }
                 if let Some(asked) = &found.separation
                     && let Some(command) = spelling.spell_separation(&self.before.model, asked)
                 {
-                    lines.push("    Motion that tells them apart is sought by".to_owned());
+                    lines.push("    To plan a motion that distinguishes them:".to_owned());
                     lines.push(format!("      {command}"));
                 }
             }
         }
     }
 
-    /// The best of what was refused, with the reason.
+    /// The rejected candidates that explain most of the error alone, with the reason.
     fn refused_text(&self, style: Style, lines: &mut Vec<String>) {
+        let has_effects = !self.diagnosis.effects.is_empty();
         let candidates = self.diagnosis.candidates.iter();
         let rows: Vec<Vec<String>> = candidates
             .filter_map(|c| {
                 let why = c.refused.clone()?;
-                (c.explained > 0.01).then(|| {
+                (c.explained > NAMED_LEAST_SHARE).then(|| {
                     vec![
                         words::effect(&c.effect),
                         percent(Some(c.explained)),
-                        if why == "sign" {
-                            "beside what was found its sign makes no sense".to_owned()
-                        } else {
-                            why
-                        },
+                        words::refusal(&why, has_effects).to_owned(),
                     ]
                 })
             })
@@ -287,25 +296,25 @@ impl Findings {
             return;
         }
         lines.push(String::new());
-        lines.push(style.bold("what was considered and refused"));
+        lines.push(style.bold("Rejected candidates"));
         lines.extend(table(
             2,
             &[
                 ("candidate", Align::Left),
-                ("explains alone", Align::Right),
-                ("refused because", Align::Left),
+                ("alone it would explain", Align::Right),
+                ("rejected because", Align::Left),
             ],
             &rows,
         ));
     }
 
-    /// What the recordings leave open, with the experiment that would tell.
+    /// Effects that these recordings can neither show nor exclude, each with the experiment that would decide.
     fn untold_text(&self, style: Style, lines: &mut Vec<String>) {
         if self.untold.is_empty() {
             return;
         }
         lines.push(String::new());
-        lines.push(style.bold("what these recordings cannot tell"));
+        lines.push(style.bold("Effects that these recordings can neither show nor exclude"));
         for one in &self.untold {
             let says = words::lines(
                 &format!("{}: {}.", words::effect(&one.effect), one.says),
@@ -317,7 +326,7 @@ impl Findings {
         }
     }
 
-    /// Parameters that differ from what the file says.
+    /// Base parameters whose estimates differ from the nominal values of the file.
     fn off_text(&self, style: Style, spelling: &dyn StepSpelling, lines: &mut Vec<String>) {
         if self.off_nominal.is_empty() {
             return;
@@ -336,46 +345,46 @@ impl Findings {
             })
             .collect();
         lines.push(String::new());
-        lines.push(style.bold("base parameters off their nominal values"));
+        lines.push(style.bold("Base parameters that differ from their nominal values"));
         lines.extend(table(
             2,
             &[
                 ("", Align::Left),
                 ("nominal", Align::Right),
                 ("identified", Align::Right),
-                ("sigmas", Align::Right),
+                ("difference / std", Align::Right),
                 ("unit", Align::Left),
-                ("", Align::Left),
+                ("expression", Align::Left),
             ],
             &rows,
         ));
         lines.push(
-            "  They make up for what the nominal values lack, such as a payload, a misplaced mass or a wrong length."
+            "  Possible causes: a payload, a misplaced mass or a wrong length that the nominal values do not contain."
                 .to_owned(),
         );
         let Some(held) = &self.with_nominal else {
             return;
         };
         let says = words::verdict(&held.diagnosis, self.channels(), self.judged);
-        let says = format!("With all parameters held at their nominal values: {says}");
+        let says = format!("With all parameters fixed at their nominal values: {says}");
         lines.extend(
             words::lines(&says, 98)
                 .iter()
                 .map(|line| format!("  {line}")),
         );
         let held = Remedy::option(OptionName::Held).spell(spelling);
-        lines.push(format!("  ({held} tells more.)"));
+        lines.push(format!("  (Details: {held}.)"));
     }
 }
 
-/// Estimates as scripts read them.
+/// Estimates as JSON.
 pub(super) fn estimates(all: &[Estimate]) -> Vec<Value> {
     let one =
         |e: &Estimate| json!({"name": e.name, "value": e.value, "std": e.std, "unit": e.unit});
     all.iter().map(one).collect()
 }
 
-/// The ladder as scripts read it.
+/// The steps of the search as JSON.
 fn steps(ladder: &[Rung]) -> Vec<Value> {
     let step = |rung: &Rung| {
         json!({

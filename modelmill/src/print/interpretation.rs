@@ -1,4 +1,4 @@
-//! Physical parameters as JSON and for people.
+//! Physical parameters solved from base parameters, as JSON for scripts and as text for people.
 
 use modelmill_boundary::message;
 use modelmill_identify::interpret::{Interpretation, Physical};
@@ -10,7 +10,7 @@ use crate::text::Style;
 use crate::text::table::{Align, count, number, significant, table};
 
 impl Interpreted {
-    /// All that was found as one JSON object.
+    /// All solutions as one JSON object; values in SI units.
     pub fn json(&self) -> Value {
         let parameters = &self.model.derivation.mechanism.parameters;
         let names = self.names();
@@ -75,7 +75,7 @@ impl Interpreted {
                 self.model.name
             ),
             Interpretation::Exact { .. } => format!(
-                "{}: {} for {unknowns} from {equations}, and no others",
+                "{}: {} for {unknowns} from {equations}; there are no others",
                 self.model.name,
                 count(solutions.len(), "real solution", "real solutions"),
             ),
@@ -86,10 +86,10 @@ impl Interpreted {
                 self.model.name
             ),
             Interpretation::LeastSquares { starts, .. } => format!(
-                "{}: {} of weighted least squares for {unknowns} from {equations}, looked for from {}",
+                "{}: {} of weighted least squares for {unknowns} from {equations}, searched from {}",
                 self.model.name,
                 count(solutions.len(), "minimum", "minima"),
-                count(*starts, "start", "starts"),
+                count(*starts, "starting point", "starting points"),
             ),
         };
         let mut lines = vec![style.bold(&head)];
@@ -98,14 +98,14 @@ impl Interpreted {
         }
         if !self.directions().is_empty() {
             let how = message!(
-                "  Hold one parameter of each line at its nominal value, that is, leave it out of {}.",
+                "  Fix one parameter of each line at its nominal value: leave it out of {}.",
                 Remedy::option(OptionName::Unknown)
             );
             lines.push(how.spell(spelling));
         }
         if let (Interpretation::Exact { .. }, []) = (&self.found, solutions) {
             lines.push(
-                "  No real values of these parameters give the base parameters; hold others at their nominal values."
+                "  No real values of these parameters give the base parameters. Fix other parameters at their nominal values."
                     .to_owned(),
             );
         }
@@ -122,6 +122,7 @@ impl Interpreted {
         lines.join("\n")
     }
 
+    /// A solution as a table: nominal and solved values, standard deviations, and objections to values that are not plausible.
     fn table(&self, one: &Physical) -> Vec<String> {
         let parameters = &self.model.derivation.mechanism.parameters;
         let rows: Vec<Vec<String>> = (0..self.unknown.len())
@@ -152,6 +153,7 @@ impl Interpreted {
         table(2, &columns, &rows)
     }
 
+    /// Residuals of the base parameters for a solution by least squares, each in the unit of its base parameter.
     fn residuals(&self, one: &Physical) -> Vec<String> {
         let rows: Vec<Vec<String>> = self
             .used

@@ -1,4 +1,4 @@
-//! What differs between runs as JSON and for people.
+//! Differences between runs of one machine, as JSON for scripts and as text for people.
 
 use modelmill_identify::ParameterInfo;
 use serde_json::{Value, json};
@@ -9,7 +9,7 @@ use crate::text::Style;
 use crate::text::table::{Align, count, table, with_deviation};
 
 impl Compared {
-    /// All that was found as one JSON object.
+    /// All differences as one JSON object; values in SI units.
     pub fn json(&self, spelling: &dyn RemedySpelling) -> Value {
         let later = || self.runs.iter().enumerate().skip(1);
         let moved =
@@ -18,7 +18,8 @@ impl Compared {
         let changes =
             all.flat_map(|(k, run)| run.changes.iter().map(move |one| change_json([0, k], one)));
         let unread = self.unread.iter();
-        let unread = unread.map(|one| json!({ "file": one.file, "says": one.error.spell(spelling) }));
+        let unread =
+            unread.map(|one| json!({ "file": one.file, "says": one.error.spell(spelling) }));
         let runs = self.runs.iter().map(|run| {
             json!({
                 "file": run.file,
@@ -38,6 +39,7 @@ impl Compared {
         })
     }
 
+    /// A lasting change as JSON: the run from which on it is there, means before and since, and physical causes.
     fn point_json(&self, point: &ChangePoint) -> Value {
         let steps = point.steps.iter().map(|step| {
             json!({
@@ -57,7 +59,7 @@ impl Compared {
         })
     }
 
-    /// The fit in which some values are each run's own.
+    /// The joint fit, in which some values are shared and each run has others for itself.
     fn shared_json(&self, fit: &SharedFit) -> Value {
         let shared = self.parameters.iter().zip(&fit.shared);
         let shared = shared.filter_map(|(info, value)| {
@@ -87,6 +89,7 @@ impl Compared {
         })
     }
 
+    /// Base parameters with one fitted value each as JSON.
     fn parameters_json(&self, fitted: &[Fitted]) -> Vec<Value> {
         let pairs = self.parameters.iter().zip(fitted);
         let one = |(info, fitted): (&ParameterInfo, &Fitted)| {
@@ -122,7 +125,7 @@ impl Compared {
             return String::new();
         };
         let mut lines = vec![style.bold(&format!(
-            "{}: {} against {}",
+            "{}: {} compared with {}",
             self.model,
             count(later.len(), "run", "runs"),
             first.file
@@ -149,26 +152,26 @@ impl Compared {
         for one in &self.unread {
             lines.push(String::new());
             let why = one.error.spell(spelling);
-            lines.push(format!("{} gave no answer: {why}", one.file));
+            lines.push(format!("{} was not evaluated: {why}", one.file));
         }
         lines.push(String::new());
         lines.join("\n")
     }
 
-    /// A run against the first.
+    /// A run compared with the first one.
     fn say_run(&self, first: &OneRun, run: &OneRun, lines: &mut Vec<String>, style: Style) {
         lines.push(String::new());
         lines.push(style.bold(&run.file));
         say_changes(&run.changes, lines);
         let is_event = |one: &Changed| matches!(one.what, What::ContactEvent { .. });
         if run.changes.iter().all(is_event) {
-            let else_ = if run.changes.is_empty() { "" } else { " else" };
+            let other = if run.changes.is_empty() { "" } else { "other " };
             lines.push(format!(
-                "  nothing{else_} changed beyond what chance, the noise of the runs and the errors of the model make"
+                "  No {other}change found that is larger than noise and model error."
             ));
         }
         if !run.moved.is_empty() {
-            lines.push("  Base parameters that moved, each run fitted alone:".to_owned());
+            lines.push("  Base parameters that changed (each run fitted separately):".to_owned());
             let rows: Vec<Vec<String>> = run
                 .moved
                 .iter()
@@ -178,7 +181,7 @@ impl Compared {
                 ("name", Align::Left),
                 ("before", Align::Right),
                 ("now", Align::Right),
-                ("+-", Align::Right),
+                ("std", Align::Right),
                 ("unit", Align::Left),
                 ("expression", Align::Left),
             ];
@@ -186,15 +189,15 @@ impl Compared {
         }
     }
 
-    /// When something changed and stayed changed.
+    /// Changes that last over two or more runs; nothing for fewer than four runs.
     fn say_points(&self, lines: &mut Vec<String>, style: Style) {
         if self.runs.len() < 4 {
             return;
         }
         lines.push(String::new());
-        lines.push(style.bold("Over the order of the runs"));
+        lines.push(style.bold("Lasting changes, in the order of the runs"));
         if self.points.is_empty() {
-            lines.push("  no base parameter changed and stayed changed".to_owned());
+            lines.push("  No base parameter changed for two or more runs.".to_owned());
         }
         for point in &self.points {
             let names: Vec<&str> = (point.steps.iter().take(6))
@@ -218,6 +221,7 @@ impl Compared {
         }
     }
 
+    /// A row of the table of changed base parameters. The standard deviation is that of the difference of both runs.
     fn moved(&self, first: &OneRun, run: &OneRun, k: usize) -> Vec<String> {
         let (before, now) = (first.alone[k], run.alone[k]);
         let info = &self.parameters[k];
@@ -233,27 +237,28 @@ impl Compared {
     }
 }
 
-/// Up to so many later runs are told one after the other with their base parameters.
+/// Up to this number of later runs each run is listed with its base parameters; beyond, only changes are listed.
 const SINGLY: usize = 12;
 
+/// Adds one line for each change, with the changes that explain the runs equally well.
 fn say_changes(changes: &[Changed], lines: &mut Vec<String>) {
     for change in changes {
         lines.push(format!("  {}", change.says));
         if !change.rivals.is_empty() {
             lines.push(format!(
-                "    these runs cannot tell it from: {}",
+                "    with these runs it is not distinguishable from: {}",
                 change.rivals.join("; ")
             ));
         }
     }
 }
 
-/// Many runs, each with its changes alone; those without any are counted.
+/// Many runs: only those with changes are listed, the others are counted.
 fn say_many(later: &[OneRun], lines: &mut Vec<String>, style: Style) {
     let unchanged = later.iter().filter(|run| run.changes.is_empty()).count();
     lines.push(String::new());
     lines.push(format!(
-        "Against the first run {unchanged} of {} later ones changed in nothing",
+        "{unchanged} of {} later runs show no change relative to the first run",
         later.len()
     ));
     for run in later.iter().filter(|run| !run.changes.is_empty()) {
@@ -262,6 +267,7 @@ fn say_many(later: &[OneRun], lines: &mut Vec<String>, style: Style) {
     }
 }
 
+/// A change as JSON; `between` are the indices of both runs.
 fn change_json(between: [usize; 2], change: &Changed) -> Value {
     let (kind, at, estimates) = change.what.parts(change.unit);
     let estimates = estimates.iter().map(|(name, estimate, unit)| {
@@ -283,27 +289,29 @@ fn change_json(between: [usize; 2], change: &Changed) -> Value {
     })
 }
 
-/// Values of the fit in which some are each run's own.
+/// The joint fit: factors of force signals, and values that each run has for itself.
 fn say_shared(fit: &SharedFit, lines: &mut Vec<String>, style: Style) {
     lines.push(String::new());
     let n = fit.shared.iter().flatten().count();
     lines.push(style.bold(&format!(
-        "One fit of all runs, with {} shared",
+        "Joint fit of all runs, with {} shared",
         count(n, "base parameter", "base parameters")
     )));
     let text = |value: Fitted| match value.deviation {
         Some(deviation) => with_deviation(value.value, deviation),
-        None => ["not told".to_owned(), String::new()],
+        None => ["not identifiable".to_owned(), String::new()],
     };
     if !fit.gains.is_empty() {
-        lines.push("  True forces are the measured ones times".to_owned());
+        lines.push(
+            "  Factors of the force signals (true force = factor times measured force):".to_owned(),
+        );
         let rows: Vec<Vec<String>> = (fit.gains.iter())
             .map(|(drive, gain)| [vec![drive.clone()], text(*gain).to_vec()].concat())
             .collect();
         let columns = [
             ("drive", Align::Left),
             ("factor", Align::Right),
-            ("+-", Align::Right),
+            ("std", Align::Right),
         ];
         lines.extend(table(4, &columns, &rows));
     }
@@ -312,7 +320,7 @@ fn say_shared(fit: &SharedFit, lines: &mut Vec<String>, style: Style) {
         let row = |one: &Valued| {
             let [value, deviation] = text(one.value);
             let against = if one.is_against_first {
-                "against the first run"
+                "relative to the first run"
             } else {
                 ""
             };
@@ -327,23 +335,23 @@ fn say_shared(fit: &SharedFit, lines: &mut Vec<String>, style: Style) {
             .map(str::to_owned)
             .to_vec()
         };
-        let told = values.iter().filter(|one| one.value.deviation.is_some());
-        let rows: Vec<Vec<String>> = told.map(row).collect();
+        let known = values.iter().filter(|one| one.value.deviation.is_some());
+        let rows: Vec<Vec<String>> = known.map(row).collect();
         let columns = [
             ("of", Align::Left),
             ("", Align::Left),
             ("value", Align::Right),
-            ("+-", Align::Right),
+            ("std", Align::Right),
             ("unit", Align::Left),
             ("", Align::Left),
         ];
         lines.extend(table(4, &columns, &rows));
-        let not_told = values.iter().filter(|one| one.value.deviation.is_none());
-        let not_told: Vec<String> = not_told
+        let unknown = values.iter().filter(|one| one.value.deviation.is_none());
+        let unknown: Vec<String> = unknown
             .map(|one| format!("{} of {}", one.name, one.of))
             .collect();
-        if !not_told.is_empty() {
-            lines.push(format!("    not told: {}", not_told.join(", ")));
+        if !unknown.is_empty() {
+            lines.push(format!("    not identifiable: {}", unknown.join(", ")));
         }
     }
 }

@@ -1,4 +1,4 @@
-//! What a model file holds, as JSON and for people; and what is wrong with one that has no meaning, as JSON.
+//! Output of `check`: contents of a model file as JSON and as text for people, and the errors of an invalid file as JSON.
 
 use modelmill_boundary::text::plain;
 use modelmill_codegen::review::NumericMethod;
@@ -14,7 +14,7 @@ use crate::text::Style;
 use crate::text::table::count;
 
 impl Checked {
-    /// What the model holds as one JSON object, with all warnings.
+    /// Contents of the model as one JSON object, with all warnings.
     pub fn json(&self, spelling: &dyn RemedySpelling) -> Value {
         let model = &self.model;
         let loaded = &model.loaded;
@@ -49,7 +49,7 @@ impl Checked {
     }
 }
 
-/// Why a model that has a meaning cannot be used, as one JSON object.
+/// Why a valid model cannot be used, as one JSON object.
 pub fn refusal(says: &str, path: &str) -> Value {
     json!({
         "valid": false,
@@ -57,7 +57,7 @@ pub fn refusal(says: &str, path: &str) -> Value {
     })
 }
 
-/// What is wrong with a file that has no meaning, as one JSON object.
+/// Errors of an invalid model file, as one JSON object.
 pub fn faults(failure: &Failure, spelling: &dyn RemedySpelling) -> Value {
     json!({
         "valid": false,
@@ -65,11 +65,12 @@ pub fn faults(failure: &Failure, spelling: &dyn RemedySpelling) -> Value {
     })
 }
 
-/// What may not be intended in a file that has a meaning, each as a JSON object.
+/// Warnings of a valid model file, each as a JSON object.
 pub fn warnings(loaded: &Loaded, spelling: &dyn RemedySpelling) -> Vec<Value> {
     diagnostics(&loaded.warnings, &loaded.sources, spelling)
 }
 
+/// Diagnostics of a model file as JSON, with file, line and column where they are known.
 fn diagnostics(
     found: &[Diagnostic],
     sources: &Sources,
@@ -130,7 +131,7 @@ impl Summary {
         style: Style,
     ) -> String {
         let m = &derivation.mechanism;
-        let mut lines = vec![style.bold(&format!("{}: sound", plain(name)))];
+        let mut lines = vec![style.bold(&format!("{}: valid", plain(name)))];
         if let Some(title) = &m.title {
             lines.push(format!("  {}", plain(title)));
         }
@@ -143,7 +144,7 @@ impl Summary {
         let whose = if module == m.name {
             "the file's `name`"
         } else {
-            "for the file's `name`, which is a word of Rust or of emitted code"
+            "instead of the file's `name`, which is a reserved word of Rust or of emitted code"
         };
         line("module", format!("{module} ({whose})"));
         line("bodies", self.bodies.to_string());
@@ -185,7 +186,7 @@ impl Summary {
         line(
             "p_g and p_min",
             format!(
-                "{} with an effect on the actuators, {}",
+                "{} of parameters with an effect on the drives, {} (combinations that can be identified)",
                 count(reduction.products.len(), "product", "products"),
                 count(
                     reduction.retained.len(),
@@ -197,11 +198,14 @@ impl Summary {
         match reduction.method {
             Method::Numeric { .. } => line(
                 "reduced",
-                "numerically, on the values of this file".to_owned(),
+                "numerically, for the values of this file only".to_owned(),
             ),
             Method::Exact {
                 at_values: true, ..
-            } => line("reduced", "for the values of this file alone".to_owned()),
+            } => line(
+                "reduced",
+                "exactly, for the values of this file only".to_owned(),
+            ),
             Method::Exact { .. } | Method::Unreduced => {}
         }
         if let Some(rank) = rank {
@@ -222,6 +226,7 @@ fn reduction(reduction: &Reduction) -> Value {
     }
 }
 
+/// Name of a joint, with its motion if it is not revolute, and `passive`.
 fn joint(motion: Motion, name: &str, passive: bool) -> String {
     let unusual = (motion != Motion::Revolute).then(|| motion.name());
     let remarks: Vec<&str> = unusual
@@ -234,6 +239,7 @@ fn joint(motion: Motion, name: &str, passive: bool) -> String {
     format!("{name} ({})", remarks.join(", "))
 }
 
+/// Drives with the joint or the points between which they act, either the actuated or the undriven ones.
 fn drives(m: &Mechanism, is_driven: bool) -> Vec<String> {
     let shared = m.shared_drives.iter();
     m.drives

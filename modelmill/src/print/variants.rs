@@ -1,4 +1,4 @@
-//! What a variant costs along motions, as JSON and for people.
+//! Forces, power and limits of two variants along the same motions, as JSON for scripts and as text for people.
 
 use serde_json::{Value, json};
 
@@ -7,13 +7,13 @@ use crate::text::Style;
 use crate::text::table::{Align, count, number, percent, significant, table};
 use crate::variants::{Crossing, DriveVariants, Effort, LimitUse, TermShare, Variants};
 
-/// Summands of a drive's difference that are shown, at most; the rest is told in one line.
+/// Terms of a drive's difference that are shown at most; the others are added up in one line.
 const MOST_TERMS: usize = 6;
-/// Relative changes up to this are none.
+/// Relative changes up to this are rounding and print as none.
 const UNCHANGED: f64 = 5e-6;
 /// Products of p_g that are named, at most.
 const MOST_PRODUCTS: usize = 4;
-/// Summands below this share of the largest one are not shown by themselves.
+/// Terms below this share of the largest one are not shown separately.
 const LEAST_SHARE: f64 = 0.01;
 
 impl Variants {
@@ -48,19 +48,19 @@ impl Variants {
             significant(self.seconds, 3)
         ))];
         lines.push(String::new());
-        lines.push(style.bold("what the drives give"));
+        lines.push(style.bold("Forces and power of the drives"));
         lines.extend(efforts(&self.drives));
         lines.push(String::new());
-        lines.push(style.bold("what makes the difference"));
+        lines.push(style.bold("Causes of the difference"));
         for drive in &self.drives {
             lines.extend(shares(drive));
         }
         lines.push(String::new());
-        lines.push(style.bold("limits"));
+        lines.push(style.bold("Limits"));
         lines.extend(self.limits_text(style));
         if self.errors.iter().any(Option::is_some) {
             lines.push(String::new());
-            lines.push(style.bold("error against measured forces"));
+            lines.push(style.bold("Error relative to the measured forces"));
             let named = ["before", "after"].into_iter().zip(&self.errors);
             let named = named.filter_map(|(name, figures)| Some((name, figures.as_ref()?)));
             lines.extend(tables::figures(&named.collect::<Vec<_>>()));
@@ -68,6 +68,7 @@ impl Variants {
         lines.join("\n")
     }
 
+    /// Limits that are exceeded by either variant, one line each, and a count of the others.
     fn limits_text(&self, style: Style) -> Vec<String> {
         if self.limits.is_empty() {
             return vec!["  the files have no `[limits]`".to_owned()];
@@ -97,7 +98,7 @@ impl Variants {
         });
         if let Some(most) = most {
             lines.push(format!(
-                "  kept: {}; most is used of {}",
+                "  within: {}; the most used is {}",
                 count(kept.count(), "limit", "limits"),
                 limit(most)
             ));
@@ -216,13 +217,14 @@ fn efforts(drives: &[DriveVariants]) -> Vec<String> {
             ("", Align::Left),
             ("peak, W", Align::Right),
             ("rms, W", Align::Right),
-            ("work given, J", Align::Right),
-            ("net, J", Align::Right),
+            ("positive work, J", Align::Right),
+            ("net work, J", Align::Right),
         ],
         &rows,
     )
 }
 
+/// Peak and rms force (N or N m), peak and rms power (W), positive and net work (J).
 fn numbers(effort: &Effort) -> [f64; 6] {
     let Effort {
         peak,
@@ -248,14 +250,14 @@ fn change(before: f64, after: f64) -> String {
     format!("{sign}{}", percent(Some((by / before).abs())))
 }
 
-/// What makes the difference of a drive.
+/// Terms that cause the difference of a drive, the largest first.
 fn shares(one: &DriveVariants) -> Vec<String> {
     let size = one.difference;
     if one.products.is_empty() {
         return vec![format!("  {}: no difference", one.drive)];
     }
     let mut lines = vec![format!(
-        "  {}: {} {unit} where they differ most, {} {unit} in the mean square",
+        "  {}: difference {} {unit} at most, {} {unit} rms",
         one.drive,
         significant(size.peak, 4),
         significant(size.rms, 4),
@@ -309,14 +311,15 @@ fn shares(one: &DriveVariants) -> Vec<String> {
     let rest: f64 = terms[n..].iter().map(|term| term.share).sum();
     if n < terms.len() {
         lines.push(format!(
-            "    {} by {}",
+            "    {} from {}",
             signed_percent(rest),
-            count(terms.len() - n, "other summand", "other summands")
+            count(terms.len() - n, "other term", "other terms")
         ));
     }
     lines
 }
 
+/// A share in per cent with its sign.
 fn signed_percent(share: f64) -> String {
     let size = percent(Some(share.abs()));
     if share < 0.0 {
@@ -326,23 +329,23 @@ fn signed_percent(share: f64) -> String {
     }
 }
 
-/// What of a share is the column's and not the value's; nothing where there is no such part.
+/// Which part of a share comes from the changed geometry (the column) instead of the changed value; empty without such a part.
 fn by_column(term: &TermShare) -> String {
     let by_column = term.share - term.by_value;
     if by_column.abs() <= LEAST_SHARE * term.share.abs() {
         String::new()
     } else if term.by_value == 0.0 {
-        "by its column alone".to_owned()
+        "from the changed geometry alone".to_owned()
     } else {
         format!(
-            "{} by its value, {} by its column",
+            "{} from the new value, {} from the changed geometry",
             signed_percent(term.by_value),
             signed_percent(by_column)
         )
     }
 }
 
-/// A summand's value, and what it was.
+/// Value of a term, and the one before.
 fn value(term: &TermShare) -> String {
     let unit = match term.unit.as_str() {
         "1" | "" => String::new(),
@@ -353,7 +356,7 @@ fn value(term: &TermShare) -> String {
             format!("{}{unit}", number(after))
         }
         (Some(before), Some(after)) => format!("{} -> {}{unit}", number(before), number(after)),
-        (Some(before), None) => format!("{}{unit}, then gone", number(before)),
+        (Some(before), None) => format!("{}{unit}, then removed", number(before)),
         (None, after) => format!("new, {}{unit}", number(after.unwrap_or(0.0))),
     }
 }

@@ -12,7 +12,7 @@ use crate::model::Model;
 use crate::text::svg::escape;
 use crate::text::table::significant;
 
-/// A mechanism of the page: what the atlas says of it, its model, and its picture as SVG.
+/// A mechanism of the page: its counts in the atlas, its model, and its picture as SVG.
 pub struct Pictured {
     /// Counts.
     pub entry: Entry,
@@ -36,7 +36,7 @@ pub fn atlas(mechanisms: &[Pictured]) -> String {
     page
 }
 
-/// Text with what stands between stars or backticks in type of its own.
+/// HTML of a text in which `*x*` is emphasised and `` `x` `` is code.
 fn emphasized(text: &str) -> String {
     let mut html = String::new();
     for (mark, tag) in [('*', "em"), ('`', "code")] {
@@ -55,6 +55,7 @@ fn emphasized(text: &str) -> String {
     html
 }
 
+/// The table of all mechanisms: numbers of joints, loops, drives and base parameters, operations, and seconds of the derivation.
 fn counts(mechanisms: &[Pictured]) -> String {
     let whole = |n: usize| Cell::number(&n.to_string(), n as f64);
     let rows: Vec<Vec<Cell>> = mechanisms
@@ -101,6 +102,7 @@ fn counts(mechanisms: &[Pictured]) -> String {
     table("sortable", &head, &rows)
 }
 
+/// The section of one mechanism: title, picture and base parameters.
 fn mechanism(one: &Pictured) -> String {
     let Pictured { entry, picture, .. } = one;
     let expressions = if entry.is_imported {
@@ -117,6 +119,7 @@ fn mechanism(one: &Pictured) -> String {
     )
 }
 
+/// Base parameters with expressions, nominal values and units, folded.
 fn expressions(model: &Model) -> String {
     let rows: Vec<Vec<Cell>> = (model.base.iter().zip(&model.nominal).enumerate())
         .map(|(k, (base, value))| {

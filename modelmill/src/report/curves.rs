@@ -1,5 +1,4 @@
-//! Measured and calculated forces over time: pictures that stand by themselves, and the same numbers packed for the script
-//! that zooms into them.
+//! Measured and calculated forces over time: pictures that need no script, and the same numbers packed for the script that zooms.
 //!
 //! Long recordings keep the least and the largest value of each of many stretches, so that no peak is lost and the page
 //! stays small; values are packed as 16-bit steps between the least and the largest of a curve.
@@ -24,6 +23,7 @@ pub(crate) const MOST_RUNS: usize = 6;
 /// Height of a panel.
 const HEIGHT: f64 = 190.0;
 
+/// A curve of one panel.
 struct Curve {
     name: String,
     class: &'static str,
@@ -31,8 +31,8 @@ struct Curve {
     values: Vec<f64>,
 }
 
-/// Measured and calculated forces over time and their errors, of all recordings, those of the check first and open; `names` are
-/// those of both models' curves. The same numbers stand beside them for the script of pages.
+/// Measured and calculated forces over time and their errors for each recording, validation runs first. `names` are the names of
+/// the curves before and after. The same numbers follow as JSON for the script of pages.
 pub fn section(before: &Version, after: Option<&Version>, names: [&str; 2]) -> String {
     let mut order: Vec<usize> = (0..before.runs.len()).collect();
     order.sort_by_key(|k| !before.runs[*k].is_check);
@@ -46,9 +46,9 @@ pub fn section(before: &Version, after: Option<&Version>, names: [&str; 2]) -> S
         let title = format!(
             "{} {}",
             if run.is_check {
-                "Check run"
+                "Validation run"
             } else {
-                "Run of the fit"
+                "Fitted run"
             },
             run.name
         );
@@ -64,13 +64,14 @@ pub fn section(before: &Version, after: Option<&Version>, names: [&str; 2]) -> S
     if shown < order.len() {
         let _ = writeln!(
             html,
-            "<p>{} more recordings are in the figures and not drawn here.</p>",
+            "<p>{} more recordings are part of the error figures, but are not drawn here.</p>",
             order.len() - shown
         );
     }
     html
 }
 
+/// All panels of one recording, and their numbers as JSON for the script. `most` bounds the values of a curve.
 fn of_run(
     before: &Version,
     after: Option<&Version>,
@@ -132,7 +133,7 @@ fn panels(
     }
     [
         (drive.to_owned(), forces),
-        (format!("{drive}: measured less model"), errors),
+        (format!("{drive}: measured minus model"), errors),
     ]
 }
 

@@ -90,6 +90,7 @@ impl Axis {
         ticks
     }
 
+    /// Powers of ten along the axis, with steps between them if there are few.
     fn decade_ticks(&self, most: usize) -> Vec<(f64, String)> {
         let decades = (self.to / self.from).log10();
         let mut ticks = Vec::new();

@@ -9,7 +9,9 @@ use crate::diagnose::Version;
 use crate::text::svg::escape;
 use crate::text::table::significant;
 
+/// Cells of a map across; few enough that each holds several samples.
 const COLUMNS: usize = 22;
+/// Cells of a map upwards.
 const ROWS: usize = 14;
 /// Shades of the map; the page has a class for each.
 const SHADES: usize = 9;
@@ -154,6 +156,7 @@ pub(crate) fn figures(before: &Version, after: Option<&Version>, variables: &[Va
     html
 }
 
+/// Maps side by side with one scale of shades; `names` are the variables across and upwards, `unit` is that of the error.
 fn picture(
     maps: &[(&str, Vec<Option<f64>>)],
     grid: &Grid,
@@ -210,7 +213,7 @@ fn picture(
         [right, foot + 9.0],
         "start",
         &format!(
-            "0 to {} {unit} (root mean square in a cell); upwards: {}",
+            "0 to {} {unit} (rms in a cell); vertical axis: {}",
             significant(largest, 2),
             names[1]
         ),

@@ -1,4 +1,5 @@
-//! Where the error lives: a sentence and a picture for each region, the mean and the spread of the error over its variable.
+//! Regions where the error is largest: a sentence and a picture for each, with mean and standard deviation of the error over the
+//! variable of the region.
 
 use std::cmp::Ordering;
 use std::fmt::Write as _;
@@ -13,6 +14,7 @@ use crate::model::Model;
 use crate::text::svg::escape;
 use crate::text::table::significant;
 
+/// Segments of the variable in a picture.
 const BINS: usize = 44;
 const WIDTH: f64 = 420.0;
 const HEIGHT: f64 = 190.0;
@@ -43,7 +45,7 @@ pub(crate) fn sentence(region: &Region, model: &Model) -> String {
     let unit = variable_unit(model, &region.variable);
     let [low, high] = region.range;
     let name = if region.variable == TIME_COLUMN {
-        "the time"
+        "time"
     } else {
         &region.variable
     };
@@ -71,6 +73,7 @@ pub(crate) fn sentence(region: &Region, model: &Model) -> String {
     )
 }
 
+/// Picture of a region: mean and standard deviation of the error over the variable, before and after. `None` without samples.
 fn picture(
     region: &Region,
     before: &Version,
@@ -152,14 +155,14 @@ fn picture(
     Some(picture.finish(&region.says))
 }
 
-/// A stretch of a variable: its middle, mean and standard deviation of the error there.
+/// A segment of a variable: its middle, mean and standard deviation of the error there.
 struct Bin {
     at: f64,
     mean: f64,
     spread: f64,
 }
 
-/// Mean and standard deviation of an error in stretches of equal length that hold at least three samples.
+/// Mean and standard deviation of an error in segments of equal length; segments with fewer than three samples are left out.
 fn binned(over: &[f64], error: &[f64]) -> Vec<Bin> {
     let [low, high] = range(over);
     if high.partial_cmp(&low) != Some(Ordering::Greater) {

@@ -1,4 +1,4 @@
-//! What differs between runs as one self-contained page: what changed and when, and every base parameter over the runs.
+//! Differences between runs as one self-contained HTML page: changes, when they happened, and every base parameter over the runs.
 
 use std::fmt::Write as _;
 
@@ -19,21 +19,21 @@ const HEIGHT: f64 = 170.0;
 /// How many standard deviations a bar reaches up and down.
 const BARS: f64 = 2.0;
 
-/// The page's text, with advice in the words of whoever reads it.
+/// The HTML of the page; `spelling` writes commands or calls for its reader.
 pub fn runs_page(compared: &Compared, spelling: &dyn RemedySpelling) -> String {
-    let title = format!("{}: what changed between runs", compared.model);
+    let title = format!("{}: changes between runs", compared.model);
     let mut page = pages::begin(&title);
     page.push_str(&summary(compared));
     let mut sections = vec![
+        ("when", "Lasting changes", points(compared)),
         (
-            "when",
-            "When something changed and stayed changed",
-            points(compared),
+            "against",
+            "Each run compared with the first",
+            against(compared),
         ),
-        ("against", "Every run against the first", against(compared)),
     ];
     if let Some(shared) = &compared.shared {
-        sections.push(("own", "One fit of all runs", own(shared)));
+        sections.push(("own", "Joint fit of all runs", own(shared)));
     }
     sections.push((
         "parameters",
@@ -51,6 +51,7 @@ pub fn runs_page(compared: &Compared, spelling: &dyn RemedySpelling) -> String {
     page
 }
 
+/// The verdict: lasting changes, and how many runs differ from the first.
 fn summary(compared: &Compared) -> String {
     let later = compared.runs.len() - 1;
     let changed = compared.runs.iter().skip(1);
@@ -66,19 +67,23 @@ fn summary(compared: &Compared) -> String {
     };
     let _ = write!(
         says,
-        "{changed} of {later} later runs differ from {} by more than chance, noise and the errors of the model.",
+        "{changed} of {later} later runs differ from {} by more than noise and model error.",
         compared.runs[0].file
     );
     format!("<p class=\"verdict {class}\">{}</p>\n", escape(&says))
 }
 
+/// Changes as a list, each with those that explain the runs equally well.
 fn said(changes: &[Changed]) -> String {
     let mut html = String::from("<ul>\n");
     for one in changes {
         let _ = write!(html, "<li>{}", escape(&one.says));
         if !one.rivals.is_empty() {
             let rivals = escape(&one.rivals.join("; "));
-            let _ = write!(html, "<br><small>not told from: {rivals}</small>");
+            let _ = write!(
+                html,
+                "<br><small>not distinguishable from: {rivals}</small>"
+            );
         }
         html.push_str("</li>\n");
     }
@@ -86,17 +91,17 @@ fn said(changes: &[Changed]) -> String {
     html
 }
 
+/// Lasting changes, each with its physical causes and the base parameters before and since.
 fn points(compared: &Compared) -> String {
     if compared.points.is_empty() {
-        return "<p>No base parameter changed and stayed changed over two or more runs.</p>\n"
-            .to_owned();
+        return "<p>No base parameter changed for two or more runs.</p>\n".to_owned();
     }
     let mut html = String::new();
     for point in &compared.points {
         let file = escape(&compared.runs[point.run].file);
         let _ = writeln!(html, "<h3>From run {} on: {file}</h3>", point.run + 1);
         if point.changes.is_empty() {
-            html.push_str("<p>No single change in physics explains it.</p>\n");
+            html.push_str("<p>No single physical change explains it.</p>\n");
         } else {
             html.push_str(&said(&point.changes));
         }
@@ -124,6 +129,7 @@ fn points(compared: &Compared) -> String {
     html
 }
 
+/// A value with its standard deviation as a cell.
 fn value(fitted: Option<Fitted>) -> Cell {
     match fitted {
         Some(Fitted {
@@ -133,10 +139,11 @@ fn value(fitted: Option<Fitted>) -> Cell {
             &format!("{} ± {}", significant(value, 5), significant(deviation, 2)),
             value,
         ),
-        _ => Cell::text("not told"),
+        _ => Cell::text("not identifiable"),
     }
 }
 
+/// Runs that differ from the first one, with their changes.
 fn against(compared: &Compared) -> String {
     let rows: Vec<Vec<Cell>> = (compared.runs.iter().enumerate())
         .filter(|(_, run)| !run.changes.is_empty())
@@ -151,20 +158,17 @@ fn against(compared: &Compared) -> String {
     if rows.is_empty() {
         return "<p>No run differs from the first.</p>\n".to_owned();
     }
-    table(
-        "changes",
-        &["#run", "recording", "what is different"],
-        &rows,
-    )
+    table("changes", &["#run", "recording", "differences"], &rows)
 }
 
+/// Values that each run has for itself in the joint fit.
 fn own(shared: &SharedFit) -> String {
     let mut html = String::from(
-        "<p>Base parameters are shared by all runs; these values are each run's own.</p>\n",
+        "<p>All runs share their base parameters. The values below belong to one run each.</p>\n",
     );
     if !shared.gains.is_empty() {
         html.push_str(
-            "<p>True forces are the measured ones times these factors, by the known load.</p>\n",
+            "<p>True force = factor times measured force, determined by the known load.</p>\n",
         );
         let rows: Vec<Vec<Cell>> = (shared.gains.iter())
             .map(|(drive, gain)| vec![Cell::text(drive), value(Some(*gain))])
@@ -192,27 +196,28 @@ fn own(shared: &SharedFit) -> String {
     html
 }
 
+/// Pictures of base parameters over the runs: those with lasting changes first, the others folded.
 fn parameters(compared: &Compared) -> String {
     let has_changed = |k: &usize| {
         let mut steps = compared.points.iter().flat_map(|point| &point.steps);
         steps.any(|step| step.parameter == *k)
     };
-    let is_told = |k: &usize| {
+    let is_determined = |k: &usize| {
         compared
             .runs
             .iter()
-            .any(|run| told(run.alone[*k]).is_some())
+            .any(|run| determined(run.alone[*k]).is_some())
     };
-    let all = (0..compared.parameters.len()).filter(is_told);
+    let all = (0..compared.parameters.len()).filter(is_determined);
     let (changed, same): (Vec<usize>, Vec<usize>) = all.partition(has_changed);
     let mut html = String::from(
-        "<p>Each run fitted alone, with bars of two standard deviations; lines are means between the changes above.</p>\n",
+        "<p>Each run is fitted separately. Bars are two standard deviations, lines are means between the changes above.</p>\n",
     );
     for k in changed {
         html.push_str(&picture(compared, k));
     }
     if !same.is_empty() {
-        html.push_str("<details>\n<summary>Those that did not change</summary>\n");
+        html.push_str("<details>\n<summary>Parameters that did not change</summary>\n");
         for k in same {
             html.push_str(&picture(compared, k));
         }
@@ -221,8 +226,8 @@ fn parameters(compared: &Compared) -> String {
     html
 }
 
-/// A value that the run tells, with its deviation.
-fn told(fitted: Fitted) -> Option<[f64; 2]> {
+/// A value and its standard deviation, if the run determines it.
+fn determined(fitted: Fitted) -> Option<[f64; 2]> {
     Some([fitted.value, fitted.deviation.filter(|d| *d > 0.0)?])
 }
 
@@ -230,7 +235,7 @@ fn told(fitted: Fitted) -> Option<[f64; 2]> {
 fn picture(compared: &Compared, k: usize) -> String {
     let runs = &compared.runs;
     let known: Vec<(usize, [f64; 2])> = (runs.iter().enumerate())
-        .filter_map(|(at, run)| Some((at, told(run.alone[k])?)))
+        .filter_map(|(at, run)| Some((at, determined(run.alone[k])?)))
         .collect();
     let steps = compared.points.iter().flat_map(|point| {
         let own = point.steps.iter().filter(|step| step.parameter == k);
@@ -240,8 +245,8 @@ fn picture(compared: &Compared, k: usize) -> String {
     over_runs(&compared.parameters[k], "run", runs.len(), &known, &steps)
 }
 
-/// A base parameter over `n` runs or days as a picture: values that are known, by place and with their deviations, and levels
-/// before and since each change, by the place from which on it is there.
+/// Picture of a base parameter over `n` runs or days (`what`). `known` has the index of a run with value and standard deviation;
+/// `steps` has the index of the first run of each change with the mean before and since.
 pub fn over_runs(
     info: &ParameterInfo,
     what: &str,
@@ -291,6 +296,7 @@ pub fn over_runs(
     )
 }
 
+/// All runs with their sizes, and those that could not be evaluated with the reason.
 fn runs(compared: &Compared, spelling: &dyn RemedySpelling) -> String {
     let mut rows: Vec<Vec<Cell>> = (compared.runs.iter().enumerate())
         .map(|(k, run)| {
@@ -303,12 +309,12 @@ fn runs(compared: &Compared, spelling: &dyn RemedySpelling) -> String {
         })
         .collect();
     rows.extend(compared.unread.iter().map(|one| {
-        let says = Cell::text(&format!("gave no answer: {}", one.error.spell(spelling)));
+        let says = Cell::text(&format!("not evaluated: {}", one.error.spell(spelling)));
         vec![Cell::text(""), Cell::text(&one.file), Cell::text(""), says]
     }));
     table(
         "runs",
-        &["#run", "recording", "#samples", "#parameters that moved"],
+        &["#run", "recording", "#samples", "#parameters that changed"],
         &rows,
     )
 }

@@ -1,4 +1,4 @@
-//! Spectra of what the model leaves, by averaged windowed segments (P. Welch, IEEE Trans. Audio Electroacoustics 15 (1967)).
+//! Spectra of the residuals, by averaged windowed segments (P. Welch, IEEE Trans. Audio Electroacoustics 15 (1967)).
 
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
@@ -68,12 +68,12 @@ fn goertzel(values: &[f64], bin: usize) -> f64 {
     one * one + two * two - factor * one * two
 }
 
-/// A figure for each drive: what is left over frequency, before and after.
+/// A figure for each drive: density of the residual over frequency, before and after the effects.
 pub(crate) fn figures(before: &Version, after: Option<&Version>) -> String {
     let mut html = String::new();
     for (d, drive) in before.model.drives().iter().enumerate() {
         let of = |version: &Version| -> Vec<(f64, f64)> {
-            // The longest run says most about low frequencies.
+            // The longest run resolves the lowest frequencies.
             let judged = version.judged();
             let longest = judged.iter().max_by_key(|k| version.runs[**k].time.len());
             let Some(run) = longest.map(|k| &version.runs[*k]) else {

@@ -3,7 +3,9 @@
 use std::fmt::Write as _;
 
 const WIDTH: f64 = 900.0;
+/// Height of a panel.
 const PANEL: f64 = 150.0;
+/// Room between panels, for the names of curves.
 const GAP: f64 = 34.0;
 const LEFT: f64 = 80.0;
 const RIGHT: f64 = 16.0;
