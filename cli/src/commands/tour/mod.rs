@@ -1,6 +1,6 @@
-//! `tour`: the whole story on bundled recordings: derive, compare, see where it fails, learn what is missing, add it, watch
-//! the error fall; then the same for the paper's own treatment. Everything it uses and makes goes into one folder, so that
-//! each command can be repeated by hand.
+//! `tour`: all main steps on bundled recordings: derive, compare, find the missing effect, add it, identify again; then a diagnosis
+//! of the model as published in the paper. Its models, recordings and pages are written into one folder, so that each command can
+//! be repeated by hand.
 
 mod story;
 
@@ -26,10 +26,10 @@ use story::Story;
 const RODS_PAGE: &str = "report.html";
 /// The page of the paper's treatment.
 const PAPER_PAGE: &str = "report-paper.html";
-/// The model with what was found.
+/// File of the model with the effects that were found.
 const EDITED: &str = "spidermill-completed.toml";
 
-/// Tells the story and writes its files.
+/// Prints the tour and writes its files.
 pub(crate) fn run(host: &Host, args: &TourArgs) -> Outcome {
     let folder = args
         .out
@@ -71,8 +71,9 @@ fn diagnose(model: &Model, [fit, check]: &[Recording; 2], held: Held) -> Outcome
     Ok(model.diagnose(&[fit], &[check], &question)?)
 }
 
-/// The folder of the tour.
+/// The folder of the tour, with its models and recordings.
 struct Place {
+    /// Its path.
     folder: PathBuf,
 }
 
@@ -97,12 +98,12 @@ impl Place {
         output::write(&self.folder.join(name), text)
     }
 
-    /// A file of the folder as a command has it.
+    /// A file of the folder as an argument of a command, quoted.
     fn name(&self, file: &str) -> String {
         quoted(&self.folder.join(file).display().to_string())
     }
 
-    /// Recordings as a command has them.
+    /// Recordings as flags of a command.
     fn recordings(&self, runs: &Runs) -> String {
         format!(
             "--data {} --check {}",
@@ -124,21 +125,27 @@ impl Place {
         Ok([read(runs.fit.0)?, read(runs.check.0)?])
     }
 
-    /// How the command line asks for the same.
+    /// The spelling of commands that use the same recordings.
     fn flags(&self, runs: &Runs) -> CommandLineSpelling {
         let [fit, check] = [runs.fit.0, runs.check.0].map(|name| self.path(name));
         CommandLineSpelling::new(&[fit], &[check], &Reading::default())
     }
 
-    /// Writes the model with what was found beside the one it came from; the commands for it, and the difference.
-    fn add(&self, findings: &Findings, flags: &CommandLineSpelling) -> Outcome<Option<(Vec<String>, String)>> {
+    /// Writes the model with the effects that were found. Returns the commands that do the same, and the difference of the files.
+    fn add(
+        &self,
+        findings: &Findings,
+        flags: &CommandLineSpelling,
+    ) -> Outcome<Option<(Vec<String>, String)>> {
         let Some(edited) = &findings.edited else {
             return Ok(None);
         };
         self.write(EDITED, &edited.text)?;
         let model = &findings.before.model;
         let commands = findings.entries.iter();
-        let commands = commands.map(|entry| flags.spell_effect(model, entry)).collect();
+        let commands = commands
+            .map(|entry| flags.spell_effect(model, entry))
+            .collect();
         let names = ["spidermill.toml", EDITED];
         let difference = edit::difference(model.text(), &edited.text, names);
         let coloured = edit::coloured(&difference, terminal::style());
@@ -151,11 +158,14 @@ fn file_name(name: &str) -> &str {
     name.rsplit('/').next().unwrap_or(name)
 }
 
-/// The model with nominal parameters held against a recording.
+/// The model with nominal parameters compared with a recording.
 struct Seen {
     compared: Compared,
+    /// Times of the samples, s.
     time: Vec<f64>,
+    /// Measured forces, N, `[drive][sample]`.
     measured: Vec<Vec<f64>>,
+    /// Measured minus calculated forces, N, `[drive][sample]`.
     errors: Vec<Vec<f64>>,
 }
 
@@ -164,7 +174,7 @@ impl Seen {
         let one = recording
             .stretches
             .first()
-            .ok_or_else(|| Failure::Input("the bundled recording has no sample".to_owned()))?;
+            .ok_or_else(|| Failure::Input("the bundled recording has no samples".to_owned()))?;
         let measured = along::measured(one)?;
         let forces = along::decimated(along::forces(model, one, &model.nominal)?, one)?;
         let errors = measured
