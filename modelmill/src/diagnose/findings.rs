@@ -93,7 +93,7 @@ pub struct Findings {
     pub entries: Vec<NewEffect>,
     /// The model file with these entries.
     pub edited: Option<Added>,
-    /// Regions where the error of the model as it is is largest.
+    /// Regions where the error without added effects is largest.
     pub places: Places,
     /// Regions where the residual with the effects is largest.
     pub left: Option<Places>,

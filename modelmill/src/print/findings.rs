@@ -147,7 +147,7 @@ impl Findings {
         lines.push(style.bold(if diagnosis.verdict == Verdict::Unexplained {
             "Where the residual is largest"
         } else {
-            "Where the error of the model as it is is largest"
+            "Where the error without added effects is largest"
         }));
         let places = &self.regions;
         lines.extend(places.iter().map(|region| format!("  {}.", region.says)));
