@@ -41,6 +41,7 @@ pub(crate) fn entries(model: &Model, answer: &Answer) -> Vec<NewEffect> {
     let (pairs, others): (Vec<_>, Vec<_>) = entries.partition(|(_, couples)| *couples);
     let only = |entries: Vec<(NewEffect, bool)>| entries.into_iter().map(|(entry, _)| entry);
     let mut made = split_shared_places(only(others).collect());
+    // Couplings come last, after the effects of single places.
     made.extend(only(pairs));
     made
 }
@@ -70,6 +71,7 @@ fn split_shared_places(entries: Vec<NewEffect>) -> Vec<NewEffect> {
                 .collect(),
             ..effect.clone()
         };
+        // Three groups keep the force at each place: only the first entry, both, only the second.
         let groups = [
             of(&|first, second| first && !second, &other),
             of(&|first, second| first && second, &sum(&other, &entry)),
@@ -92,6 +94,7 @@ fn entry(found: &FoundEffect, kind: &EffectKind, answer: &Answer) -> NewEffect {
     let estimates = parameters.iter().zip(&found.estimates);
     for (parameter, value) in estimates.clone() {
         let symbol = parameter.symbol.as_str();
+        // The product of a parameter and a constant, divided by the parameter, gives the constant.
         if let Some((factor, constant)) = symbol.split_once('*') {
             let of = estimates.clone().find(|(p, _)| p.symbol == factor);
             if let Some((_, of)) = of

@@ -102,8 +102,10 @@ pub(crate) fn candidates(model: &Model) -> Outcome<Candidates> {
         let fitting: Vec<&Spot> = all
             .iter()
             .filter(|spot| fits(mechanism, kind, spot))
+            // Effects that the model has already are no candidates; pairs are checked below.
             .filter(|spot| kind.places == Some(2) || !has(mechanism, kind, &[*spot]))
             .collect();
+        // Tilt and delay change all columns of the model, so they are derived separately.
         if let Some(mechanics @ (Mechanics::Tilt | Mechanics::Delay)) = kind.mechanics {
             if let Some(spot) = fitting.first() {
                 let change = Change {
@@ -125,6 +127,7 @@ pub(crate) fn candidates(model: &Model) -> Outcome<Candidates> {
         {
             continue;
         }
+        // Sums refer to the single entries of this kind by their position after the earlier ones.
         let first = singles.len();
         let (places, sums) = sets(mechanism, kind, &fitting, &all);
         for spots in places {
@@ -141,6 +144,7 @@ pub(crate) fn candidates(model: &Model) -> Outcome<Candidates> {
             });
         }
     }
+    // Effects of the model itself come first in the derivation of each variant.
     let own = mechanism.effects.len();
     let [known, searched, carried] = variants;
     let known = known.derive(model, own, &mut singles)?;

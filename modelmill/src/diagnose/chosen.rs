@@ -132,6 +132,7 @@ pub(crate) fn choose(model: &Model, named: &Named, constants: Constants) -> Outc
         let given = given(&kind, named, constants)?;
         let all: Vec<Place> = places.iter().map(|spot| spot.place).collect();
         let grouped = kind.mechanics.and_then(|one| one.groups(mechanism, &all));
+        // A kind for two places, or a mechanics that joins places, is one entry for all of them.
         let joined = kind.places.is_some() || grouped.is_some();
         let together = if joined { places.len() } else { 1 };
         for group in places.chunks(together) {
@@ -197,6 +198,7 @@ fn check(model: &Model, named: &Named) -> Outcome {
             }
         }
     }
+    // The edit is only tried; its result is not used.
     model.host().edit(&model.path, model.text(), &effect)?;
     Ok(())
 }
@@ -298,6 +300,7 @@ impl Chosen {
                     .next()
                     .map_or_else(Vec::new, |(_, choices)| choices)
             }
+            // A tilt has one column for each axis: the change of all base columns times their nominal values.
             Source::Tilt(tilt) => {
                 let level = vec![0.0; tilt.axes.len()];
                 let sum = |direction: [f64; 3]| {
@@ -326,6 +329,7 @@ impl Chosen {
 pub(crate) fn base(model: &Model, all: &Runs<'_>) -> Outcome<(Vec<Column>, Column, Column)> {
     let every = regressor(all, &Evaluator::new(&model.derivation), model)?;
     let none = Column(vec![None; model.drives().len()]);
+    // The load is the force of all bodies; the known force is subtracted before a fit.
     let (mut load, mut known) = (none.clone(), none);
     let mut free = Vec::new();
     for (k, column) in every.into_iter().enumerate() {

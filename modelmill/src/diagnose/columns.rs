@@ -35,6 +35,7 @@ pub(crate) fn columns(candidates: &Candidates, model: &Model, all: &Runs<'_>) ->
     let rounds = (0..of_known)
         .map(|round| (Sort::Known, round))
         .chain((0..longest).map(|round| (Sort::Searched, round)));
+    // Each round evaluates all candidates once, with one value of each constant; rounds run in parallel.
     let jobs: Vec<(Sort, usize, Vec<usize>)> = rounds
         .map(|(sort, round)| {
             let takes_part = |k: &usize| {
@@ -149,6 +150,7 @@ fn effect(candidates: &Candidates, entry: &Entry) -> Effect {
 fn shared_scales(candidates: &Candidates, motions: &Motions) -> Vec<[f64; 2]> {
     let own = |single: &Single| motions.scale(single.spots[0].place);
     let mut scales: Vec<[f64; 2]> = candidates.singles.iter().map(own).collect();
+    // A scale spreads over entries that share places, until nothing changes.
     loop {
         let before = scales.clone();
         for entry in &candidates.entries {
@@ -217,6 +219,7 @@ fn singles(
         Sort::Carried => &candidates.carried,
     };
     let mechanism = &derivation.mechanism;
+    // Nominal constants, with the given values for the searched ones.
     let mut constants: Vec<f64> = mechanism.constants.iter().map(|c| c.value).collect();
     for k in which {
         for (_, name, search) in &candidates.singles[*k].constants {
@@ -300,6 +303,7 @@ fn candidate(
         })
         .collect();
     let effect = effect(candidates, entry);
+    // Columns that depend on the load are computed later, for the load of the current fit.
     if first.sort == Sort::Carried {
         let felt = vec![true; parameters.len()];
         let candidate = Candidate {
@@ -339,6 +343,7 @@ fn candidate(
     };
     let linear = first.constants.iter().find(|c| c.2 == Search::Linear);
     if let (None, Some((symbol, _, _))) = (searched, linear) {
+        // A column is affine in a linear constant, so the difference of its values at 1 and 0 is the column of the product.
         let mut shifts = sum(1);
         for (shift, column) in shifts.iter_mut().zip(&choices[0].columns) {
             shift.add(-1.0, column);
@@ -352,6 +357,7 @@ fn candidate(
             choices[0].columns.push(shift);
         }
     }
+    // Values of the constant for which a column is not finite are not tried.
     choices.retain(|choice| choice.columns.iter().all(is_finite));
     if choices.is_empty() {
         return None;
@@ -404,6 +410,7 @@ pub(crate) fn carried(
     if which.is_empty() {
         return Ok(Vec::new());
     }
+    // Loads of all recordings are stacked; each recording gets its own part, interpolated to all of its samples.
     let mut start = 0;
     let mut loaded = Vec::new();
     for (one, is_check) in all {

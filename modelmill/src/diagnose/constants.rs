@@ -48,6 +48,7 @@ pub(crate) fn constants(
             middle = along(k, 0.0).ok();
         }
         let Some(middle) = &middle else { continue };
+        // First and second derivative; fixed base parameters are summed with their nominal values.
         let [mut slope, mut bend] = [(); 2].map(|()| Sensitivity {
             base: Vec::new(),
             held: Column(vec![None; model.drives().len()]),
@@ -61,6 +62,7 @@ pub(crate) fn constants(
                 without_rounding(sum)
             };
             let first = 0.5 / step;
+            // The central second difference.
             let second = 1.0 / (step * step);
             let first = sum([(first, &ahead[p]), (0.0, middle), (-first, &back[p])]);
             let second = sum([

@@ -110,6 +110,7 @@ pub(crate) fn encoders(
         };
         let step = problem.layout.stretches.iter().map(|s| s.step);
         let step = step.fold(f64::MIN_POSITIVE, f64::max);
+        // A prismatic coordinate has no turn: its error repeats along the travel.
         let turn = if *is_angle {
             std::f64::consts::TAU
         } else {
@@ -117,12 +118,14 @@ pub(crate) fn encoders(
         };
         let choice = |times: u32| {
             let k = std::f64::consts::TAU * f64::from(times) / turn;
+            // At the largest rate a wave must have enough samples, or the low-pass would remove it.
             if k * fastest * step > std::f64::consts::TAU / ENCODER_WAVE_SAMPLES {
                 return None;
             }
             let wave = |phase: f64| {
                 let error = |j: usize| {
                     let (sin, cos) = (k * q[j] + phase).sin_cos();
+                    // Error of the position, and its first and second derivative in time.
                     let rate = k * cos * qd[j];
                     [sin, rate, k * cos * qdd[j] - k * k * sin * qd[j] * qd[j]]
                 };
@@ -141,6 +144,7 @@ pub(crate) fn encoders(
             };
             Some(Choice {
                 constants: vec![("times_per_turn".to_owned(), f64::from(times))],
+                // Sine and cosine, so that the phase is estimated linearly.
                 columns: vec![wave(0.0), wave(0.5 * std::f64::consts::PI)],
             })
         };
@@ -170,6 +174,7 @@ pub(crate) fn values(model: &Model, problem: &Problem, held: Held) -> Vec<f64> {
         let mut one = Moments::new(problem.base.len());
         let columns: Vec<Option<&[f64]>> = problem.base.iter().map(|c| c.0[d].as_deref()).collect();
         one.add_rows(&columns, measured);
+        // Each drive counts alike, whatever its force.
         let weight = one.total.max(f64::MIN_POSITIVE).recip();
         one.gram *= weight;
         one.rhs *= weight;
@@ -221,6 +226,7 @@ fn sensitivity(
         let pairs = ahead.into_iter().zip(back);
         let slope = pairs.map(|(ahead, back)| {
             let mut slope: Vec<f64> = ahead.iter().zip(&back).map(|(a, b)| a - b).collect();
+            // The median, since jumps of signs are rare but large.
             let mut sizes: Vec<f64> = slope.iter().map(|x| x.abs()).collect();
             sizes.sort_by(f64::total_cmp);
             let bound = SLOPE_JUMP_MEDIANS * sizes.get(sizes.len() / 2).copied().unwrap_or(0.0);

@@ -32,6 +32,7 @@ pub(crate) fn take_off(
 ) -> Outcome<()> {
     problem.removed.resize(model.drives().len(), 0.0);
     let samples = problem.layout.samples().max(1) as f64;
+    // Differences between recordings are subtracted, and their power is counted as removed.
     for one in between {
         for (d, force) in one.force.0.iter().enumerate() {
             let (Some(force), Some(measured)) = (force, &mut problem.measured.0[d]) else {
@@ -121,6 +122,7 @@ fn coarse(problem: &mut Problem, model: &Model, all: &Runs<'_>) -> Outcome<()> {
         else {
             continue;
         };
+        // Standard deviation of a uniform distribution over one step.
         problem.noise[d] = problem.noise[d].max(step / 12.0_f64.sqrt());
         problem.disturbances.push(Disturbance {
             kind: "quantised_force".to_owned(),
@@ -169,6 +171,7 @@ fn pushes(problem: &mut Problem, all: &Runs<'_>) {
         let mut of_event = along.iter().zip(&inside).filter(|(_, inside)| **inside);
         let mut of_event: Vec<f64> = of_event.by_ref().map(|(x, _)| *x).collect();
         of_event.sort_by(f64::total_cmp);
+        // The place where the event begins: its tenth percentile, which bears single wrong samples.
         let Some(place) = of_event.get(of_event.len() / 10) else {
             return false;
         };
@@ -201,6 +204,7 @@ fn acts_beyond(
         .chain(friction.unwrap_or_default())
         .map(|column| column.0[channel].as_deref())
         .collect();
+    // The model is fitted to samples before the place and away from the event.
     let is_elsewhere = |i: usize| !about[i] && depths[i] < 0.0;
     let elsewhere: Vec<usize> = (0..measured.len()).filter(|i| is_elsewhere(*i)).collect();
     let some = |values: &[f64]| -> Vec<f64> { elsewhere.iter().map(|i| values[*i]).collect() };

@@ -232,6 +232,7 @@ impl Model {
             };
             problem::find(self, &data[0], &data[1], asked)
         };
+        // The search with differences between recordings; it is repeated without them if there are any.
         let mut answer = find(&between)?;
         let mut between = between;
         if !between.is_empty() {
@@ -252,6 +253,7 @@ impl Model {
         }
         let notes = data.iter().flatten().flat_map(Stretch::notes);
         let notes = self.caution().into_iter().chain(notes.cloned()).collect();
+        // The model file with the effects, and that model identified from the same recordings.
         let entries = added::entries(self, &answer);
         let (edited, after) = if entries.is_empty() {
             (None, Err(Message::new()))
@@ -265,6 +267,7 @@ impl Model {
             }
         };
         let [fit_data, check_data] = data;
+        // The model without effects, for comparison.
         let before = Version::new(self.clone(), fit_data, check_data, held)?;
         let places = places(&before)?;
         let left = after.as_ref().ok().map(self::places).transpose()?;
@@ -485,6 +488,7 @@ fn identified<'a>(
     let derivation = &after.model.derivation;
     let mechanism = &derivation.mechanism;
     let place = findings.entries.iter().position(|one| one == entry)?;
+    // Added effects are the last ones of the edited model.
     let first = mechanism
         .effects
         .len()
@@ -532,6 +536,7 @@ fn separation(findings: &Findings, found: &FoundEffect) -> Option<Separation> {
     let others = findings.diagnosis.effects.iter();
     let others = others.filter(|other| other.effect != found.effect && is_force(&&other.effect));
     let noise = &findings.answer.problem.noise;
+    // One figure for all drives, since the planned motion has no noise of its own.
     let squares: f64 = noise.iter().map(|n| n * n).sum();
     let noise = (squares / noise.len().max(1) as f64).sqrt();
     Some(Separation {

@@ -41,6 +41,7 @@ pub(crate) fn gears(
             };
             (0..values.len()).map(slope).collect()
         };
+        // The displacement of the load has a rate and an acceleration too, in proportion to those of the torque.
         let rates: Vec<Vec<f64>> = loads.iter().map(|load| rate(load)).collect();
         let bends = rates.iter().map(|of| rate(of)).collect::<Vec<_>>();
         Ok(loads.into_iter().chain(rates).chain(bends).collect())
@@ -65,6 +66,7 @@ pub(crate) fn gears(
             let is_yielding = kind == "drive_compliance";
             let shift = |order: usize, sample: usize| match (is_yielding, order) {
                 (true, order) => loads[order * n + d][sample],
+                // Half the play, towards the side that the load presses.
                 (false, 0) => 0.5 * loads[d][sample].signum(),
                 (false, _) => 0.0,
             };
@@ -76,6 +78,7 @@ pub(crate) fn gears(
                         *x *= shift(order, sample);
                     }
                 }
+                // Forces belong to the true position, so the error enters with a minus sign.
                 column.add(-1.0, &part);
             }
             if column.is_zero() {

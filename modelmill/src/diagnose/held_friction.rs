@@ -17,6 +17,7 @@ pub(crate) fn changes(model: &Model, base: &[Column]) -> Vec<Candidate> {
     let own = effects
         .iter()
         .filter(|effect| KINDS.contains(&effect.kind.as_str()));
+    // Dry and viscous friction at the same drives change together.
     let mut of_places: Vec<(&[Place], Vec<&EffectTerm>)> = Vec::new();
     for effect in own {
         match of_places

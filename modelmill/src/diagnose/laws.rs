@@ -33,6 +33,7 @@ pub(crate) fn sites(candidates: &Candidates, model: &Model, all: &Runs<'_>) -> O
         if !matches!(spot.sort, ActsOn::Drive | ActsOn::Coordinate) {
             continue;
         }
+        // A place without a drive acts on the drives through the mechanism; its column comes from the derivation.
         let (force, channel) = match (spot.place, forces.iter().find(|(at, _)| *at == spot)) {
             (Place::Drive(d), _) => (on_drive(model, all, d.0), Some(d.0)),
             (_, Some((_, force))) => (force.clone(), None),
@@ -242,6 +243,7 @@ fn word(variable: Variable) -> &'static str {
 /// The table of a library for a law, and the effect that adds it to a model; `None` for a law that depends on the earlier motion.
 fn entry(sites: &[Site], law: &Proposed, parameters: &[Estimate]) -> Option<LawEntry> {
     let mut products = law.terms.iter().map(|term| &term.product);
+    // A law that depends on the earlier motion has no formula over the state.
     if products.any(Product::remembers) {
         return None;
     }
@@ -357,6 +359,7 @@ impl Formula {
                 let parts: Vec<String> = parts
                     .map(|(text, symbol)| format!("{symbol}*{text}"))
                     .collect();
+                // A sum needs parentheses only next to other factors or terms.
                 let is_alone = factors.len() == 1 && law.terms.len() == 1;
                 let sum = parts.join(" + ");
                 product.push(if is_alone { sum } else { format!("({sum})") });
@@ -377,6 +380,7 @@ impl Formula {
         }
         let of_name =
             |one: &&(String, f64, Factor)| one.0.trim_end_matches(char::is_numeric) == symbol;
+        // Several constants of one name are numbered from the second on.
         let symbol = match self.constants.iter().filter(of_name).count() {
             0 => symbol.to_owned(),
             n => format!("{symbol}{}", n + 1),

@@ -47,10 +47,12 @@ pub(crate) fn thinned(model: &Model, stretch: &Stretch) -> Outcome<Stretch> {
     let most = (stretch.run.prepared.band_hz).map_or(every as f64, |band| {
         PASSED_BY_DECIMATION / (PART_OF_BAND * band * step)
     });
+    // The largest decimation that keeps the band, down to `KEPT` samples.
     let wanted = (every + 1..=every * kept.div_ceil(KEPT))
         .rev()
         .find(|wanted| *wanted as f64 <= most);
     let factor = wanted.unwrap_or(every) / LEFT;
+    // A segment with weights stays as it is, since weights belong to single samples.
     if samples < LONG || factor < 2 || stretch.weights.is_some() {
         return Ok(stretch.clone());
     }

@@ -29,6 +29,7 @@ pub(crate) fn memories(model: &Model, all: &Runs<'_>) -> Outcome<Vec<Candidate>>
         columns.truncate(drives.len());
         Ok(columns)
     };
+    // The travel over all recordings sets the scale of the distances.
     let mut travels = vec![[f64::INFINITY, f64::NEG_INFINITY]; drives.len()];
     for (one, _) in all {
         for (travel, values) in travels.iter_mut().zip(positions(one)?) {
@@ -86,6 +87,7 @@ fn states(position: &[f64], length: f64) -> Vec<f64> {
         let moved = x - before;
         before = *x;
         let bound = if moved < 0.0 { -1.0 } else { 1.0 };
+        // The sign of the motion is constant between two samples.
         state = bound + (state - bound) * (-moved.abs() / length).exp();
         state
     };

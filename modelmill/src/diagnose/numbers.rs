@@ -35,6 +35,7 @@ pub(crate) fn layout(model: &Model, all: &Runs<'_>) -> Layout {
         };
         all.iter().flat_map(of).collect()
     };
+    // Without left-out samples the layout has no masks, which saves memory.
     let drives = if all_count { 0 } else { model.drives().len() };
     Layout {
         channels: model.drives(),
@@ -122,6 +123,7 @@ impl Motions {
 
     /// Largest rate (per s) and travel of a place; zero for a place that does not move.
     pub(crate) fn scale(&self, place: Place) -> [f64; 2] {
+        // Columns of the evaluator: positions, rates, and one derivative for each active coordinate.
         let n = self.drives.len() / (2 + self.active.len()).max(1);
         let found = match place {
             Place::Drive(d) => Some((&self.drives[n + d.0], &self.drives[d.0])),

@@ -31,6 +31,7 @@ pub(super) fn off_nominal(version: &Version) -> Vec<OffNominal> {
         .filter_map(|(_, p)| {
             let (nominal, std) = (p.nominal?, p.std?);
             let sigmas = (p.value - nominal).abs() / std;
+            // Both bounds: a precise fit would report tiny differences, a poor one large but uncertain ones.
             let is_off = std > 0.0
                 && sigmas > OFF_NOMINAL_SIGMAS
                 && (p.value - nominal).abs() > OFF_NOMINAL_PART * nominal.abs();
@@ -86,6 +87,7 @@ fn has_one_sign(version: &Version, k: usize) -> bool {
     let mechanism = &derivation.mechanism;
     let constants: Vec<f64> = mechanism.constants.iter().map(|c| c.value).collect();
     let nominal = version.model.nominal[k];
+    // A fixed seed: the same recording always gives the same warning.
     let mut random = Random::new(1);
     let may_turn =
         |i: usize| version.model.sign_of(i) == Sign::Any && mechanism.parameters[i].unit != "m";

@@ -45,6 +45,7 @@ pub(crate) fn payloads(model: &Model, all: &Runs<'_>) -> Outcome<Vec<Candidate>>
         let has_effect = |k: &usize| match *k {
             k @ 0..OF_A_MASS => !ten[k].is_zero(),
             k => {
+                // A second moment acts through the two inertias about the other axes.
                 let across = [[7, 9], [4, 9], [4, 7]][k - OF_A_MASS];
                 across.iter().any(|entry| !ten[*entry].is_zero())
             }
@@ -53,6 +54,7 @@ pub(crate) fn payloads(model: &Model, all: &Runs<'_>) -> Outcome<Vec<Candidate>>
         if !(0..OF_A_MASS).any(|k| has_effect(&k)) {
             continue;
         }
+        // A point mass has four parameters, a general payload seven.
         for (most, refines) in [(OF_A_MASS, "point_mass"), (PARAMETERS.len(), "payload")] {
             let free: Vec<usize> = (0..most).filter(has_effect).collect();
             let parameter = |k: &usize| {

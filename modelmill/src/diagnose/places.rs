@@ -181,6 +181,7 @@ pub(crate) fn sets<'a>(
         Place::Coordinate(i) => mechanism.coordinates[i.0].passive,
         _ => false,
     };
+    // In mechanisms with loops, limbs are often built alike: their places may share parameters.
     for sort in [ActsOn::Drive, ActsOn::Coordinate] {
         for passive in [false, true] {
             for carries in [Carries::Force, Carries::Torque] {

@@ -100,6 +100,7 @@ pub(crate) fn find(
     let units: Vec<String> = (0..model.drives().len())
         .map(|d| model.force_unit(d).to_owned())
         .collect();
+    // Candidates that a model file cannot contain: faults of signals, of encoders, of gears and of lengths.
     let mut further = readings(&problem);
     further.extend(drifts(&problem, &units));
     further.extend(memories(model, &all)?);
@@ -282,6 +283,7 @@ fn hold(problem: &mut Problem, model: &Model, held: Held) {
     problem.prior = model.information(&fitted);
     let has_prior = problem.prior.is_some();
     let is_fitted = |k: usize| has_prior && fitted.contains(&k);
+    // The force of fixed parameters is summed; columns of the others stay.
     let mut known = Column(vec![None; model.drives().len()]);
     let (mut free, mut is_part_of_load) = (Vec::new(), Vec::new());
     for (k, column) in std::mem::take(&mut problem.base).into_iter().enumerate() {
@@ -321,6 +323,7 @@ fn friction(model: &Model, all: &Runs<'_>) -> Outcome<Vec<Column>> {
     let rates = stack(all, |one| drive_rates(model, one))?;
     let mut friction = Vec::new();
     for (d, rate) in rates.iter().enumerate() {
+        // At exact standstill dry friction has no direction.
         let sign = |v: &f64| if *v == 0.0 { 0.0 } else { v.signum() };
         let signs = rate.iter().map(sign).collect();
         for values in [rate.clone(), signs, vec![1.0; rate.len()]] {

@@ -25,6 +25,7 @@ pub(crate) fn tilt(derivation: &Derivation, model: &Model, all: &Runs<'_>) -> Ou
         axes: Vec::new(),
         components: std::array::from_fn(|_| Sensitivity::default()),
     };
+    // Without gravity a tilt has no effect.
     if size == 0.0 {
         return Ok(tilt);
     }
@@ -57,6 +58,7 @@ pub(crate) fn tilt(derivation: &Derivation, model: &Model, all: &Runs<'_>) -> Ou
                 .position(|p| reduction.products[*p] == *product);
             let mut change = Column(vec![None; model.drives().len()]);
             if let Some(place) = place {
+                // The difference of both directions, per unit of gravity.
                 change.add(0.5 / size, &after[place]);
                 change.add(-0.5 / size, &before[place]);
             }

@@ -172,6 +172,7 @@ pub fn verdict(diagnosis: &Diagnosis, channels: &[String], judged: Judged) -> St
 /// otherwise be hidden by the others.
 fn falls(first: &Rung, last: &Rung, channels: &[String], judged: Judged) -> String {
     let pairs = first.check_by_channel.iter().zip(&last.check_by_channel);
+    // The drive whose error falls most, relative to its error before.
     let most = (channels.iter().zip(pairs)).min_by(|(_, a), (_, b)| {
         let share = |(before, after): &(&f64, &f64)| **after / before.max(f64::MIN_POSITIVE);
         share(a).total_cmp(&share(b))
@@ -228,6 +229,7 @@ fn disturbances(diagnosis: &Diagnosis) -> Option<String> {
         .into_iter()
         .map(|(name, mut at)| {
             let mut seen = std::collections::HashSet::new();
+            // A drive may have the same disturbance in several recordings.
             at.retain(|place| seen.insert(*place));
             match at.as_slice() {
                 [] => kind(name),

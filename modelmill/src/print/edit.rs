@@ -21,6 +21,7 @@ pub fn difference(old: &str, new: &str, [before, after]: [&str; 2]) -> String {
 /// A diff for the terminal.
 pub fn coloured(difference: &str, style: Style) -> String {
     let lines = difference.lines().map(|line| {
+        // The lines with file names begin like added and removed lines, so they are tested first.
         if line.starts_with("+++") || line.starts_with("---") {
             style.bold(line)
         } else if line.starts_with('+') {

@@ -147,6 +147,7 @@ fn wrapped(text: &str, indent: usize) -> Vec<String> {
 /// Units for the places where a symbol may stand, without repetition.
 fn units(units: &[(Carries, String)]) -> String {
     let mut all: Vec<&str> = units.iter().map(|(_, unit)| unit.as_str()).collect();
+    // Forces and torques often have different units; equal ones are named once.
     all.dedup();
     all.join(" or ")
 }

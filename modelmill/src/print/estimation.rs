@@ -19,6 +19,7 @@ fn effective_samples(found: &Identified) -> Option<f64> {
         .copied()
         .filter(|x| *x > 0.0 && x.is_finite())
         .collect();
+    // The median, since a parameter that acts rarely has very few samples.
     all.sort_by(f64::total_cmp);
     all.get(all.len() / 2).copied()
 }
@@ -40,6 +41,7 @@ pub(crate) fn json(model: &Model, found: &Identified, args: &Estimation) -> Valu
         "residual_correlation": by_drive(&found.deviations.residual_lag1),
         "bandwidth": found.deviations.bandwidth,
     });
+    // Optional parts are added only if the estimator computed them.
     let mut put = |name: &str, what: Value| value[name] = what;
     if let Some(weighting) = &found.weighting {
         put("residual_scale", by_drive(&weighting.scales));
@@ -318,6 +320,7 @@ fn physical_text(
              `std` also depend on nominal values and on the bounds of physical bodies"
         ));
     }
+    // A body at its bound shows that the data ask for an impossible one.
     let tight = bodies
         .iter()
         .zip(&physical.margins)

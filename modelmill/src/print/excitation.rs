@@ -24,6 +24,7 @@ impl Excited {
             let one = json!({ "offset": series.offset, "mu": series.mu, "nu": series.nu });
             (name.clone(), one)
         });
+        // A limit that is zero has no share that is used; JSON has null there.
         let limits = found.margins.iter().map(|margin| {
             json!({
                 "name": margin.name,

@@ -47,6 +47,7 @@ impl Findings {
                 json!({"name": p.name, "expression": p.expression, "nominal": off.nominal, "value": p.value, "sigmas": off.sigmas, "unit": p.unit})
             })
             .collect();
+        // Parts of the residual are relative to the rms force of the drive.
         let budget: Map<String, Value> = (channels.iter().zip(&diagnosis.budgets).enumerate())
             .map(|(d, (channel, budget))| {
                 let part = |x: f64| {
@@ -161,6 +162,7 @@ impl Findings {
         self.refused_text(style, &mut lines);
         self.untold_text(style, &mut lines);
         self.off_text(style, spelling, &mut lines);
+        // Entries to add first, then advice for what a model file cannot contain.
         let mut next: Vec<String> = (self.to_add().iter())
             .map(|entry| spelling.spell_effect(&self.before.model, entry))
             .collect();
@@ -247,6 +249,7 @@ impl Findings {
                 words::effect(&found.effect),
                 values.join(", ")
             ));
+            // Kinds of the libraries have a text of their own; others are explained here.
             let mut kinds = self.answer.candidates.kinds.iter();
             let kind = kinds.find(|kind| kind.name == found.effect.kind);
             let meaning = kind.map_or_else(
@@ -278,6 +281,7 @@ impl Findings {
     /// The rejected candidates that explain most of the error alone, with the reason.
     fn refused_text(&self, style: Style, lines: &mut Vec<String>) {
         let has_effects = !self.diagnosis.effects.is_empty();
+        // Candidates are sorted by what they explain alone, so the first are the closest rivals.
         let candidates = self.diagnosis.candidates.iter();
         let rows: Vec<Vec<String>> = candidates
             .filter_map(|c| {

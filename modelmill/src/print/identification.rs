@@ -24,6 +24,7 @@ impl Identification {
                 "nominal".to_owned(),
                 json!({ "fit": self.nominal_fit, "check": self.nominal_check }),
             );
+            // Figures of the estimator belong to this output only; a fit file is read without them.
             object.insert(
                 "estimator".to_owned(),
                 estimation::json(model, &self.found, &self.options),
@@ -66,6 +67,7 @@ impl Identification {
         lines.extend(estimator.iter().map(|line| format!("  {line}")));
         lines.push(String::new());
         lines.push(style.bold("Error"));
+        // Errors with nominal values mean nothing if the file has none.
         let has_nominal = (0..model.base.len()).any(|k| model.has_nominal(k));
         let mut figures = Vec::new();
         if has_nominal {

@@ -36,11 +36,13 @@ impl Interpreted {
                 "residuals": Value::Object(entries.collect::<Map<_, _>>()),
             })
         };
+        // `none` means that the base parameters do not determine the unknowns.
         let method = match &self.found {
             Interpretation::Exact { .. } => "exact",
             Interpretation::LeastSquares { .. } => "least_squares",
             Interpretation::Undetermined { .. } => "none",
         };
+        // If not all unknowns are determined, some may still be.
         let determined: Vec<&String> = match &self.found {
             Interpretation::Undetermined { determined, .. } => {
                 let pairs = names.iter().zip(determined);

@@ -17,6 +17,7 @@ impl Identification {
     pub fn next_step(&self) -> Message {
         let parameters = &self.fit.parameters;
         let estimated = parameters.iter().filter(|p| p.status != Status::Known);
+        // Parameters that the file declares as known are not counted.
         let n = estimated.clone().count();
         let vague = estimated
             .filter(|p| match p.status {
@@ -26,6 +27,7 @@ impl Identification {
             })
             .count();
         if vague > 0 && vague as f64 >= MANY * n as f64 {
+            // Physical bounds are advised only if they were not used.
             let physical = match self.found.refined {
                 Refined::Physical(..) => Message::new(),
                 _ => message!(

@@ -130,6 +130,7 @@ impl Compared {
             count(later.len(), "run", "runs"),
             first.file
         ))];
+        // With many runs the lasting changes come first, since single runs fill pages.
         if later.len() > SINGLY {
             self.say_points(&mut lines, style);
         }
@@ -163,6 +164,7 @@ impl Compared {
         lines.push(String::new());
         lines.push(style.bold(&run.file));
         say_changes(&run.changes, lines);
+        // A contact within a run is no change of the machine.
         let is_event = |one: &Changed| matches!(one.what, What::ContactEvent { .. });
         if run.changes.iter().all(is_event) {
             let other = if run.changes.is_empty() { "" } else { "other " };
@@ -191,6 +193,7 @@ impl Compared {
 
     /// Changes that last over two or more runs; nothing for fewer than four runs.
     fn say_points(&self, lines: &mut Vec<String>, style: Style) {
+        // A lasting change needs two runs before and two after it.
         if self.runs.len() < 4 {
             return;
         }
@@ -200,6 +203,7 @@ impl Compared {
             lines.push("  No base parameter changed for two or more runs.".to_owned());
         }
         for point in &self.points {
+            // Six names are enough to recognise the change; the JSON has all.
             let names: Vec<&str> = (point.steps.iter().take(6))
                 .map(|step| self.parameters[step.parameter].name.as_str())
                 .collect();

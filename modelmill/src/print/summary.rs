@@ -19,6 +19,7 @@ impl Checked {
         let model = &self.model;
         let loaded = &model.loaded;
         let mut warnings = self::warnings(loaded, spelling);
+        // Warnings of the derivation come after those of the file.
         let in_vain = retained_in_vain(&model.derivation).into_iter();
         warnings.extend(in_vain.map(|(k, says)| {
             let span = loaded.retain.get(k);
@@ -140,6 +141,7 @@ impl Summary {
             [] => String::new(),
             names => format!(": {}", names.join(", ")),
         };
+        // Emitted code cannot use a reserved word as the name of a module.
         let module = module_name(&m.name);
         let whose = if module == m.name {
             "the file's `name`"

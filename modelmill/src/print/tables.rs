@@ -8,12 +8,14 @@ use crate::text::table::{Align, number, percent, significant, table};
 
 /// Identified base parameters beside their nominal values.
 pub fn parameters(parameters: &[FitParameter]) -> Vec<String> {
+    // One row for each parameter; the second `std` is relative to the value.
     let rows: Vec<Vec<String>> = parameters
         .iter()
         .map(|p| {
             vec![
                 p.name.clone(),
                 p.nominal.map_or_else(|| "-".to_owned(), number),
+                // Values that were not identified are in parentheses.
                 if p.status == Status::Identified {
                     number(p.value)
                 } else {
@@ -66,6 +68,7 @@ pub fn figures(named: &[(&str, &Figures)]) -> Vec<String> {
     let mut rows = Vec::new();
     for (name, figures) in named {
         let mut name = (*name).to_owned();
+        // A total needs one unit: forces and torques are not added up.
         if let Some(rms) = figures.rms {
             rows.push(vec![
                 std::mem::take(&mut name),
@@ -172,6 +175,7 @@ pub fn places(places: &Places) -> Vec<String> {
     let mut lines: Vec<String> = regions
         .map(|region| format!("  {}.", region.says))
         .collect();
+    // Errors at the level of rounding have no place that means anything.
     if !places.rounding.is_empty() {
         lines.push(format!(
             "  The error of {} is rounding (below {ROUNDING:e} of the force): there is nothing to find.",

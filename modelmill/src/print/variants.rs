@@ -92,6 +92,7 @@ impl Variants {
             .limits
             .iter()
             .filter(|l| l.crossing() == Crossing::Kept);
+        // Of the limits that both variants keep, only the one nearest to its end is named.
         let most = kept.clone().max_by(|a, b| {
             let used = |one: &LimitUse| one.used.into_iter().flatten().fold(0.0, f64::max);
             used(a).total_cmp(&used(b))
@@ -184,6 +185,7 @@ fn limit(one: &LimitUse) -> String {
 
 /// The part of a limit that is used; close to the limit with more digits, which say on which side.
 fn part(used: f64) -> String {
+    // Next to 100 % three digits would not show on which side a value is.
     let digits = if (used - 1.0).abs() < 0.01 { 6 } else { 3 };
     format!("{} %", significant(100.0 * used, digits))
 }
@@ -240,6 +242,7 @@ fn numbers(effort: &Effort) -> [f64; 6] {
 /// A change relative to what was, `+12.3 %`.
 fn change(before: f64, after: f64) -> String {
     let by = after - before;
+    // A change of rounding prints as a dash.
     if by.abs() <= UNCHANGED * before.abs() {
         return "-".to_owned();
     }
@@ -308,6 +311,7 @@ fn shares(one: &DriveVariants) -> Vec<String> {
         ("", Align::Left),
     ];
     lines.extend(table(4, &columns, &rows).into_iter().skip(1));
+    // The remaining terms are added up, so that the shares sum to 100 %.
     let rest: f64 = terms[n..].iter().map(|term| term.share).sum();
     if n < terms.len() {
         lines.push(format!(
@@ -332,6 +336,7 @@ fn signed_percent(share: f64) -> String {
 /// Which part of a share comes from the changed geometry (the column) instead of the changed value; empty without such a part.
 fn by_column(term: &TermShare) -> String {
     let by_column = term.share - term.by_value;
+    // A small rest is rounding of the split, not a change of geometry.
     if by_column.abs() <= LEAST_SHARE * term.share.abs() {
         String::new()
     } else if term.by_value == 0.0 {

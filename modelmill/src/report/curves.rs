@@ -25,9 +25,13 @@ const HEIGHT: f64 = 190.0;
 
 /// A curve of one panel.
 struct Curve {
+    /// Name in the key.
     name: String,
+    /// Class of the style, which gives the colour.
     class: &'static str,
+    /// Times of the first and the last value, s.
     span: [f64; 2],
+    /// Evenly spaced values, N or N m.
     values: Vec<f64>,
 }
 
@@ -39,6 +43,7 @@ pub fn section(before: &Version, after: Option<&Version>, names: [&str; 2]) -> S
     let shown = order.len().min(MOST_RUNS);
     let drives = before.model.drives().len();
     let curves = shown * drives * if after.is_some() { 5 } else { 3 };
+    // Many recordings and drives share the budget, so that the page stays small.
     let most = (BUDGET / curves.max(1)).max(LEAST);
     let mut html = String::new();
     for (place, k) in order[..shown].iter().enumerate() {

@@ -28,9 +28,11 @@ pub(crate) fn picture(ladder: &[Rung], noise: f64, judged: Judged) -> String {
         .iter()
         .map(|rung| words::lines(&words::rung(rung), LETTERS))
         .collect();
+    // All rows have the height of the longest label.
     let longest = labels.iter().map(Vec::len).max().unwrap_or(1);
     let row = ROW.max(LINE * longest as f64 + 8.0);
     let bottom = TOP + row * ladder.len() as f64;
+    // The axis has room of a factor 1.6 at both ends.
     let percents = [100.0 * low / 1.6, 100.0 * high * 1.6];
     let x = Axis::decades(percents, [LEFT, WIDTH - 156.0]);
     let y = Axis::new([0.0, 1.0], [bottom, TOP]);
@@ -39,6 +41,7 @@ pub(crate) fn picture(ladder: &[Rung], noise: f64, judged: Judged) -> String {
     if noise > 0.0 {
         let at = x.at(100.0 * noise);
         picture.path("noise", &format!("M{at:.1} {TOP:.1}V{bottom:.1}"));
+        // The label stays inside of the picture on either half of the axis.
         let anchor = if at > 0.5 * (x.start + x.end) {
             "end"
         } else {

@@ -23,14 +23,18 @@ pub(crate) type Variable = (String, Vec<f64>);
 
 /// Where each sample lies in a map; the cells of both variables.
 struct Grid {
+    /// Least and largest value of the variable across.
     x: [f64; 2],
+    /// Least and largest value of the variable upwards.
     y: [f64; 2],
+    /// Index of the cell of each sample, row by row from below.
     cells: Vec<usize>,
 }
 
 impl Grid {
     fn new(x: &[f64], y: &[f64]) -> Option<Self> {
         let (of_x, of_y) = (range(x), range(y));
+        // A variable that does not change has no cells.
         if !(of_x[1] > of_x[0] && of_y[1] > of_y[0]) {
             return None;
         }
@@ -66,6 +70,7 @@ impl Grid {
 
     /// How much of the spread of the squared error is between cells, less what as many cells would show by chance.
     fn gathers(&self, error: &[f64]) -> f64 {
+        // Adjusted coefficient of determination of an analysis of variance, with the cell as the only factor.
         let n = error.len() as f64;
         let mean = error.iter().map(|e| e * e).sum::<f64>() / n;
         let total: f64 = error.iter().map(|e| (e * e - mean).powi(2)).sum();
@@ -121,6 +126,7 @@ pub(crate) fn figures(before: &Version, after: Option<&Version>, variables: &[Va
             let Some(grid) = Grid::new(x, y) else {
                 continue;
             };
+            // The map is drawn over the pair of variables that concentrates the error most.
             let gathers = grid.gathers(&error);
             if best.as_ref().is_none_or(|(most, ..)| gathers > *most) {
                 best = Some((gathers, i, j, grid));

@@ -18,6 +18,7 @@ use crate::text::table::percent;
 ///
 /// Fails only if the derivation of the equations is cancelled.
 pub fn page(findings: &Findings, spelling: &dyn StepSpelling) -> Outcome<String> {
+    // Equations are those of the model with the effects, if it could be built.
     let last = findings.last();
     let equations = last.model.equations(Format::Html)?.text;
     let name = &findings.before.model.name;
@@ -54,6 +55,7 @@ pub fn page(findings: &Findings, spelling: &dyn StepSpelling) -> Outcome<String>
         ),
         ("equations", "Equations", embedded(findings, &equations)),
     ];
+    // Links to all sections at the top of the page.
     page.push_str("<nav>");
     for (id, title, _) in &sections {
         let _ = write!(page, "<a href=\"#report-{id}\">{title}</a> ");
@@ -193,6 +195,7 @@ fn laws(findings: &Findings, spelling: &dyn StepSpelling) -> String {
 
 /// Missing effects and the steps that add them, or the reason why none should be added.
 fn effects(findings: &Findings, spelling: &dyn StepSpelling) -> String {
+    // Without entries to add there may still be findings, such as a delayed force signal.
     if findings.to_add().is_empty() {
         if let Some(says) = findings.beside_the_file() {
             return format!("{}<p>{says}</p>\n", tables::effects(findings));
@@ -343,6 +346,7 @@ fn embedded(findings: &Findings, page: &str) -> String {
     let inner = between(page, "<main>", "</main>")
         .replace(" id=\"", " id=\"equations-")
         .replace("href=\"#", "href=\"#equations-");
+    // Headings become lower ones in an order in which no replacement meets the result of another.
     let mut inner = inner;
     for (from, to) in [("h3", "h5"), ("h2", "h4"), ("h1", "h3")] {
         inner = inner

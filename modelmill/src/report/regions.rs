@@ -49,6 +49,7 @@ pub(crate) fn sentence(region: &Region, model: &Model) -> String {
     } else {
         &region.variable
     };
+    // A range of equal size on both sides of zero is a range of magnitudes, as for rates near standstill.
     let is_around_zero = low < 0.0 && low.to_bits() == (-high).to_bits();
     let lies = if is_around_zero {
         format!("within {} {unit} of zero {name}", significant(high, 3))
@@ -59,6 +60,7 @@ pub(crate) fn sentence(region: &Region, model: &Model) -> String {
             significant(high, 3)
         )
     };
+    // Times of several recordings overlap, so a region in time names its file.
     let file = region.says.split_once(": ").map(|(file, _)| file);
     let of = match file {
         Some(file) if region.variable == TIME_COLUMN => format!(" in {file}"),

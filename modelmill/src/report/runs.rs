@@ -56,6 +56,7 @@ fn summary(compared: &Compared) -> String {
     let later = compared.runs.len() - 1;
     let changed = compared.runs.iter().skip(1);
     let changed = changed.filter(|run| !run.changes.is_empty()).count();
+    // The colour of the verdict.
     let class = if changed == 0 && compared.points.is_empty() {
         "adequate"
     } else {
@@ -209,6 +210,7 @@ fn parameters(compared: &Compared) -> String {
             .any(|run| determined(run.alone[*k]).is_some())
     };
     let all = (0..compared.parameters.len()).filter(is_determined);
+    // Parameters with a lasting change are shown first, the others folded.
     let (changed, same): (Vec<usize>, Vec<usize>) = all.partition(has_changed);
     let mut html = String::from(
         "<p>Each run is fitted separately. Bars are two standard deviations, lines are means between the changes above.</p>\n",
@@ -254,6 +256,7 @@ pub fn over_runs(
     known: &[(usize, [f64; 2])],
     steps: &[(usize, [f64; 2])],
 ) -> String {
+    // The axis has room for all bars.
     let ends: Vec<f64> = (known.iter())
         .flat_map(|(_, [x, d])| [x - BARS * d, x + BARS * d])
         .collect();
@@ -271,6 +274,7 @@ pub fn over_runs(
         let start = if i == 0 { 0 } else { steps[i - 1].0 };
         let end = steps.get(i + 1).map_or(n, |next| next.0);
         let at = |run: usize| x.at(run as f64 + 0.5);
+        // The level before the first change belongs to no step.
         if i == 0 {
             let level = y.at(*before);
             let d = format!("M{:.1} {level:.1}H{:.1}", at(start), at(*run));

@@ -78,6 +78,7 @@ pub(crate) fn ladder(findings: &Findings) -> String {
                 percents(rung.fit),
                 percents(rung.check),
                 of(&|| evidence.map(|e| (percent(Some(e.gain)), e.gain))),
+                // Without noise the ratio is huge and only its size class matters.
                 of(&|| evidence.map(|e| (significant(e.blocks_t.min(999.0), 2), e.blocks_t))),
                 of(&|| {
                     evidence.map(|e| (format!("{:.0}", e.effective_samples), e.effective_samples))
@@ -102,6 +103,7 @@ pub(crate) fn ladder(findings: &Findings) -> String {
 
 /// Errors of each drive before and after the effects, with the noise of its force.
 pub(crate) fn drives(findings: &Findings) -> String {
+    // The same figure as in the text: rms of the error over rms of the measured force, on the data that are judged.
     let nrms = |version: &Version, d: usize| -> f64 {
         let runs = version.judged();
         let error = version.errors(&runs, d);
@@ -266,6 +268,7 @@ pub(crate) fn candidates(findings: &Findings) -> String {
         ]
     };
     let rows: Vec<Vec<Cell>> = all.iter().map(row).collect();
+    // The table is folded after the first candidates, since a machine may have hundreds.
     let split = FIRST.min(rows.len());
     let mut html = table("sortable", &head, &rows[..split]);
     if split < rows.len() {

@@ -18,6 +18,7 @@ pub fn csv(columns: &[(&str, &[f64])]) -> String {
     let names = columns.iter().map(|(name, _)| csv_field(name));
     let mut text = names.collect::<Vec<_>>().join(",");
     text.push('\n');
+    // The first column is the time, which all others follow.
     let samples = columns.first().map_or(0, |(_, values)| values.len());
     for i in 0..samples {
         for (k, (_, values)) in columns.iter().enumerate() {

@@ -43,9 +43,12 @@ pub struct Look<'a> {
 
 /// A figure as it grows.
 pub struct Figure<'a> {
+    /// Title as SVG text.
     title: String,
+    /// Times of the samples, s.
     time: &'a [f64],
     body: String,
+    /// Number of panels so far.
     panels: usize,
 }
 
@@ -74,6 +77,7 @@ impl<'a> Figure<'a> {
             .fold(0.0_f64, |m, v| m.max(v.abs()));
         let limit = look.limit.unwrap_or(largest).max(f64::MIN_POSITIVE);
         let plot_width = WIDTH - LEFT - RIGHT;
+        // Zero is in the middle of the panel; larger values are cut off at its edge.
         let y = |value: f64| top + PANEL * (0.5 - 0.5 * (value / limit).clamp(-1.0, 1.0));
         let body = &mut self.body;
         let _ = writeln!(
