@@ -71,7 +71,7 @@ impl Default for Question {
 
 /// Findings of a diagnosis.
 pub struct Findings {
-    /// Verdict, ladder, candidates with the reason of their refusal, and what is left unexplained.
+    /// Verdict, error after each step, candidates with the reasons of their rejection, and the unexplained residual.
     pub diagnosis: Diagnosis,
     /// Missing effects.
     pub missing: Vec<Missing>,

@@ -20,7 +20,7 @@ const PART_OF_BAND: f64 = 0.25;
 /// Samples that are left for each one that the parallel filter keeps.
 const LEFT: usize = 4;
 /// Order of the low-pass of the forces. It is Butterworth's, which is flat where the parallel filter passes: one with ripples
-/// would change forces that are held against states as they were.
+/// would change the forces relative to the states, which are not filtered.
 const ORDER: usize = 4;
 
 impl Recording {
@@ -118,7 +118,7 @@ mod tests {
     use super::*;
     use crate::Host;
 
-    /// A long stretch of a pendulum, of which the parallel filter keeps one in ten samples.
+    /// A long segment of a pendulum, of which the parallel filter keeps one in ten samples.
     fn long(samples: usize, band_hz: f64) -> Stretch {
         let time: Vec<f64> = (0..samples).map(|i| 1e-3 * i as f64).collect();
         let of = |f: &dyn Fn(f64) -> f64| vec![time.iter().map(|t| f(*t)).collect::<Vec<f64>>()];

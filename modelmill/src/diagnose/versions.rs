@@ -60,7 +60,7 @@ impl Version {
             Some(result) => result.values(),
             None => model.nominal.clone(),
         };
-        // Fitted recordings come first, so a position tells which are validation runs.
+        // Fitted recordings come first, so the index shows which are validation runs.
         let n_fit = fit.len();
         let data: Vec<Stretch> = fit.into_iter().chain(check).collect();
         let mut runs = Vec::new();

@@ -7,7 +7,8 @@ use crate::model::{Change, Changes, Model};
 use crate::text::Style;
 
 impl Changes {
-    /// All changes as one JSON object.
+    /// All changes as one JSON object: base parameters of both models, changed entries, products (eq. (5)), dependencies (eq. (6)),
+    /// base parameters (eq. (16)), and operations for each call.
     pub fn json(&self, before: &Model, after: &Model) -> Value {
         let list = |changes: &[Change]| -> Vec<Value> {
             changes

@@ -10,7 +10,7 @@ use crate::text::Style;
 use crate::text::table::{Align, count, number, significant, table};
 
 impl Contents {
-    /// The tables as one JSON object.
+    /// The tables as one JSON object: names, types, number of samples, rate (Hz), start and end (s), and columns.
     pub fn json(&self) -> Value {
         let of_table = |table: &TableInfo| {
             let columns = table.columns.iter();

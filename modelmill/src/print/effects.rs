@@ -12,7 +12,7 @@ use crate::text::table::{Align, table};
 /// Width of a line of text, letters.
 const WIDTH: usize = 96;
 
-/// The kinds as one JSON object.
+/// The kinds as one JSON object: where each acts, its expression, and its parameters and constants with units.
 pub fn json(kinds: &[EffectKind]) -> Value {
     json!({ "kinds": kinds.iter().map(described).collect::<Vec<_>>() })
 }

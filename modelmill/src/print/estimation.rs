@@ -25,6 +25,10 @@ fn effective_samples(found: &Identified) -> Option<f64> {
 }
 
 /// The object `estimator` of `identify --json`.
+///
+/// `effective_samples` is the number of independent samples, `residual_correlation` the correlation of the residuals at lag 1 for
+/// each drive, `bandwidth` the lag (samples) up to which correlations are counted. With weights: `residual_scale` is the noise of
+/// each drive (N or N m). `prior`, `essential`, `physical` and `instruments` are there if the option was used.
 pub(crate) fn json(model: &Model, found: &Identified, args: &Estimation) -> Value {
     let drives = model.drives();
     let by_drive = |values: &[f64]| -> Value {

@@ -16,7 +16,13 @@ impl Excited {
         margins.filter(|margin| margin.excess > 0.0).count()
     }
 
-    /// All that was found as one JSON object.
+    /// The trajectory and its quality as one JSON object.
+    ///
+    /// - `condition_number` of the regressor, `start` for the best random trajectory, `scaled_condition_number` with columns of
+    ///   equal norm
+    /// - `value` and `ends`: the criterion at the result and at the end of each start
+    /// - `limits`: the part of each limit that is used (1), and whether it is proven for all times
+    /// - `coefficients`: offset and Fourier coefficients of each coordinate (m or rad); `period` is in s
     pub fn json(&self) -> Value {
         let found = &self.found;
         let names = &self.coordinates;

@@ -16,8 +16,21 @@ const NAMED: usize = 6;
 const NAMED_LEAST_SHARE: f64 = 0.01;
 
 impl Findings {
-    /// All findings as one JSON object; `spelling` writes commands or calls for its reader. Forces are in N or N m, errors are
-    /// relative to the force.
+    /// All findings as one JSON object; `spelling` writes commands or calls for its reader.
+    ///
+    /// - `verdict`, `noise_floor` (relative to the force, as all errors here)
+    /// - `budget`: for each drive the parts of its residual relative to its force, whose `rms` is in `unit`
+    /// - `disturbances`: faults of the recordings, with estimates and times (`interval`, s)
+    /// - `steps`: errors after each added effect, on fitted (`fit`) and validation data (`check`)
+    /// - `effects`: missing effects with estimates, probability and alternatives
+    /// - `candidates`: all effects that were tried, with the share of the squared error that each explains alone and the reason
+    ///   of its rejection
+    /// - `untold`: effects that the recordings can neither show nor exclude
+    /// - `laws`: hypotheses for the residual
+    /// - `parameters_off_nominal`: base parameters that differ from the file, in standard deviations (`sigmas`)
+    /// - `unexplained`: drives with a repeatable residual that no effect explains
+    /// - `data`, `where`: notes on the recordings, and regions where the error is largest
+    /// - `with_nominal_parameters`: the diagnosis with all parameters fixed
     pub fn json(&self, spelling: &dyn StepSpelling) -> Value {
         let diagnosis = &self.diagnosis;
         let channels = self.channels();

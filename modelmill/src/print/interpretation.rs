@@ -11,6 +11,11 @@ use crate::text::table::{Align, count, number, significant, table};
 
 impl Interpreted {
     /// All solutions as one JSON object; values in SI units.
+    ///
+    /// - `identifiable`, `method`: whether and how the base parameters determine the unknowns
+    /// - `solutions`: values with standard deviations, and whether each is plausible; `fit`: residuals of each solution
+    /// - `determined`: unknowns with a unique value; `undetermined`: sentences about the others
+    /// - `base_parameters`: those that were used as equations
     pub fn json(&self) -> Value {
         let parameters = &self.model.derivation.mechanism.parameters;
         let names = self.names();

@@ -10,6 +10,13 @@ use crate::text::table::{Align, count, table, with_deviation};
 
 impl Compared {
     /// All differences as one JSON object; values in SI units.
+    ///
+    /// - `together`: base parameters of one fit to all runs; `runs`: those of each run fitted separately
+    /// - `moved`: base parameters that differ between the first run and another, in standard deviations (`sigmas`)
+    /// - `changes`: physical changes of a run relative to the first
+    /// - `change_points`: lasting changes, from four runs on
+    /// - `unread`: files that could not be evaluated, with the reason
+    /// - `per_run`: the joint fit in which runs have some values for themselves, if it was requested
     pub fn json(&self, spelling: &dyn RemedySpelling) -> Value {
         let later = || self.runs.iter().enumerate().skip(1);
         let moved =

@@ -6,7 +6,7 @@ use crate::compare::{Places, ROUNDING};
 use crate::model::Model;
 use crate::text::table::{Align, number, percent, significant, table};
 
-/// Identified base parameters beside their nominal values.
+/// Identified base parameters with nominal values and standard deviations, absolute and relative.
 pub fn parameters(parameters: &[FitParameter]) -> Vec<String> {
     // One row for each parameter; the second `std` is relative to the value.
     let rows: Vec<Vec<String>> = parameters

@@ -17,7 +17,12 @@ const MOST_PRODUCTS: usize = 4;
 const LEAST_SHARE: f64 = 0.01;
 
 impl Variants {
-    /// All figures as one JSON object.
+    /// All figures as one JSON object, `before` and `after` for the two variants.
+    ///
+    /// - `drives`: peak and rms force (N or N m), peak and rms power (W), positive and net work (J), and the terms that cause the
+    ///   difference; their shares sum to 1, and `by_value` is the part of a share that comes from the new value
+    /// - `limits`: range of each limit and the part of it that is used (1)
+    /// - `errors`: relative to measured forces, if the recordings have them
     pub fn json(&self, spelling: &dyn RemedySpelling) -> Value {
         let limits = self.limits.iter().map(|one| {
             let side = |m: usize| json!({ "range": one.ranges[m], "used": one.used[m] });

@@ -1,6 +1,6 @@
 //! Measured and calculated forces over time: pictures that need no script, and the same numbers packed for the script that zooms.
 //!
-//! Long recordings keep the least and the largest value of each of many stretches, so that no peak is lost and the page
+//! Long recordings keep the least and the largest value of each of many segments, so that no peak is lost and the page
 //! stays small; values are packed as 16-bit steps between the least and the largest of a curve.
 
 use std::fmt::Write as _;
@@ -95,7 +95,7 @@ fn of_run(
             packed.push(json!({ "title": title, "unit": unit, "curves": curves }));
         }
     }
-    // Text of a script must not hold what ends it.
+    // Text of a script must not contain `</`, which would end it.
     let text = json!({ "panels": packed }).to_string();
     let text = text.replace('<', "\\u003c");
     let _ = writeln!(

@@ -11,7 +11,7 @@ pub(crate) const LEFT: f64 = 66.0;
 /// Room at the right.
 pub(crate) const RIGHT: f64 = 14.0;
 
-/// An axis from one value to another over a stretch of the picture.
+/// An axis from one value to another over a part of the picture.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Axis {
     /// Value at the start.

@@ -15,7 +15,7 @@ const COLUMNS: usize = 22;
 const ROWS: usize = 14;
 /// Shades of the map; the page has a class for each.
 const SHADES: usize = 9;
-/// Samples that a cell must hold to be shown.
+/// Least number of samples of a cell that is shown.
 const LEAST: usize = 2;
 
 /// A variable along the recordings that are judged.

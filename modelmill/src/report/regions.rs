@@ -85,7 +85,7 @@ fn picture(
     let model = &before.model;
     let d = model.drives().iter().position(|d| *d == region.channel)?;
     let judged = before.judged();
-    // A stretch of time lies in one recording, which its sentence names if there are several.
+    // A segment of time belongs to one recording, which its sentence names if there are several.
     let runs: Vec<usize> = if region.variable == TIME_COLUMN {
         let named = |k: &usize| {
             region

@@ -35,7 +35,7 @@ impl Cell {
     }
 }
 
-/// A table; columns that begin with `#` hold numbers.
+/// A table as HTML. Heads that begin with `#` mark columns of numbers, which are aligned right and sorted by value.
 pub fn table(class: &str, head: &[&str], rows: &[Vec<Cell>]) -> String {
     let mut html = format!("<div class=\"wide\"><table class=\"{class}\">\n<thead><tr>");
     for name in head {

@@ -103,7 +103,7 @@ impl<'a> Figure<'a> {
                 top + PANEL
             );
         }
-        // A scale that was asked for is a round number.
+        // A given limit is a round number and is printed unchanged.
         let text = |value: f64| match look.limit {
             Some(_) => value.to_string(),
             None => format!("{value:.4}"),
@@ -183,8 +183,8 @@ pub fn sheet(title: &str, left: f64, height: f64, body: &str) -> String {
     )
 }
 
-/// Least and largest value of each of half as many stretches as points are wanted, with their places; all values where
-/// they are few enough.
+/// A curve in about `wanted` points, each with its index: the least and the largest value of each of many segments, so that no peak is
+/// lost. All values if they are few enough.
 pub fn thinned(values: &[f64], wanted: usize) -> Vec<(usize, f64)> {
     if values.len() <= wanted {
         return values.iter().copied().enumerate().collect();

@@ -39,6 +39,7 @@ pub(crate) fn run(host: &Host, args: &TourArgs) -> Outcome {
     let place = Place::unpack(&folder)?;
     let mut story = Story::new(terminal::style());
 
+    // Steps 1 to 5: the recording has rods, the model does not.
     let model = place.model(host, "spidermill.toml")?;
     let runs = place.read(&model, &WITH_RODS)?;
     story.derive(&place.name("spidermill.toml"), &model);
@@ -46,6 +47,7 @@ pub(crate) fn run(host: &Host, args: &TourArgs) -> Outcome {
     story.compare(&place, &model, &seen);
 
     let flags = place.flags(&WITH_RODS);
+    // Base parameters are estimated, as a user would do with an unknown machine.
     let rods = diagnose(&model, &runs, Held::Known)?;
     story.diagnose(&place, &rods);
     let edited = place.add(&rods, &flags)?;
@@ -53,8 +55,10 @@ pub(crate) fn run(host: &Host, args: &TourArgs) -> Outcome {
     story.ladder(&rods);
     place.write(RODS_PAGE, &page(&rods, &flags)?)?;
 
+    // Step 6: the model as published, on a recording without rods.
     let model = place.model(host, "spidermill-paper.toml")?;
     let runs = place.read(&model, &PLAIN)?;
+    // Base parameters are fixed: estimated ones would absorb most of the error.
     let paper = diagnose(&model, &runs, Held::All)?;
     story.paper(&place, &paper);
     place.write(PAPER_PAGE, &page(&paper, &place.flags(&PLAIN))?)?;
@@ -63,9 +67,11 @@ pub(crate) fn run(host: &Host, args: &TourArgs) -> Outcome {
     terminal::print(story.text.trim_start())
 }
 
+/// Diagnoses the first recording as fit and the second as validation run.
 fn diagnose(model: &Model, [fit, check]: &[Recording; 2], held: Held) -> Outcome<Findings> {
     let question = Question {
         held,
+        // The second diagnosis would double the time of the tour.
         again_with_nominal: false,
     };
     Ok(model.diagnose(&[fit], &[check], &question)?)
@@ -146,6 +152,7 @@ impl Place {
         let commands = commands
             .map(|entry| flags.spell_effect(model, entry))
             .collect();
+        // File names of the difference, as `diff` prints them.
         let names = ["spidermill.toml", EDITED];
         let difference = edit::difference(model.text(), &edited.text, names);
         let coloured = edit::coloured(&difference, terminal::style());
@@ -176,6 +183,7 @@ impl Seen {
             .first()
             .ok_or_else(|| Failure::Input("the bundled recording has no samples".to_owned()))?;
         let measured = along::measured(one)?;
+        // Samples of forces and measurements must agree, so both are decimated alike.
         let forces = along::decimated(along::forces(model, one, &model.nominal)?, one)?;
         let errors = measured
             .iter()

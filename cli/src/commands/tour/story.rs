@@ -18,7 +18,9 @@ const OTHERS: usize = 5;
 
 /// The text as it grows.
 pub(super) struct Story {
+    /// All that was printed so far.
     pub(super) text: String,
+    /// Colours, or none if the output is no terminal.
     style: Style,
 }
 
@@ -31,11 +33,13 @@ impl Story {
         }
     }
 
+    /// A line without trailing blanks.
     fn line(&mut self, line: &str) {
         self.text.push_str(line.trim_end());
         self.text.push('\n');
     }
 
+    /// Several lines.
     fn lines(&mut self, lines: &[String]) {
         for line in lines {
             self.line(line);
@@ -132,6 +136,7 @@ impl Story {
             count(all.len(), "candidate", "candidates")
         ));
         self.say(&verdict(findings));
+        // Effects that were found come first, then the best of the rejected ones.
         let shown = all.iter().filter(|c| c.refused.is_none());
         let others = all.iter().filter(|c| c.refused.is_some()).take(OTHERS);
         let has_effects = !findings.diagnosis.effects.is_empty();
@@ -221,7 +226,9 @@ impl Story {
         let largest = ladder.iter().map(|rung| rung.check).fold(noise, f64::max);
         let least = ladder.iter().map(|rung| rung.check);
         let least = least.chain([noise]).filter(|e| *e > 0.0);
+        // The axis begins below the smallest error, so that its bar has a length.
         let least = least.fold(f64::INFINITY, f64::min) / 3.0;
+        // Length of a bar on the logarithmic axis, between 0 and 1.
         let share = |error: f64| {
             if error > 0.0 && largest > least {
                 (error / least).ln() / (largest / least).ln()
@@ -233,6 +240,7 @@ impl Story {
         let rungs = ladder.iter().map(|rung| (words::rung(rung), rung.check));
         for (name, error) in rungs.chain([(name, noise)]) {
             let bar = bar(share(error), 1.0, BAR);
+            // Green: within 30 % of the noise floor, so nothing is left to explain.
             let bar = if error > noise * 1.3 {
                 self.style.red(&bar)
             } else {
@@ -240,6 +248,7 @@ impl Story {
             };
             let lines = words::lines(&name, 34);
             for (k, line) in lines.iter().enumerate() {
+                // Only the last line of a long name has the figure and the bar.
                 if k + 1 < lines.len() {
                     self.line(&format!("  {line}"));
                 } else {
