@@ -313,6 +313,18 @@ impl Findings {
         self.after.as_ref().unwrap_or(&self.before)
     }
 
+    /// The experiment that decides whether effects of a kind are present at some places: the text of the library, and the motion
+    /// to record.
+    pub(crate) fn deciding_experiment(&self, kind: &str, places: &str) -> String {
+        let mut kinds = self.answer.candidates.kinds.iter();
+        let known = kinds.find(|one| one.name == kind);
+        let known = known.map_or("", |one| one.doubles.as_str());
+        let motion = format!(
+            "To decide, record a motion over more of the travel of {places}, at other speeds and with another load."
+        );
+        format!("{known} {motion}").trim().to_owned()
+    }
+
     /// Names of the drives, in the order of the channels.
     pub fn channels(&self) -> &[String] {
         &self.answer.problem.layout.channels
@@ -395,19 +407,12 @@ fn missing(findings: &Findings) -> Vec<Missing> {
 /// Effects that the recordings can neither show nor exclude, with the reason and the experiment that would decide.
 fn untold(findings: &Findings) -> Vec<Untold> {
     let of = |effect: &Effect| {
-        let mut kinds = findings.answer.candidates.kinds.iter();
-        let kind = kinds.find(|kind| kind.name == effect.kind);
-        let place = effect.at.join(" and ");
-        let known = kind.map_or("", |kind| kind.doubles.as_str());
-        let more = format!(
-            "To decide, record a motion over more of the travel of {place}, at other speeds and with another load."
-        );
         Untold {
             effect: effect.clone(),
             says: "along these motions its force is almost a combination of forces that the model has, so even an effect as \
                    large as the force of the drive can be neither shown nor excluded"
                 .to_owned(),
-            separate_by: format!("{known} {more}").trim().to_owned(),
+            separate_by: findings.deciding_experiment(&effect.kind, &effect.at.join(" and ")),
         }
     };
     findings.diagnosis.untold.iter().map(of).collect()

@@ -1,11 +1,11 @@
 //! Findings of a diagnosis, as JSON for scripts and as text for people: verdict, errors after each step, effects, disturbances,
 //! rejected candidates and next steps.
 
-use modelmill_identify::diagnose::{Rung, Verdict};
+use modelmill_identify::diagnose::{Effect, Rung, Verdict};
 use serde_json::{Map, Value, json};
 
 use super::laws;
-use crate::diagnose::{Estimate, Findings, words};
+use crate::diagnose::{Estimate, Findings, Untold, words};
 use crate::print::{OptionName, Remedy, StepSpelling, notes};
 use crate::text::Style;
 use crate::text::table::{Align, number, percent, significant, table};
@@ -332,13 +332,32 @@ impl Findings {
         }
         lines.push(String::new());
         lines.push(style.bold("Effects that these recordings can neither show nor exclude"));
+        // Effects of one kind share their text, so it is printed once with all places.
+        let mut groups: Vec<(&Untold, Vec<&Effect>)> = Vec::new();
         for one in &self.untold {
-            let says = words::lines(
-                &format!("{}: {}.", words::effect(&one.effect), one.says),
-                98,
-            );
+            let is_alike = |(first, _): &&mut (&Untold, _)| {
+                (&first.effect.kind, &first.says) == (&one.effect.kind, &one.says)
+            };
+            match groups.iter_mut().find(is_alike) {
+                Some((_, effects)) => effects.push(&one.effect),
+                None => groups.push((one, vec![&one.effect])),
+            }
+        }
+        for (first, effects) in groups {
+            let (title, experiment) = match effects.as_slice() {
+                [one] => (words::effect(one), first.separate_by.clone()),
+                all => {
+                    let kind = &first.effect.kind;
+                    let places: Vec<String> = all.iter().map(|one| one.at.join(", ")).collect();
+                    (
+                        format!("{} ({})", words::kind(kind), places.join("; ")),
+                        self.deciding_experiment(kind, "each of these places"),
+                    )
+                }
+            };
+            let says = words::lines(&format!("{title}: {}.", first.says), 98);
             lines.extend(says.iter().map(|line| format!("  {line}")));
-            let wrapped = words::lines(&one.separate_by, 96);
+            let wrapped = words::lines(&experiment, 96);
             lines.extend(wrapped.iter().map(|line| style.dim(&format!("    {line}"))));
         }
     }
