@@ -34,7 +34,7 @@ pub(crate) fn picture(ladder: &[Rung], noise: f64, judged: Judged) -> String {
     let bottom = TOP + row * ladder.len() as f64;
     // The axis has room of a factor 1.6 at both ends.
     let percents = [100.0 * low / 1.6, 100.0 * high * 1.6];
-    let x = Axis::decades(percents, [LEFT, WIDTH - 156.0]);
+    let x = Axis::decades(percents, [LEFT, WIDTH - 176.0]);
     let y = Axis::new([0.0, 1.0], [bottom, TOP]);
     let mut picture = Picture::new(WIDTH, bottom + 40.0);
     picture.frame(&x, &y, "error / force, %", [7, 0]);
@@ -76,7 +76,7 @@ pub(crate) fn picture(ladder: &[Rung], noise: f64, judged: Judged) -> String {
         picture.dot("dot c-fit", [fit, middle - 7.0], 5.0);
         picture.dot("dot c-after", [check, middle + 7.0], 5.0);
         last = Some([fit, check, middle - 7.0]);
-        let right = WIDTH - 150.0;
+        let right = WIDTH - 170.0;
         picture.text(
             "tick c-fit",
             [right, middle - 3.0],
