@@ -86,6 +86,7 @@ pub(crate) struct Chosen {
     pub named: Named,
     /// Its kind.
     pub kind: EffectKind,
+    /// Its derivation, in the form of candidates.
     candidates: Candidates,
 }
 

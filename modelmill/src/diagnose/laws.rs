@@ -307,7 +307,9 @@ fn entry(sites: &[Site], law: &Proposed, parameters: &[Estimate]) -> Option<LawE
 
 /// A law as a formula, with the symbols of its parameters and constants.
 struct Formula {
+    /// Symbols of the parameters.
     parameters: Vec<String>,
+    /// Symbols of the constants with their values and the factors in which they stand.
     constants: Vec<(String, f64, Factor)>,
     /// Whether constants stand as symbols rather than as numbers.
     with_symbols: bool,

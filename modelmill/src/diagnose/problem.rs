@@ -41,8 +41,11 @@ pub enum Held {
 
 /// The problem, its solution and the candidates.
 pub(crate) struct Answer {
+    /// The problem in numbers, without columns.
     pub problem: Problem,
+    /// Its solution.
     pub diagnosis: Diagnosis,
+    /// Candidates that `add` could add, with their derivation.
     pub candidates: Candidates,
 }
 
@@ -164,11 +167,15 @@ fn tell(one: &mut Disturbance, model: &Model) {
 
 /// Computes columns that the search requests while it runs.
 struct Made<'a> {
+    /// Candidates that `add` could add.
     candidates: &'a Candidates,
+    /// The entry that each candidate of the problem comes from.
     origins: &'a [Origin],
     /// Values that are tried for the constant of each single candidate.
     grids: &'a [Vec<f64>],
+    /// The model without the effects.
     model: &'a Model,
+    /// Fitted recordings, then validation runs.
     all: &'a Runs<'a>,
 }
 
