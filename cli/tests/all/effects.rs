@@ -26,7 +26,7 @@ fn the_library_is_listed_and_explained() {
         assert!(kinds.iter().any(|one| one["name"] == kind), "{kind}");
         let says = ran(&["effects", kind]);
         assert_eq!(says.status, 0, "{}", says.err);
-        assert!(says.out.contains("told from its doubles"), "{kind}");
+        assert!(says.out.contains("what it can be confused with"), "{kind}");
     }
     let unknown = ran(&["effects", "magic"]);
     assert_eq!(unknown.status, 1);

@@ -230,9 +230,9 @@ fn nominal_values_and_bodies_that_can_be_help_where_the_recording_is_poor() {
         &path,
         "--physical",
     ]);
-    assert!(combined > 10 && text.contains("not alone: the recordings tell combinations"));
+    assert!(combined > 10 && text.contains("only in combination: the recordings determine sums"));
     // One in every row, one in the sentence below.
-    assert_eq!(text.matches("not alone").count(), combined + 1);
+    assert_eq!(text.matches("only in combination").count(), combined + 1);
     let essential = identified(&path, &["--essential"]);
     let dropped = essential["estimator"]["essential"]["dropped"]
         .as_array()

@@ -198,7 +198,7 @@ fn exchanged_columns_are_named() {
     assert!(told.err.contains("exchanged"), "{}", told.err);
     let told = ran(&["diagnose", &spidermill(), "--data", &arm]);
     let first =
-        "Look first at what may be wrong with the recording or the model: the coordinates theta1";
+        "Check the recording and the model first: the coordinates theta1";
     assert!(told.out.starts_with(first), "{}", told.out);
     let found = json(&["diagnose", &spidermill(), "--data", &path, "--json"]);
     let kinds = found["disturbances"]

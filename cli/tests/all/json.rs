@@ -27,7 +27,7 @@ fn check_summarises_the_model() {
     assert_eq!(summary["parameters"].as_array().map(Vec::len), Some(8));
     let text = printed(&["check", &model("spidermill-paper.toml")]);
     assert!(
-        text.contains("11 products with an effect on the actuators, 5 base parameters"),
+        text.contains("11 products of parameters with an effect on the drives, 5 base parameters"),
         "{text}"
     );
 }
@@ -314,5 +314,5 @@ fn runs_says_what_changed() {
         &recording,
         &recording,
     ]);
-    assert!(text.contains("nothing changed"), "{text}");
+    assert!(text.contains("No change found"), "{text}");
 }

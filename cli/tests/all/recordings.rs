@@ -202,10 +202,10 @@ fn nominal_values_of_zero_are_no_prior() {
     let ran = ran(&["identify", &some, "--data", &data, "--prior", "0.2"]);
     assert!(
         ran.out
-            .contains("1 soft constraint of nominal values count")
+            .contains("nominal values of 1 base parameter are used as soft constraints")
             && ran
                 .out
-                .contains("go without one, since their nominal values are 0 or not given"),
+                .contains("have none, since their nominal values are 0 or not given"),
         "{}{}",
         ran.out,
         ran.err

@@ -76,7 +76,7 @@ fn many_runs_become_a_page() {
     let data = folder.to_str().expect("plain text");
     let out = scratch("page");
     let says = printed(&["runs", &model, "--data", data, "--out", &out]);
-    assert!(says.contains("run13.csv gave no answer"), "{says}");
+    assert!(says.contains("run13.csv was not evaluated"), "{says}");
     assert!(
         says.contains("from run 4 on") && says.contains("kg more on S3"),
         "{says}"

@@ -1,4 +1,4 @@
-//! What was found as entries of a model file, and the edit of the file in memory.
+//! The effects found, as entries of a model file, and the edit of the file in memory.
 
 use modelmill_identify::diagnose::IdentifiedEffect;
 use modelmill_spec::edit::{NewEffect, NewParameter};
@@ -13,23 +13,23 @@ use super::problem::DiagnosisSolution;
 /// Significant digits of estimates that go into a model file.
 const DIGITS: usize = 5;
 
-/// A model file with everything that was found, not yet written.
+/// A model file with the effects found, not yet written to disk.
 #[derive(Clone, Debug)]
 pub struct CompletedModelFile {
-    /// Its text.
+    /// Text of the file.
     pub text: String,
-    /// What it means.
+    /// The loaded model.
     pub loaded: LoadedModel,
 }
 
-/// The effects that were found, as entries with the estimates for nominal values.
+/// The effects found, as entries whose nominal values are the estimates.
 pub(crate) fn entries(model: &Model, answer: &DiagnosisSolution) -> Vec<NewEffect> {
     let spots = candidate_places(&model.derivation.mechanism);
     let found = answer.diagnosis.effects.iter();
     let entries = found.filter_map(|found| {
         let kinds = &answer.candidates.kinds;
         let kind = kinds.iter().find(|kind| kind.name == found.effect.kind)?;
-        // A late reading of one drive is a fault of the recording, though all forces may have a delay.
+        // A delay of one drive is a fault of the recording; only a delay of all forces is an entry of a model file.
         let may_act = |name: &String| {
             let mut of_name = spots.iter().filter(|spot| spot.name == *name);
             of_name.any(|spot| kind.on.contains(&spot.sort))
@@ -37,16 +37,17 @@ pub(crate) fn entries(model: &Model, answer: &DiagnosisSolution) -> Vec<NewEffec
         found.effect.at.first().filter(|name| may_act(name))?;
         Some((entry(found, kind, answer), kind.places == Some(2)))
     });
-    // What couples two places may couple each with a third, and is no sum at either.
+    // Effects that couple two places are kept apart: a place may be coupled with several others.
     let (pairs, others): (Vec<_>, Vec<_>) = entries.partition(|(_, couples)| *couples);
     let only = |entries: Vec<(NewEffect, bool)>| entries.into_iter().map(|(entry, _)| entry);
     let mut made = split_shared_places(only(others).collect());
+    // Couplings come last, after the effects of single places.
     made.extend(only(pairs));
     made
 }
 
-/// Entries of one kind that share places, such as friction at both drives and more of it at one, as entries that do not:
-/// a model file has a kind once at a place. Their parameters add up, since their columns are the same there.
+/// Splits entries of one kind that share places, such as friction at both drives and more at one, into entries that do not: a model
+/// file has a kind once at a place. At shared places the parameters add up, since the columns are the same.
 fn split_shared_places(entries: Vec<NewEffect>) -> Vec<NewEffect> {
     let mut made: Vec<NewEffect> = Vec::new();
     for entry in entries {
@@ -70,6 +71,7 @@ fn split_shared_places(entries: Vec<NewEffect>) -> Vec<NewEffect> {
                 .collect(),
             ..effect.clone()
         };
+        // Three groups keep the force at each place: only the first entry, both, only the second.
         let groups = [
             of(&|first, second| first && !second, &other),
             of(&|first, second| first && second, &sum(&other, &entry)),
@@ -80,7 +82,7 @@ fn split_shared_places(entries: Vec<NewEffect>) -> Vec<NewEffect> {
     made
 }
 
-/// An estimate may belong to a parameter, to a constant that was found linearly, or to the product of both.
+/// An effect as an entry. An estimate may belong to a parameter, to a constant that enters linearly, or to the product of both.
 fn entry(found: &IdentifiedEffect, kind: &EffectKind, answer: &DiagnosisSolution) -> NewEffect {
     let parameters = &answer.problem.candidates[found.candidate].parameters;
     let mut effect = NewEffect {
@@ -92,6 +94,7 @@ fn entry(found: &IdentifiedEffect, kind: &EffectKind, answer: &DiagnosisSolution
     let estimates = parameters.iter().zip(&found.estimates);
     for (parameter, value) in estimates.clone() {
         let symbol = parameter.symbol.as_str();
+        // The product of a parameter and a constant, divided by the parameter, gives the constant.
         if let Some((factor, constant)) = symbol.split_once('*') {
             let of = estimates.clone().find(|(p, _)| p.symbol == factor);
             if let Some((_, of)) = of
@@ -119,7 +122,7 @@ fn entry(found: &IdentifiedEffect, kind: &EffectKind, answer: &DiagnosisSolution
     effect
 }
 
-/// Both effects at one place.
+/// The sum of two effects of one kind at the same place.
 fn sum(one: &NewEffect, other: &NewEffect) -> NewEffect {
     let mut both = one.clone();
     for more in &other.parameters {
@@ -137,6 +140,7 @@ fn sum(one: &NewEffect, other: &NewEffect) -> NewEffect {
     both
 }
 
+/// A value with the digits that go into a model file.
 pub(crate) fn round_significant(value: f64) -> f64 {
     let text = format!("{value:.*e}", DIGITS - 1);
     text.parse().unwrap_or(value)
@@ -151,7 +155,7 @@ pub(crate) fn add_entries(model: &Model, effects: &[NewEffect]) -> Outcome<Compl
         text = edited.text;
         last = Some(edited.loaded);
     }
-    let loaded = last.ok_or_else(|| Error::input("there is nothing to add"))?;
+    let loaded = last.ok_or_else(|| Error::input("no effect was given to add"))?;
     Ok(CompletedModelFile { text, loaded })
 }
 

@@ -1,5 +1,5 @@
-//! Every effect that may be missing, as the entry that `add` would write, in variants of the model: their derivation gives
-//! the columns of all.
+//! All candidates: every kind of the library at every possible place, as entries that `add` would write. They are derived together in
+//! three variants of the model, which give their columns.
 //!
 //! Decision: a candidate is the entry that `add` would write, and its columns come from the derivation of that
 //! entry. So there is no second definition of an effect, and effect kinds of a user's own library are tried like
@@ -16,17 +16,20 @@ use crate::model::Model;
 
 use super::places::{CandidatePlace, candidate_places, is_applicable, place_sets};
 
-/// Values of a constant that are tried where the search has no scale of its own.
+/// Values of a constant that are tried on an even grid.
 const TRIED: usize = 15;
-/// Values of a rate that are tried.
+/// Values of a positive constant that are tried on a logarithmic grid.
 const RATES: usize = 14;
-/// Wavelengths that are tried at most.
+/// Wavelengths that are tried at most for a periodic effect.
 const WAVES: usize = 120;
 
 /// An effect as one entry of a model file.
 pub(crate) struct SingleCandidate {
+    /// Index of its kind.
     pub kind: usize,
+    /// Its places.
     pub spots: Vec<CandidatePlace>,
+    /// How often its columns are evaluated.
     pub sort: EvaluationFrequency,
     /// Symbols of its parameters with their positions among those of its variant.
     pub parameters: Vec<(String, usize)>,
@@ -46,27 +49,33 @@ impl SingleCandidate {
     }
 }
 
-/// A candidate: entries whose columns add up, since they share their parameters.
+/// A candidate: the sum of entries that share their parameters.
 pub(crate) struct CandidateEntry {
+    /// Indices of the entries.
     pub singles: Vec<usize>,
 }
 
-/// A kind that is a change of the model rather than columns of its own.
+/// A kind that changes the model instead of adding columns: tilt or delay.
 pub(crate) struct ChangeCandidate {
+    /// Index of the kind.
     pub kind: usize,
+    /// Its place.
     pub spot: CandidatePlace,
 }
 
 /// All candidates of a model, derived.
 pub(crate) struct DerivedCandidates {
+    /// Kinds of the libraries.
     pub kinds: Vec<EffectKind>,
+    /// Effects as single entries of a model file.
     pub singles: Vec<SingleCandidate>,
+    /// Candidates, each the sum of single entries.
     pub entries: Vec<CandidateEntry>,
     /// Effects whose constants are known.
     pub known: Derivation,
-    /// Effects with constants that are searched for, whose columns are evaluated again and again.
+    /// Effects with constants that are searched for; their columns are evaluated for each value.
     pub searched: Derivation,
-    /// Effects that depend on what the drives carry.
+    /// Effects that depend on the load of the drives, such as load-dependent friction.
     pub load_dependent: Derivation,
     /// The base columns as functions of a tilt about x, y and z, whose constants are the last three; with its kind.
     pub tilt: Option<(ChangeCandidate, Derivation)>,
@@ -81,7 +90,7 @@ pub(crate) enum EvaluationFrequency {
     Known,
     /// For every value of a constant.
     Searched,
-    /// Whenever a fit says anew what the drives carry.
+    /// Again after each fit, since they depend on the load of the drives.
     LoadDependent,
 }
 
@@ -98,8 +107,10 @@ pub(crate) fn candidates(model: &Model) -> Outcome<DerivedCandidates> {
         let fitting: Vec<&CandidatePlace> = all
             .iter()
             .filter(|spot| is_applicable(mechanism, kind, spot))
+            // Effects that the model has already are no candidates; pairs are checked below.
             .filter(|spot| kind.places == Some(2) || !has_effect(mechanism, kind, &[*spot]))
             .collect();
+        // Tilt and delay change all columns of the model, so they are derived separately.
         if let Some(mechanics @ (Mechanics::Tilt | Mechanics::Delay)) = kind.mechanics {
             if let Some(spot) = fitting.first() {
                 let change = ChangeCandidate {
@@ -113,7 +124,7 @@ pub(crate) fn candidates(model: &Model) -> Outcome<DerivedCandidates> {
             }
             continue;
         }
-        // What must be known and is not cannot be tried.
+        // A kind with a constant that is neither known nor searched for cannot be tried.
         if kind
             .constants
             .iter()
@@ -121,6 +132,7 @@ pub(crate) fn candidates(model: &Model) -> Outcome<DerivedCandidates> {
         {
             continue;
         }
+        // Sums refer to the single entries of this kind by their position after the earlier ones.
         let first = singles.len();
         let (places, sums) = place_sets(mechanism, kind, &fitting, &all);
         for spots in places {
@@ -137,6 +149,7 @@ pub(crate) fn candidates(model: &Model) -> Outcome<DerivedCandidates> {
             });
         }
     }
+    // Effects of the model itself come first in the derivation of each variant.
     let own = mechanism.effects.len();
     let [known, searched, carried] = variants;
     let known = known.derive(model, own, &mut singles)?;
@@ -210,16 +223,19 @@ pub(crate) fn is_load_dependent(kind: &EffectKind) -> bool {
     words.any(|word| word == "load")
 }
 
-/// The model with effects besides.
+/// The model with further effects.
 #[derive(Default)]
 pub(crate) struct CandidateVariant {
+    /// Constants of the effects, with names of their own.
     constants: Vec<ModelConstant>,
+    /// The effects.
     effects: Vec<AddedEffect>,
-    /// Which candidates it holds, in order.
+    /// Indices of their single entries, in the same order.
     singles: Vec<usize>,
 }
 
 impl CandidateVariant {
+    /// Adds an entry as candidate `number`; its parameters and constants get names with that number.
     pub(crate) fn add(
         &mut self,
         mechanism: &Mechanism,
@@ -282,7 +298,7 @@ impl CandidateVariant {
         };
         let mut derivation = modelmill_codegen::derive_columns(mechanism, &is_wanted)
             .map_err(|error| Error::derivation(&model.path, error))?;
-        // One candidate without a finite value somewhere must not stop the others: who looks at the columns leaves it out.
+        // One candidate without a finite value must not stop the others: it is left out when its columns are checked.
         let guards = &mut derivation.programs.regressor.guards;
         guards.retain(|guard| !matches!(guard, PoseGuard::Finite(_)));
         Ok(derivation)
@@ -315,6 +331,7 @@ pub(crate) fn derive_tilt(model: &Model) -> Outcome<Derivation> {
         .map_err(|error| Error::derivation(&model.path, error))
 }
 
+/// A constant of a variant.
 fn named_constant(name: &str, value: f64, unit: &str) -> ModelConstant {
     ModelConstant {
         name: name.to_owned(),
@@ -325,8 +342,8 @@ fn named_constant(name: &str, value: f64, unit: &str) -> ModelConstant {
     }
 }
 
-/// Values that are tried for the constant that a candidate searches for, given the largest rate and the travel of its place;
-/// one where there is none.
+/// Values that are tried for the constant of a candidate, for a largest rate (per s) and a travel of its place; one value without such a
+/// constant.
 pub(crate) fn grid(single: &SingleCandidate, [rate, travel]: [f64; 2]) -> Vec<f64> {
     for (_, _, search) in &single.constants {
         let ConstantSearch::Range { from, to, of } = *search else {
@@ -345,9 +362,9 @@ pub(crate) fn grid(single: &SingleCandidate, [rate, travel]: [f64; 2]) -> Vec<f6
             continue;
         }
         return match of {
-            // Waves differ by how often they fit into the travel.
+            // The grid is even in the number of waves per travel, since that is what distinguishes them.
             Scale::Travel if from > 0.0 => {
-                // So many that neighbours differ by less than half a wave over the travel.
+                // Neighbours differ by less than 0.4 waves over the travel, so that no wavelength is missed between them.
                 let (few, many) = (1.0 / to, 1.0 / from);
                 let count = (2..WAVES).find(|n| (many - few) / (*n as f64) < 0.4);
                 let waves = evenly(count.unwrap_or(WAVES), few, many);

@@ -1,4 +1,5 @@
-//! An effect that the user names, derived like a candidate, with its columns along recordings.
+//! An effect that the user names, such as `coulomb_friction@motor:Fc=25.9`: it is derived like a candidate. Output are its columns
+//! along recordings.
 
 use modelmill_codegen::ModelEvaluator;
 use modelmill_identify::diagnose::{
@@ -30,12 +31,12 @@ pub struct NamedEffect {
 }
 
 impl NamedEffect {
-    /// Reads `KIND@PLACE,PLACE:NAME=VALUE:NAME=VALUE`.
+    /// Reads `KIND@PLACE,PLACE:NAME=VALUE:NAME=VALUE`, values in SI units.
     ///
-    /// Fails with what is expected.
+    /// Fails with a message that gives the expected form.
     pub fn parse(text: &str) -> Result<Self, String> {
         let expected = || {
-            "expected KIND@PLACE, such as coulomb_friction@motor, several places with commas, values behind colons: \
+            "expected KIND@PLACE, such as coulomb_friction@motor. Write several places with commas, and values after colons: \
              coulomb_friction@motor:Fc=25.9"
                 .to_owned()
         };
@@ -52,7 +53,7 @@ impl NamedEffect {
             return Err(expected());
         }
         if let Some(twice) = (0..at.len()).find(|k| at[..*k].contains(&at[*k])) {
-            return Err(format!("`{}` is named twice", at[twice]));
+            return Err(format!("the place `{}` is given twice", at[twice]));
         }
         let mut values: Vec<(String, f64)> = Vec::new();
         for part in parts {
@@ -60,10 +61,10 @@ impl NamedEffect {
             let symbol = symbol.trim();
             let value = match value.trim().parse::<f64>() {
                 Ok(value) if value.is_finite() => value,
-                _ => return Err(format!("`{}` is no finite number", value.trim())),
+                _ => return Err(format!("`{}` is not a finite number", value.trim())),
             };
             if values.iter().any(|(known, _)| known == symbol) {
-                return Err(format!("`{symbol}` has two values"));
+                return Err(format!("`{symbol}` is given two values"));
             }
             values.push((symbol.to_owned(), value));
         }
@@ -77,21 +78,22 @@ impl NamedEffect {
     }
 }
 
-/// Whether constants of an effect that have no given value are searched for or have their usual one.
+/// How constants without a given value are determined.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum ConstantPolicy {
-    /// Searched for.
+    /// They are searched for.
     Searched,
-    /// The library's usual value.
+    /// They have the default value of the library.
     Usual,
 }
 
-/// A derived effect.
+/// A named effect with its derivation.
 pub(crate) struct ChosenEffect {
     /// What the user named.
     pub named: NamedEffect,
     /// Its kind.
     pub kind: EffectKind,
+    /// Its derivation, in the form of candidates.
     candidates: DerivedCandidates,
 }
 
@@ -111,14 +113,14 @@ pub(crate) fn derive_effect(
     let kind = kind.ok_or_else(|| Error::input(format!("unknown kind {:?}", named.effect)))?;
     if kind.mechanics == Some(Mechanics::Delay) {
         return Err(Error::input(format!(
-            "`{}` moves all forces in time and adds none of its own, so that no motion can be sought along which its force \
-             differs; record fast and slow passages, and reversals at high acceleration",
+            "`{}` only delays all forces and adds none, so no motion can be planned that makes its force large. Record fast and \
+             slow passages, and reversals at high acceleration",
             kind.name
         )));
     }
     let all = candidate_places(mechanism);
     let of_kind = named.effect.at.iter().enumerate().map(|(k, place)| {
-        // The other place of a kind is where it does not act.
+        // The second place of a kind is only an argument of its expression; the effect does not act there.
         let moves = |one: &&CandidatePlace| {
             one.name == *place && matches!(one.sort, ActsOn::Drive | ActsOn::Coordinate)
         };
@@ -142,6 +144,7 @@ pub(crate) fn derive_effect(
         let given = fixed_constants(&kind, named, constants)?;
         let all: Vec<EffectPlace> = places.iter().map(|spot| spot.place).collect();
         let grouped = kind.mechanics.and_then(|one| one.groups(mechanism, &all));
+        // A kind for two places, or a mechanics that joins places, is one entry for all of them.
         let joined = kind.places.is_some() || grouped.is_some();
         let together = if joined { places.len() } else { 1 };
         for group in places.chunks(together) {
@@ -172,7 +175,7 @@ pub(crate) fn derive_effect(
     })
 }
 
-/// What `add` would refuse.
+/// Fails for what `add` would refuse: an unknown kind, place or symbol, or an effect that the model has.
 fn check_effect(model: &Model, named: &NamedEffect) -> Outcome {
     let kinds = &model.loaded.kinds;
     let mut effect = NewEffect {
@@ -187,7 +190,7 @@ fn check_effect(model: &Model, named: &NamedEffect) -> Outcome {
         for (symbol, value) in &named.values {
             if !known.contains(&symbol.as_str()) {
                 return Err(Error::input(format!(
-                    "`{}` has no `{symbol}`; known are {}",
+                    "`{}` has no parameter or constant `{symbol}`; it has {}",
                     kind.name,
                     known.join(", ")
                 )));
@@ -196,7 +199,7 @@ fn check_effect(model: &Model, named: &NamedEffect) -> Outcome {
                 effect.constants.push((symbol.clone(), *value));
             }
         }
-        // What must have a value is looked for, so that any will do here.
+        // A constant without a value is searched for later, so any value will do for this check.
         for one in kind.constants.iter().filter(|c| c.value.is_none()) {
             if effect
                 .constants
@@ -207,6 +210,7 @@ fn check_effect(model: &Model, named: &NamedEffect) -> Outcome {
             }
         }
     }
+    // The edit is only tried; its result is not used.
     model.host().edit(&model.path, model.text(), &effect)?;
     Ok(())
 }
@@ -222,17 +226,17 @@ fn find_place(
     if let Some(spot) = all.iter().find(suits) {
         return Ok(spot.clone());
     }
-    // A joint with a drive of its own is known by the drive.
+    // A joint with a drive has the name of the drive.
     let drive = mechanism.drives.iter().find(|drive| match drive.kind {
         DriveKind::Joint(i) => mechanism.coordinates[i.0].name == name,
         DriveKind::Linear { .. } => false,
     });
     let advice = match drive {
         Some(drive) if kind.on.contains(&ActsOn::Drive) => format!(
-            "it is the joint of the drive `{}`; name that instead",
+            "this is the joint of the drive `{}`; name the drive instead",
             drive.name
         ),
-        _ => "it would be without effect there".to_owned(),
+        _ => "it has no effect there".to_owned(),
     };
     Err(Error::input(format!(
         "`{}` at `{name}`: {advice}",
@@ -240,8 +244,8 @@ fn find_place(
     )))
 }
 
-/// Constants with a value: those that are given and, where nothing is searched for, the usual ones. The position of rest
-/// of a spring and its like are found with the parameters in any case.
+/// Constants with a value: given ones and, if none are searched for, default ones. Constants that enter linearly, such as the neutral
+/// position of a spring, are always estimated with the parameters.
 fn fixed_constants(
     kind: &EffectKind,
     named: &NamedEffect,
@@ -268,7 +272,7 @@ fn fixed_constants(
             (None, ConstantPolicy::Searched, Some(_), _) | (None, _, None, Some(_)) => {}
             (None, ..) => {
                 return Err(Error::input(format!(
-                    "`{}` has no usual value of `{symbol}`; write {}@{}:{symbol}=VALUE",
+                    "`{}` has no default value of `{symbol}`; give one with {}@{}:{symbol}=VALUE",
                     kind.name,
                     kind.name,
                     named.effect.at.join(","),
@@ -281,8 +285,8 @@ fn fixed_constants(
 }
 
 impl ChosenEffect {
-    /// The effect along recordings, with its columns for each value of a constant that is searched for; `None` if it has no
-    /// effect. `load` is what the drives carry.
+    /// The effect along recordings, with its columns for each value of a constant that is searched for; `None` if all columns are zero.
+    /// `load` is the force that the drives transmit, N or N m.
     pub(crate) fn candidate(
         &self,
         model: &Model,
@@ -293,8 +297,8 @@ impl ChosenEffect {
         let grids = std::mem::take(&mut made.grids);
         if let Some(effect) = made.undefined.first() {
             return Err(Error::input(format!(
-                "`{}` at {} has no finite value somewhere along the motion; look at the quotients, roots and exponentials \
-                 of its expression",
+                "`{}` at {} has no finite value at some samples of the motion. Check the quotients, roots and exponentials of \
+                 its expression",
                 effect.kind,
                 effect.at.join(", ")
             )));
@@ -318,6 +322,7 @@ impl ChosenEffect {
                     .next()
                     .map_or_else(Vec::new, |(_, choices)| choices)
             }
+            // A tilt has one column for each axis: the change of all base_columns columns times their nominal values.
             ColumnSource::Tilt(tilt) => {
                 let level = vec![0.0; tilt.axes.len()];
                 let sum = |direction: [f64; 3]| {
@@ -338,19 +343,20 @@ impl ChosenEffect {
         Ok(Some((candidate, choices)))
     }
 
-    /// Whether its force follows from the model's nominal values.
+    /// Whether its columns depend on the nominal values of the model.
     pub(crate) fn needs_nominal(&self) -> bool {
         self.candidates.tilt.is_some() || is_load_dependent(&self.kind)
     }
 }
 
-/// Columns of the base that are to be found, what the bodies of the nominal model carry, and the force of what is known.
+/// Columns of the base parameters to estimate, the load of the nominal bodies, and the force of the known parameters.
 pub(crate) fn base_columns(
     model: &Model,
     all: &SegmentList<'_>,
 ) -> Outcome<(Vec<ForceColumn>, ForceColumn, ForceColumn)> {
     let every = regressor(all, &ModelEvaluator::new(&model.derivation), model)?;
     let none = ForceColumn(vec![None; model.drives().len()]);
+    // The load is the force of all bodies; the known force is subtracted before a fit.
     let (mut load, mut known) = (none.clone(), none);
     let mut free = Vec::new();
     for (k, column) in every.into_iter().enumerate() {

@@ -1,4 +1,4 @@
-//! Columns of all candidates along the recordings, for every choice of their constants.
+//! Columns (forces per unit of a parameter) of all candidates along the recordings, for every value of their constants.
 
 use modelmill_codegen::ModelEvaluator;
 use modelmill_identify::diagnose::{
@@ -21,10 +21,10 @@ use super::places::CandidatePlace;
 use super::tilt::{TILTS, tilt};
 use crate::regressors::{SegmentList, regressor_of};
 
-/// The kind that is a force of one times its parameter.
+/// The kind whose column is a constant force of one.
 const CONSTANT: &str = "force_offset";
 
-/// Candidates with their columns; where each comes from is said in the same order.
+/// Candidates with their columns, and the origin of each in the same order.
 pub(crate) fn candidate_columns(
     candidates: &DerivedCandidates,
     model: &Model,
@@ -37,17 +37,18 @@ pub(crate) fn candidate_columns(
             .any(|c| c.2 == ConstantSearch::Linear)
     };
     let grids = grids(candidates, model, all)?;
-    // Nothing changes in a second round where no constant does.
+    // Without linear constants one evaluation of the known effects is enough.
     let of_known = if candidates.singles.iter().any(is_linear) {
         2
     } else {
         1
     };
-    // `found[single][round]`; columns that are linear in a constant are looked at for its values 0 and 1.
+    // `found[single][round]`; columns that are linear in a constant are evaluated at its values 0 and 1.
     let longest = grids.iter().map(Vec::len).max().unwrap_or(1);
     let rounds = (0..of_known)
         .map(|round| (EvaluationFrequency::Known, round))
         .chain((0..longest).map(|round| (EvaluationFrequency::Searched, round)));
+    // Each round evaluates all candidates once, with one value of each constant; rounds run in parallel.
     let jobs: Vec<(EvaluationFrequency, usize, Vec<usize>)> = rounds
         .map(|(sort, round)| {
             let takes_part = |k: &usize| {
@@ -88,7 +89,7 @@ pub(crate) fn candidate_columns(
             undefined.push(effect(candidates, entry));
         }
     }
-    // They are in the candidates now.
+    // The candidates have copies, so this memory can be freed before the tilt is computed.
     drop(found);
     if let Some((change, derivation)) = &candidates.tilt {
         let tilt = tilt(derivation, model, all)?;
@@ -155,7 +156,7 @@ fn is_finite(column: &ForceColumn) -> bool {
     values.all(|x| x.is_finite())
 }
 
-/// What an entry would add, and where.
+/// Kind and places of an entry.
 fn effect(candidates: &DerivedCandidates, entry: &CandidateEntry) -> LocatedEffect {
     let first = &candidates.singles[entry.singles[0]];
     let singles = entry.singles.iter().map(|k| &candidates.singles[*k]);
@@ -166,11 +167,12 @@ fn effect(candidates: &DerivedCandidates, entry: &CandidateEntry) -> LocatedEffe
     }
 }
 
-/// Largest rate and travel of the place of each single candidate. Places that may share a constant look for it on one grid,
-/// that of the place that moves most.
+/// Largest rate and travel of the place of each single candidate. Places that may share a constant use one grid, that of the place that
+/// moves most.
 fn shared_scales(candidates: &DerivedCandidates, motions: &PlaceMotions) -> Vec<[f64; 2]> {
     let own = |single: &SingleCandidate| motions.scale(single.spots[0].place);
     let mut scales: Vec<[f64; 2]> = candidates.singles.iter().map(own).collect();
+    // A scale spreads over entries that share places, until nothing changes.
     loop {
         let before = scales.clone();
         for entry in &candidates.entries {
@@ -188,9 +190,9 @@ fn shared_scales(candidates: &DerivedCandidates, motions: &PlaceMotions) -> Vec<
 
 /// Candidates in numbers.
 pub(crate) struct CandidateColumns {
-    /// Those that have columns.
+    /// Candidates with at least one column that is not zero.
     pub(crate) candidates: Vec<CandidateEffect>,
-    /// Where each comes from, in the same order.
+    /// Their origins, in the same order.
     pub(crate) origins: Vec<CandidateOrigin>,
     /// Effects whose expressions have no finite value somewhere along the recordings.
     pub(crate) undefined: Vec<LocatedEffect>,
@@ -202,6 +204,7 @@ pub(crate) struct CandidateColumns {
 /// where it changes the model rather than adds columns.
 pub(crate) type CandidateOrigin = Option<(usize, Vec<bool>)>;
 
+/// A candidate that changes the model instead of adding columns.
 fn change_candidate(
     candidates: &DerivedCandidates,
     change: &ChangeCandidate,
@@ -238,6 +241,7 @@ fn single_columns(
         EvaluationFrequency::LoadDependent => &candidates.load_dependent,
     };
     let mechanism = &derivation.mechanism;
+    // Nominal constants, with the given values for the searched ones.
     let mut constants: Vec<f64> = mechanism.constants.iter().map(|c| c.value).collect();
     for k in which {
         for (_, name, search) in &candidates.singles[*k].constants {
@@ -257,7 +261,7 @@ fn single_columns(
         parameters.any(|(_, parameter)| holds(reduction.retained[k], *parameter))
     };
     let columns = regressor_of(all, &evaluator, model, &wanted)?;
-    // Where a parameter stands in products, as a mass whose place is one, the others have their nominal values.
+    // In products with other parameters, such as a mass at an unknown place, the others have their nominal values.
     let of = |(_, parameter): &(String, usize)| -> ForceColumn {
         let mut sum = ForceColumn(vec![None; model.drives().len()]);
         for (k, product) in reduction.retained.iter().enumerate() {
@@ -279,7 +283,7 @@ fn single_columns(
         .collect())
 }
 
-/// What the drives must supply for a force or torque of one at each place where the library puts a constant one.
+/// Forces of the drives for a constant force or torque of one at each place where the library has a force offset.
 pub(crate) fn unit_forces(
     candidates: &DerivedCandidates,
     model: &Model,
@@ -328,6 +332,7 @@ fn candidate(
         })
         .collect();
     let effect = effect(candidates, entry);
+    // Columns that depend on the load are computed later, for the load of the current fit.
     if first.sort == EvaluationFrequency::LoadDependent {
         let felt = vec![true; parameters.len()];
         let candidate = CandidateEffect {
@@ -370,6 +375,7 @@ fn candidate(
         .iter()
         .find(|c| c.2 == ConstantSearch::Linear);
     if let (None, Some((symbol, _, _))) = (searched, linear) {
+        // A column is affine in a linear constant, so the difference of its values at 1 and 0 is the column of the product.
         let mut shifts = sum(1);
         for (shift, column) in shifts.iter_mut().zip(&choices[0].columns) {
             shift.add(-1.0, column);
@@ -383,11 +389,12 @@ fn candidate(
             choices[0].columns.push(shift);
         }
     }
+    // Values of the constant for which a column is not finite are not tried.
     choices.retain(|choice| choice.columns.iter().all(is_finite));
     if choices.is_empty() {
         return None;
     }
-    // Parameters without any effect, such as a mass on the base, are none.
+    // Parameters without any effect, such as a mass on the base, are left out.
     let felt: Vec<bool> = (0..parameters.len())
         .map(|p| choices.iter().any(|choice| !choice.columns[p].is_zero()))
         .collect();
@@ -413,13 +420,13 @@ fn candidate(
     Some((candidate, felt))
 }
 
-/// Whether what a kind adds is part of what the drives carry.
+/// Whether the force of a kind is part of the load of the drives.
 fn is_part_of_load(kind: &EffectKind) -> bool {
     (kind.mechanics).map_or(kind.on.contains(&ActsOn::Point), Mechanics::is_part_of_load)
 }
 
-/// Columns of candidates that depend on what the drives carry, of all or of one entry, for loads that are stacked and decimated
-/// like the forces, and for some values of each single candidate's constant.
+/// Columns of candidates that depend on the load of the drives, of all or of one entry. Loads are stacked and decimated like the forces;
+/// `tried` gives the values of the constant of each single candidate.
 pub(crate) fn load_dependent_columns(
     candidates: &DerivedCandidates,
     model: &Model,
@@ -437,6 +444,7 @@ pub(crate) fn load_dependent_columns(
     if which.is_empty() {
         return Ok(Vec::new());
     }
+    // Loads of all recordings are stacked; each recording gets its own part, interpolated to all of its samples.
     let mut start = 0;
     let mut loaded = Vec::new();
     for (one, is_check) in all {
@@ -495,7 +503,7 @@ pub(crate) fn load_dependent_columns(
                     column.add(1.0, more);
                 }
             }
-            // Along these loads it says nothing.
+            // A column without finite values for these loads counts as zero.
             if !columns.iter().all(is_finite) {
                 columns.fill(ForceColumn(vec![None; model.drives().len()]));
             }
@@ -512,7 +520,7 @@ pub(crate) fn load_dependent_columns(
     Ok(made)
 }
 
-/// Values between samples of which every n-th was kept.
+/// Linear interpolation between samples of which every `factor`-th was kept.
 fn interpolate(kept: &[f64], factor: usize, samples: usize) -> Vec<f64> {
     let last = kept.len().saturating_sub(1);
     let at = |i: usize| {

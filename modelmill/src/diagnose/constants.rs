@@ -1,5 +1,5 @@
-//! Lengths and angles of the model that may be wrong: what the forces of its base parameters change by with each of its constants,
-//! by central differences. While base parameters are held they hide what a constant does to them, and nothing is asked.
+//! Candidates for a wrong length or angle of the model: first and second derivatives of the base columns by each constant, by
+//! central differences. There are none if all base parameters are fixed, since these depend on the constants too.
 
 use modelmill_codegen::ModelEvaluator;
 use modelmill_identify::diagnose::{
@@ -11,11 +11,12 @@ use crate::model::Model;
 use crate::regressors::{SegmentList, regressor};
 
 use super::payloads::reach;
+use super::thresholds::CONSTANT_LEAST_EFFECT;
 
 /// Steps of the differences: this part of the machine's size, or of a radian.
 const STEP: f64 = 1e-3;
 
-/// An error of every constant that is a length or an angle; `is_held` says which base parameters are known.
+/// A candidate for the error of each length and angle; `is_held` is true for base parameters that are fixed.
 pub(crate) fn constants(
     model: &Model,
     all: &SegmentList<'_>,
@@ -44,7 +45,7 @@ pub(crate) fn constants(
             "rad" => STEP,
             _ => continue,
         };
-        // With another length the mechanism may not close along the recordings.
+        // With another length the loops may not close along the recordings.
         let (Ok(back), Ok(ahead)) = (along(k, -step), along(k, step)) else {
             continue;
         };
@@ -52,6 +53,7 @@ pub(crate) fn constants(
             middle = along(k, 0.0).ok();
         }
         let Some(middle) = &middle else { continue };
+        // First and second derivative; fixed base parameters are summed with their nominal values.
         let [mut slope, mut bend] = [(); 2].map(|()| ForceSensitivity {
             base: Vec::new(),
             fixed: ForceColumn(vec![None; model.drives().len()]),
@@ -65,6 +67,7 @@ pub(crate) fn constants(
                 without_rounding(sum)
             };
             let first = 0.5 / step;
+            // The central second difference.
             let second = 1.0 / (step * step);
             let first = sum([(first, &ahead[p]), (0.0, middle), (-first, &back[p])]);
             let second = sum([
@@ -107,13 +110,11 @@ pub(crate) fn constants(
     candidates
 }
 
-/// Differences below this are rounding.
-const ROUNDING: f64 = 1e-7;
-
+/// The column without channels that are rounding only.
 fn without_rounding(mut column: ForceColumn) -> ForceColumn {
     for slot in &mut column.0 {
         let most = slot.iter().flatten().fold(0.0_f64, |m, x| m.max(x.abs()));
-        if most < ROUNDING {
+        if most < CONSTANT_LEAST_EFFECT {
             *slot = None;
         }
     }

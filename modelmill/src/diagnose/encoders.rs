@@ -1,7 +1,6 @@
-//! Encoders that err: by a zero that is not the model's, or as they turn, since an eccentric disc reads the position too large
-//! and too small once or several times a turn; and the model takes that for motion. What forces change by with each reading, its
-//! rate and its acceleration is had by central differences of the fitted model, so that any error along the motion is a sum of
-//! three products.
+//! Candidates for errors of encoders: a wrong zero, or an eccentric disc whose error repeats once or several times per turn. The
+//! derivatives of the forces by position, rate and acceleration come from central differences of the fitted model. The force of any
+//! small error of the motion is then a sum of three products.
 
 use modelmill_identify::changes::NormalEquations;
 use modelmill_identify::diagnose::{
@@ -16,18 +15,16 @@ use crate::stretch::RecordingSegment;
 use super::numbers::stack;
 use super::places::is_free;
 use super::problem::FixedParameters;
+use super::thresholds::{ENCODER_WAVE_SAMPLES, SLOPE_JUMP_MEDIANS};
 use crate::regressors::SegmentList;
 
-/// How often an error may come again in a turn, or along the travel of a coordinate that slides.
+/// How often an error may repeat per turn, or along the travel of a prismatic coordinate.
 const TIMES: [u32; 16] = [1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 30, 36, 48, 60];
 /// Steps of the differences, as parts of the largest value.
 const STEP: f64 = 1e-5;
-/// Samples that an error must take at least for each of its waves.
-const SAMPLES_PER_WAVE: f64 = 12.0;
-/// Beyond so many times its middle size a difference has met a sign that jumped.
-const JUMPED: f64 = 100.0;
 
-/// What forces change by with position, rate and acceleration of every active coordinate, for base parameters.
+/// Derivatives of the forces by position, rate and acceleration of every active coordinate, for given base parameters; `None` if the
+/// forces cannot be evaluated next to the recorded motion.
 pub(crate) fn sensitivities(
     model: &Model,
     all: &SegmentList<'_>,
@@ -39,7 +36,7 @@ pub(crate) fn sensitivities(
         .collect()
 }
 
-/// What the positions of each encoder read too much throughout; a free body has none.
+/// Candidates for a constant offset of each encoder; a free body has no encoder.
 pub(crate) fn zeros(model: &Model, slopes: &[Option<[ForceColumn; 3]>]) -> Vec<CandidateEffect> {
     let (active, _) = model.derivation.coordinates();
     let has_encoder = |i: &usize| !is_free(&model.derivation.mechanism, *i);
@@ -83,7 +80,7 @@ fn disturbance(kind: &str, name: String, symbols: &[&str], is_angle: bool) -> Ca
     }
 }
 
-/// An error of each encoder with sine and cosine of its angle, for each number of waves that may be.
+/// Candidates for an error of each encoder with sine and cosine of its angle, for each possible number of waves per turn.
 pub(crate) fn encoders(
     model: &Model,
     all: &SegmentList<'_>,
@@ -114,6 +111,7 @@ pub(crate) fn encoders(
         };
         let step = problem.layout.segments.iter().map(|s| s.step);
         let step = step.fold(f64::MIN_POSITIVE, f64::max);
+        // A prismatic coordinate has no turn: its error repeats along the travel.
         let turn = if *is_angle {
             std::f64::consts::TAU
         } else {
@@ -121,12 +119,14 @@ pub(crate) fn encoders(
         };
         let choice = |times: u32| {
             let k = std::f64::consts::TAU * f64::from(times) / turn;
-            if k * fastest * step > std::f64::consts::TAU / SAMPLES_PER_WAVE {
+            // At the largest rate a wave must have enough samples, or the low-pass would remove it.
+            if k * fastest * step > std::f64::consts::TAU / ENCODER_WAVE_SAMPLES {
                 return None;
             }
             let wave = |phase: f64| {
                 let error = |j: usize| {
                     let (sin, cos) = (k * q[j] + phase).sin_cos();
+                    // Error of the position, and its first and second derivative in time.
                     let rate = k * cos * qd[j];
                     [sin, rate, k * cos * qdd[j] - k * k * sin * qd[j] * qd[j]]
                 };
@@ -145,6 +145,7 @@ pub(crate) fn encoders(
             };
             Some(ColumnChoice {
                 constants: vec![("times_per_turn".to_owned(), f64::from(times))],
+                // Sine and cosine, so that the phase is estimated linearly.
                 columns: vec![wave(0.0), wave(0.5 * std::f64::consts::PI)],
             })
         };
@@ -166,7 +167,7 @@ pub(crate) fn encoders(
     candidates
 }
 
-/// Base parameters by least squares, drives weighed alike; those that are held keep their nominal values.
+/// Base parameters by least squares, with each drive weighted by its squared force; fixed ones keep their nominal values.
 pub(crate) fn values(model: &Model, problem: &DiagnosisProblem, held: FixedParameters) -> Vec<f64> {
     let mut all = NormalEquations::new(problem.base.len());
     for (d, measured) in problem.measured.0.iter().enumerate() {
@@ -174,6 +175,7 @@ pub(crate) fn values(model: &Model, problem: &DiagnosisProblem, held: FixedParam
         let mut one = NormalEquations::new(problem.base.len());
         let columns: Vec<Option<&[f64]>> = problem.base.iter().map(|c| c.0[d].as_deref()).collect();
         one.add_rows(&columns, measured);
+        // Each drive counts alike, whatever its force.
         let weight = one.total.max(f64::MIN_POSITIVE).recip();
         one.gram *= weight;
         one.rhs *= weight;
@@ -192,8 +194,8 @@ pub(crate) fn values(model: &Model, problem: &DiagnosisProblem, held: FixedParam
         .collect()
 }
 
-/// What forces change by with a position, its rate and its acceleration, decimated; `None` where the model does not hold
-/// beside the recording.
+/// Derivatives of the forces by a position, its rate and its acceleration, decimated; `None` if the forces cannot be evaluated next to
+/// the recorded motion.
 fn sensitivity(
     model: &Model,
     all: &SegmentList<'_>,
@@ -225,9 +227,10 @@ fn sensitivity(
         let pairs = ahead.into_iter().zip(back);
         let slope = pairs.map(|(ahead, back)| {
             let mut slope: Vec<f64> = ahead.iter().zip(&back).map(|(a, b)| a - b).collect();
+            // The median, since jumps of signs are rare but large.
             let mut sizes: Vec<f64> = slope.iter().map(|x| x.abs()).collect();
             sizes.sort_by(f64::total_cmp);
-            let bound = JUMPED * sizes.get(sizes.len() / 2).copied().unwrap_or(0.0);
+            let bound = SLOPE_JUMP_MEDIANS * sizes.get(sizes.len() / 2).copied().unwrap_or(0.0);
             for x in slope.iter_mut().filter(|x| x.abs() > bound) {
                 *x = 0.0;
             }

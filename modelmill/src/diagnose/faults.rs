@@ -1,5 +1,5 @@
-//! What is known to be wrong with recordings before anything is looked for: pushes, coarse readings, and what another recording
-//! of the machine does not share. All of it is told, and none of it is left to be taken for an effect.
+//! Faults of recordings that are known before the search: contacts, coarse quantisation, and differences between recordings of the
+//! machine. All are reported and subtracted or left out, so that none is mistaken for an effect.
 
 use modelmill_identify::changes::NormalEquations;
 use modelmill_identify::diagnose::{
@@ -11,20 +11,13 @@ use crate::model::Model;
 use crate::recording::PreparedRecording;
 use crate::runs::{PhysicalChange, RecordingDifference, differences};
 
+use super::thresholds::{
+    CONTACT_GAP_S, CONTACT_MARGIN_S, CONTACT_SHORTEST_S, REPEATED_PLACE_FEWEST_SAMPLES,
+    REPEATED_PLACE_MOST_RESIDUAL,
+};
 use crate::regressors::SegmentList;
 
-/// About a push so long is left out on either side, s.
-const MARGIN: f64 = 0.15;
-/// A push that lasts less is none, s.
-const SHORTEST: f64 = 0.18;
-/// Pushes closer together are one, s.
-const TOGETHER: f64 = 0.3;
-/// Samples beyond a place at other times that say whether a force comes again there.
-const FEWEST_BEYOND: usize = 10;
-/// A law of a place, found during an event, leaves less than this part of squares at other times.
-const COMES_AGAIN: f64 = 0.5;
-
-/// What later recordings do not share with the first one; nothing where that cannot be said.
+/// Differences of later recordings from the first one; none if they cannot be compared.
 pub(crate) fn run_differences(
     model: &Model,
     recordings: &[&PreparedRecording],
@@ -35,7 +28,7 @@ pub(crate) fn run_differences(
     differences(model, recordings).unwrap_or_default()
 }
 
-/// Takes what is known off a problem, and tells it there.
+/// Subtracts known faults from the measured forces of a problem, and adds them to its disturbances.
 pub(crate) fn subtract_known(
     problem: &mut DiagnosisProblem,
     model: &Model,
@@ -44,6 +37,7 @@ pub(crate) fn subtract_known(
 ) -> Outcome<()> {
     problem.removed.resize(model.drives().len(), 0.0);
     let samples = problem.layout.samples().max(1) as f64;
+    // Differences between recordings are subtracted, and their power is counted as removed.
     for one in between {
         for (d, force) in one.force.0.iter().enumerate() {
             let (Some(force), Some(measured)) = (force, &mut problem.measured.0[d]) else {
@@ -57,7 +51,7 @@ pub(crate) fn subtract_known(
             }
             problem.removed[d] += force.iter().map(|f| f * f).sum::<f64>() / samples;
         }
-        problem.disturbances.push(difference_disturbance(one));
+        problem.disturbances.push(difference(one));
     }
     add_quantisation_noise(problem, model, all)?;
     remove_contact_events(problem, all);
@@ -84,8 +78,8 @@ pub(crate) fn subtract_known(
     Ok(())
 }
 
-/// A difference of two recordings by name.
-fn difference_disturbance(one: &RecordingDifference) -> Disturbance {
+/// A difference of two recordings as a disturbance.
+fn difference(one: &RecordingDifference) -> Disturbance {
     let (_, at, values) = one.changed.change.parts(one.changed.unit);
     let kind = match one.changed.change {
         PhysicalChange::Payload { .. } => "payload_change",
@@ -107,7 +101,7 @@ fn difference_disturbance(one: &RecordingDifference) -> Disturbance {
         recordings: vec![one.first.clone(), one.later.clone()],
         interval: None,
         description: Some(format!(
-            "{} differs between the recordings: in {} beside {}, {}",
+            "{} differs between the recordings, {} compared with {}: {}",
             match one.changed.change {
                 PhysicalChange::Payload { .. } => "the payload",
                 PhysicalChange::Friction { .. } => "the friction",
@@ -124,7 +118,7 @@ fn difference_disturbance(one: &RecordingDifference) -> Disturbance {
     }
 }
 
-/// Forces that are read in steps coarser than their noise: half a step either way is their noise.
+/// Forces with a quantisation step coarser than their noise. Uniform rounding then gives the noise, step / sqrt(12).
 fn add_quantisation_noise(
     problem: &mut DiagnosisProblem,
     model: &Model,
@@ -140,6 +134,7 @@ fn add_quantisation_noise(
         else {
             continue;
         };
+        // Standard deviation of a uniform distribution over one step.
         problem.noise[d] = problem.noise[d].max(step / 12.0_f64.sqrt());
         problem.disturbances.push(Disturbance {
             kind: "quantised_force".to_owned(),
@@ -153,8 +148,8 @@ fn add_quantisation_noise(
     Ok(())
 }
 
-/// Leaves out pushes: events that no place of a coordinate explains. A push does not come again where the state comes again; a
-/// stop does, in any of the recordings.
+/// Leaves out contacts and pushes: events that are not a function of a position. An end stop acts at every visit of its place, a push
+/// only once.
 fn remove_contact_events(problem: &mut DiagnosisProblem, all: &SegmentList<'_>) {
     let events: Vec<Disturbance> = merge_events(all);
     if events.is_empty() {
@@ -168,7 +163,11 @@ fn remove_contact_events(problem: &mut DiagnosisProblem, all: &SegmentList<'_>) 
         };
         for (i, time) in one.time().into_iter().enumerate() {
             inside.push(events.iter().any(|event| is_in(event, time, 0.0)));
-            about.push(events.iter().any(|event| is_in(event, time, MARGIN)));
+            about.push(
+                events
+                    .iter()
+                    .any(|event| is_in(event, time, CONTACT_MARGIN_S)),
+            );
             let at = i * one.decimation();
             positions.push(one.run.q.iter().map(|q| q[at]).collect::<Vec<f64>>());
         }
@@ -184,6 +183,7 @@ fn remove_contact_events(problem: &mut DiagnosisProblem, all: &SegmentList<'_>) 
         let mut of_event = along.iter().zip(&inside).filter(|(_, inside)| **inside);
         let mut of_event: Vec<f64> = of_event.by_ref().map(|(x, _)| *x).collect();
         of_event.sort_by(f64::total_cmp);
+        // The place where the event begins: its tenth percentile, which bears single wrong samples.
         let Some(place) = of_event.get(of_event.len() / 10) else {
             return false;
         };
@@ -199,8 +199,8 @@ fn remove_contact_events(problem: &mut DiagnosisProblem, all: &SegmentList<'_>) 
     problem.disturbances.extend(events);
 }
 
-/// Whether the force of an event is one that acts beyond a place: the line over the depth that it follows during the event says it
-/// at other times too. Where there are no other times nothing speaks for an event. The model is fitted to what is neither.
+/// Whether the force of an event is that of a stop: the line over the depth, fitted during the event, also predicts the force beyond
+/// the place at other times. Without other times the event is not believed. The model is fitted to the samples before the place.
 fn is_force_beyond_place(
     problem: &DiagnosisProblem,
     channel: usize,
@@ -216,6 +216,7 @@ fn is_force_beyond_place(
         .chain(friction.unwrap_or_default())
         .map(|column| column.0[channel].as_deref())
         .collect();
+    // The model is fitted to samples before the place and away from the event.
     let is_elsewhere = |i: usize| !about[i] && depths[i] < 0.0;
     let elsewhere: Vec<usize> = (0..measured.len()).filter(|i| is_elsewhere(*i)).collect();
     let some = |values: &[f64]| -> Vec<f64> { elsewhere.iter().map(|i| values[*i]).collect() };
@@ -236,7 +237,7 @@ fn is_force_beyond_place(
             .collect()
     };
     let (during, otherwise) = (beyond(true), beyond(false));
-    if otherwise.len() < FEWEST_BEYOND {
+    if otherwise.len() < REPEATED_PLACE_FEWEST_SAMPLES {
         return true;
     }
     let Some(line) = fit_line(&during) else {
@@ -244,7 +245,7 @@ fn is_force_beyond_place(
     };
     let left: f64 = otherwise.iter().map(|(x, y)| (y - line(*x)).powi(2)).sum();
     let whole: f64 = otherwise.iter().map(|(_, y)| y * y).sum();
-    left < COMES_AGAIN * whole
+    left < REPEATED_PLACE_MOST_RESIDUAL * whole
 }
 
 /// The straight line through some points by least squares.
@@ -257,7 +258,7 @@ fn fit_line(points: &[(f64, f64)]) -> Option<impl Fn(f64) -> f64 + use<>> {
     (spread > 0.0).then_some(move |at: f64| y + slope * (at - x))
 }
 
-/// Events of all recordings, those that are close together as one, without the short ones.
+/// Contact events of all recordings: close ones are joined, short ones are dropped.
 fn merge_events(all: &SegmentList<'_>) -> Vec<Disturbance> {
     let mut events: Vec<Disturbance> = Vec::new();
     let faults = all.iter().flat_map(|(one, _)| &one.faults);
@@ -266,7 +267,7 @@ fn merge_events(all: &SegmentList<'_>) -> Vec<Disturbance> {
         if let Some(last) = events.last_mut()
             && last.recordings == event.recordings
             && let Some(before) = &mut last.interval
-            && from - before[1] < TOGETHER
+            && from - before[1] < CONTACT_GAP_S
         {
             before[1] = to;
             for place in &event.at {
@@ -281,7 +282,7 @@ fn merge_events(all: &SegmentList<'_>) -> Vec<Disturbance> {
     events.retain(|event| {
         event
             .interval
-            .is_some_and(|[from, to]| to - from >= SHORTEST)
+            .is_some_and(|[from, to]| to - from >= CONTACT_SHORTEST_S)
     });
     events
 }

@@ -1,5 +1,5 @@
-//! What a diagnosis found, as values: the verdict, what is missing with estimates and doubles, the model with what was
-//! found beside the model as it is, and where errors live. Text, JSON and the page print them.
+//! Findings of a diagnosis as values: verdict, missing effects with estimates and alternatives, the model before and after the
+//! effects, and regions where the error is largest. Text, JSON and the page print them.
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{CommandName, Message, OptionName, Remedy};
@@ -26,42 +26,39 @@ use super::laws::{self, LawHypothesis};
 use super::long;
 use super::off_nominal::{OffNominalParameter, off_nominal_parameters, reversed_sign_note};
 use super::problem::{self, DiagnosisQuery, DiagnosisSolution, FixedParameters};
+use super::thresholds::{DIFFERENCE_LEAST_GAIN, MOST_VALIDATION_ERROR};
 use super::versions::ModelVersion;
 use super::words::{self, ValidationMethod};
 
-/// Fails where what is fitted to the recordings misses the forces of others by more than these are: nothing that is found in the
-/// fit holds then.
+/// Fails if the fitted model predicts validation data worse than a model without any force: findings of the fit are worthless then.
 fn check_prediction(answer: &DiagnosisSolution, judged: ValidationMethod) -> Outcome {
     let diagnosis = &answer.diagnosis;
     let last = diagnosis.steps.last();
-    let Some(last) = last.filter(|last| last.check > 1.0) else {
+    let Some(last) = last.filter(|last| last.check > MOST_VALIDATION_ERROR) else {
         return Ok(());
     };
     if words::has_suspicion(diagnosis) {
         return Ok(());
     }
     Err(Error::input(message!(
-        "what is fitted to these recordings ({} of the forces is left there) misses the forces {} by {}, more than a model without \
-         any force would: nothing can be said of what is missing. Record longer to fit to, with all drives moving far and fast \
-         ({}), or hold the parameters of an earlier run ({})",
-        percent(Some(last.fit)),
+        "the error {} is {} of the force ({} on the fitted data), more than that of a model without any force. So the fit is \
+         useless, and no effect can be found. Fit a longer recording in which all drives move far and fast ({}), or fix the \
+         parameters at those of an earlier fit ({})",
         judged.phrase(),
         percent(Some(last.check)),
+        percent(Some(last.fit)),
         Remedy::command(CommandName::Excite),
         Remedy::option(OptionName::Parameters)
     )))
 }
 
-/// Recordings that differ leave so many times as much where that is not said.
-const NO_WORSE: f64 = 1.5;
-
-/// What is asked of a diagnosis; [`Question::default`] identifies what the model file leaves open.
+/// Options of a diagnosis. [`Question::default`] estimates all parameters that are not known in the model file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DiagnosisOptions {
     /// Which parameters keep their nominal values.
     pub fixed: FixedParameters,
-    /// Where base parameters come out off their nominal values, ask once more with all of them held: they may hide what is
-    /// missing.
+    /// Whether to diagnose again with all base parameters fixed, if estimates differ from their nominal values. Estimated
+    /// parameters may hide a missing effect.
     pub repeat_with_nominal: bool,
 }
 
@@ -74,39 +71,39 @@ impl Default for DiagnosisOptions {
     }
 }
 
-/// What a diagnosis found.
+/// DiagnosisFindings of a diagnosis.
 pub struct DiagnosisFindings {
-    /// Verdict, ladder, candidates with the reason of their refusal, and what is left unexplained.
+    /// Verdict, error after each step, candidates with the reasons of their rejection, and the unexplained residual.
     pub diagnosis: ModelDiagnosis,
-    /// What is missing, with what is known of it.
+    /// MissingEffect effects.
     pub missing: Vec<MissingEffect>,
-    /// Laws that no library holds and that would explain what nobody explains: hypotheses.
+    /// Laws that are in no library and would explain the residual: hypotheses.
     pub laws: Vec<LawHypothesis>,
-    /// What the recordings leave open.
+    /// Effects that the recordings can neither show nor exclude.
     pub undecided: Vec<UndecidedEffect>,
-    /// Base parameters of the bodies that are not what the file says, the farthest first.
+    /// Base parameters of the bodies that differ from the file, the one with the most standard standard_deviations first.
     pub off_nominal: Vec<OffNominalParameter>,
-    /// The same question with all parameters held at their nominal values, where some are off and it was asked for.
+    /// The diagnosis with all parameters fixed at their nominal values, if it was requested and some estimates differ.
     pub with_nominal: Option<NominalDiagnosis>,
-    /// Where the error sits that matters: what is left unexplained, or that of the model as it is.
+    /// Regions of the unexplained residual, or, without one, of the error of the model as it is.
     pub regions: Vec<ErrorRegion>,
     /// The model as it is, along all recordings.
     pub before: ModelVersion,
-    /// The model with what was found, or why there is none; the reason is empty where nothing was found.
+    /// The model with the effects found, or why there is none; the reason is empty if no effect was found.
     pub after: Result<ModelVersion, Message>,
-    /// What was found, as entries of a model file.
+    /// The effects found, as entries of a model file.
     pub entries: Vec<NewEffect>,
-    /// The model file with them.
+    /// The model file with these entries.
     pub edited: Option<CompletedModelFile>,
-    /// Where the error of the model as it is lives.
+    /// Regions where the error without added effects is largest.
     pub places: ErrorLocations,
-    /// Where what is left in the end lives.
+    /// Regions where the residual with the effects is largest.
     pub residual_locations: Option<ErrorLocations>,
-    /// Where errors are judged.
+    /// The data on which errors are judged.
     pub validation: ValidationMethod,
-    /// Remarks on the recordings.
+    /// Notes on the recordings.
     pub notes: Vec<RecordingNote>,
-    /// What was asked and with which columns.
+    /// The problem and its solution, without the columns.
     pub(crate) answer: DiagnosisSolution,
     /// Variables on which errors may depend, along the recordings that are judged.
     pub(crate) variables: Vec<(String, Vec<f64>)>,
@@ -119,37 +116,37 @@ pub struct MissingEffect {
     pub effect: LocatedEffect,
     /// Its parameters and constants.
     pub estimates: Vec<EffectEstimate>,
-    /// How likely it is that it is there, between 0 and 1.
+    /// Probability that the effect is present, between 0 and 1.
     pub probability: f64,
-    /// What the recordings cannot tell it from.
+    /// Effects that explain the recordings equally well.
     pub indistinguishable_from: Vec<LocatedEffect>,
-    /// Which experiment tells it from these, as the library says.
+    /// Experiment that distinguishes it from these, by the text of the library.
     pub separating_experiment: Option<String>,
-    /// The motion that would tell it from these, if one can be sought.
+    /// Request for a motion that distinguishes it from these, if one can be planned.
     pub separation: Option<SeparationProposal>,
 }
 
-/// An effect that the recordings leave open.
+/// An effect that the recordings can neither show nor exclude.
 #[derive(Clone, Debug, PartialEq)]
 pub struct UndecidedEffect {
     /// Its kind and places.
     pub effect: LocatedEffect,
-    /// Why they do.
+    /// Why, as a sentence without the last full stop.
     pub reason: String,
-    /// Which experiment would tell.
+    /// Experiment that would decide.
     pub separating_experiment: String,
 }
 
-/// Effects between which a motion is to decide.
+/// Request for a motion that distinguishes effects.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SeparationProposal {
     /// The effect that was found, with its values.
     pub effect: NamedEffect,
-    /// What it may be taken for.
+    /// Effects that it may be confused with.
     pub rivals: Vec<LocatedEffect>,
-    /// What is there in either case, with its constants.
+    /// Effects that are present in either case, with their constants.
     pub common_effects: Vec<NamedEffect>,
-    /// Noise of the forces, if it is known.
+    /// Noise of the forces, root mean square over the drives (N or N m), if it is known.
     pub noise: Option<f64>,
 }
 
@@ -160,17 +157,17 @@ pub struct EffectEstimate {
     pub name: String,
     /// Its value.
     pub value: f64,
-    /// Standard deviation, where identification has the parameter by itself.
+    /// Standard deviation, if identification determines the parameter by itself.
     pub std: Option<f64>,
     /// Unit of the value.
     pub unit: String,
 }
 
-/// A diagnosis with all parameters held at their nominal values.
+/// A diagnosis with all parameters fixed at their nominal values.
 pub struct NominalDiagnosis {
     /// Verdict, ladder and candidates.
     pub diagnosis: ModelDiagnosis,
-    /// What is missing then.
+    /// Missing effects with their estimates.
     pub missing: Vec<(LocatedEffect, Vec<EffectEstimate>)>,
 }
 
@@ -184,14 +181,14 @@ impl DiagnosisFindings {
         }
     }
 
-    /// What is to be done where nothing, or not all, is to be added to the model file.
+    /// Advice if not all effects can be added to the model file: a doubtful recording, or a delayed force signal.
     pub(crate) fn further_action(&self) -> Option<&'static str> {
         if self.missing.is_empty() {
             return None;
         }
         if words::has_suspicion(&self.diagnosis) {
             return Some(
-                "First clear up what the verdict begins with: effects may only make up for it.",
+                "First check the fault that the verdict starts with: the effects may only compensate it.",
             );
         }
         let is_late = |found: &MissingEffect| {
@@ -200,16 +197,16 @@ impl DiagnosisFindings {
                 && !self.entries.iter().any(is_its)
         };
         self.missing.iter().any(is_late).then_some(
-            "A force that is read late is mended where it is read: a model file has nothing for it.",
+            "Correct the delayed force signal where it is recorded: a model file has no entry for it.",
         )
     }
 }
 
 impl Model {
-    /// Finds which physical effect the model lacks: `fit` is what parameters are fitted to, errors are judged on `check`, or
-    /// by cross-validation if there is none.
+    /// Finds which physical effects the model lacks. Parameters are fitted to `fit`; errors are judged on the validation runs `check`,
+    /// or by cross-validation without any.
     ///
-    /// Fails when a recording is too short, holds no force, or leads where the mechanism cannot stand.
+    /// Fails if a recording is too short, has no forces, or has positions at which the loops of the mechanism cannot close.
     pub fn diagnose(
         &self,
         fit: &[&PreparedRecording],
@@ -226,7 +223,7 @@ impl Model {
         let held = question.fixed;
         let recordings: Vec<&PreparedRecording> = of_fit.into_iter().chain(of_check).collect();
         let between =
-            (self.host()).run_job("holding the recordings against each other", 0, |_| {
+            (self.host()).run_job("comparing the recordings with each other", 0, |_| {
                 faults::run_differences(self, &recordings)
             })?;
         let find = |between: &[RecordingDifference]| {
@@ -237,12 +234,13 @@ impl Model {
             };
             problem::find_missing_effects(self, &data[0], &data[1], asked)
         };
+        // The search with differences between recordings; it is repeated without them if there are any.
         let mut answer = find(&between)?;
         let mut between = between;
         if !between.is_empty() {
-            // What the model lacks may look as if the recordings differed.
+            // A missing effect may look like a difference between recordings.
             let without = find(&[])?;
-            if without.mean_square_residual() < NO_WORSE * answer.mean_square_residual() {
+            if without.mean_square_residual() < DIFFERENCE_LEAST_GAIN * answer.mean_square_residual() {
                 answer = without;
                 between.clear();
             }
@@ -257,6 +255,7 @@ impl Model {
         }
         let notes = data.iter().flatten().flat_map(RecordingSegment::notes);
         let notes = self.caution().into_iter().chain(notes.cloned()).collect();
+        // The model file with the effects, and that model identified from the same recordings.
         let entries = added::entries(self, &answer);
         let (edited, after) = if entries.is_empty() {
             (None, Err(Message::new()))
@@ -270,6 +269,7 @@ impl Model {
             }
         };
         let [fit_data, check_data] = data;
+        // The model without effects, for comparison.
         let before = ModelVersion::new(self.clone(), fit_data, check_data, held)?;
         let places = judged_error_locations(&before)?;
         let left = after
@@ -322,12 +322,25 @@ impl DiagnosisFindings {
         self.after.as_ref().unwrap_or(&self.before)
     }
 
+    /// The experiment that decides whether effects of a kind are present at some places: the text of the library, and the motion
+    /// to record.
+    pub(crate) fn deciding_experiment(&self, kind: &str, places: &str) -> String {
+        let mut kinds = self.answer.candidates.kinds.iter();
+        let known = kinds.find(|one| one.name == kind);
+        let known = known.map_or("", |one| one.doubles.as_str());
+        let motion = format!(
+            "To decide, record a motion over more of the travel of {places}, at other speeds and with another load."
+        );
+        format!("{known} {motion}").trim().to_owned()
+    }
+
     /// Names of the drives, in the order of the channels.
     pub fn channels(&self) -> &[String] {
         &self.answer.problem.layout.channels
     }
 }
 
+/// The model with the effects, identified. If a delay changed, recordings are prepared again, since forces then belong to earlier states.
 fn version_with_effects(
     model: &Model,
     edited: &CompletedModelFile,
@@ -356,12 +369,12 @@ fn version_with_effects(
         before.clone()
     };
     let host = model.host().clone();
-    host.run_job("identifying with what was found", 0, |_| {
+    host.run_job("identifying with the effects found", 0, |_| {
         ModelVersion::new(model, fit, check, held)
     })?
 }
 
-/// The same question with all parameters held at their nominal values.
+/// The diagnosis with all parameters fixed at their nominal values.
 fn nominal_diagnosis(
     findings: &DiagnosisFindings,
     between: &[RecordingDifference],
@@ -388,6 +401,7 @@ fn nominal_diagnosis(
     })
 }
 
+/// Missing effects with estimates, alternatives and the experiment that separates them.
 fn missing_effects(findings: &DiagnosisFindings) -> Vec<MissingEffect> {
     let found = findings.diagnosis.effects.iter();
     found
@@ -402,21 +416,15 @@ fn missing_effects(findings: &DiagnosisFindings) -> Vec<MissingEffect> {
         .collect()
 }
 
+/// Effects that the recordings can neither show nor exclude, with the reason and the experiment that would decide.
 fn undecided_effects(findings: &DiagnosisFindings) -> Vec<UndecidedEffect> {
     let of = |effect: &LocatedEffect| {
-        let mut kinds = findings.answer.candidates.kinds.iter();
-        let kind = kinds.find(|kind| kind.name == effect.kind);
-        let place = effect.at.join(" and ");
-        let known = kind.map_or("", |kind| kind.doubles.as_str());
-        let more = format!(
-            "A motion over more of the travel of {place}, at other speeds and with another load, tells it from what the model has."
-        );
         UndecidedEffect {
             effect: effect.clone(),
-            reason: "along these motions its force is all but a combination of forces that the model has, so that even one as large \
-                   as the drive's own is neither seen nor excluded"
+            reason: "along these motions its force is almost a combination of forces that the model has, so even an effect as \
+                   large as the force of the drive can be neither shown nor excluded"
                 .to_owned(),
-            separating_experiment: format!("{known} {more}").trim().to_owned(),
+            separating_experiment: findings.deciding_experiment(&effect.kind, &effect.at.join(" and ")),
         }
     };
     findings
@@ -441,7 +449,7 @@ fn unit_of_constant(findings: &DiagnosisFindings, found: &IdentifiedEffect, name
     units.map_or_else(String::new, |(_, unit)| unit.clone())
 }
 
-/// Estimates as the search has them.
+/// Estimates of the search.
 fn search_estimates(
     parameters: &[EffectParameter],
     found: &IdentifiedEffect,
@@ -456,8 +464,8 @@ fn search_estimates(
     parameters.iter().zip(values).map(of).collect()
 }
 
-/// Estimates of an effect with their deviations, from identification with everything that was found; where the model with
-/// the effects cannot say them apart, those of the search.
+/// Estimates of an effect with standard deviations, from identification with all effects found. If the model with the effects cannot
+/// separate them, those of the search.
 fn estimates(findings: &DiagnosisFindings, found: &IdentifiedEffect) -> Vec<EffectEstimate> {
     let parameters = &findings.answer.problem.candidates[found.candidate].parameters;
     let mut all = search_estimates(parameters, found);
@@ -471,7 +479,7 @@ fn estimates(findings: &DiagnosisFindings, found: &IdentifiedEffect) -> Vec<Effe
         |entry: &&NewEffect| entry.kind == found.effect.kind && entry.at == found.effect.at;
     if let Some(entry) = findings.entries.iter().find(is_its) {
         for estimate in &mut all {
-            // What is held at zero, since its sign would make no sense, stays there.
+            // A value that was fixed at zero, since it would have the wrong sign, stays zero.
             if estimate.value == 0.0 {
                 continue;
             }
@@ -479,7 +487,7 @@ fn estimates(findings: &DiagnosisFindings, found: &IdentifiedEffect) -> Vec<Effe
                 estimate.value = p.value;
                 estimate.std = p.std;
             } else if let Some((_, constant)) = estimate.name.clone().split_once('*') {
-                // A product of a parameter and a constant is told as the constant.
+                // A product of a parameter and a constant is reported as the constant.
                 let known = entry
                     .constants
                     .iter()
@@ -505,6 +513,7 @@ fn identified_parameter<'a>(
     let derivation = &after.model.derivation;
     let mechanism = &derivation.mechanism;
     let place = findings.entries.iter().position(|one| one == entry)?;
+    // Added effects are the last ones of the edited model.
     let first = mechanism
         .effects
         .len()
@@ -522,7 +531,7 @@ fn identified_parameter<'a>(
         .filter(|p| p.status == ParameterStatus::Identified)
 }
 
-/// Which experiment tells an effect from its doubles, as the library says.
+/// Experiment that distinguishes an effect from its alternatives, by the text of the library.
 fn separating_experiment(findings: &DiagnosisFindings, found: &IdentifiedEffect) -> Option<String> {
     if found.indistinguishable_from.is_empty() {
         return None;
@@ -532,7 +541,8 @@ fn separating_experiment(findings: &DiagnosisFindings, found: &IdentifiedEffect)
     (!kind.doubles.is_empty()).then(|| kind.doubles.clone())
 }
 
-/// What a motion would have to decide. What only moves forces in time has no force of its own to be made large.
+/// The request for a motion that distinguishes an effect from its alternatives; `None` for a delay, which adds no force that a
+/// motion could make larger.
 fn separation(
     findings: &DiagnosisFindings,
     found: &IdentifiedEffect,
@@ -540,7 +550,7 @@ fn separation(
     let is_force = |effect: &&LocatedEffect| {
         let kinds = findings.answer.candidates.kinds.iter();
         let mut kind = kinds.filter(|kind| kind.name == effect.kind);
-        // What no library holds has no columns along another motion.
+        // A kind that is in no library has no columns along another motion.
         kind.next()
             .is_some_and(|kind| kind.mechanics != Some(Mechanics::Delay))
     };
@@ -554,6 +564,7 @@ fn separation(
     let others = findings.diagnosis.effects.iter();
     let others = others.filter(|other| other.effect != found.effect && is_force(&&other.effect));
     let noise = &findings.answer.problem.noise;
+    // One figure for all drives, since the planned motion has no noise of its own.
     let squares: f64 = noise.iter().map(|n| n * n).sum();
     let noise = (squares / noise.len().max(1) as f64).sqrt();
     Some(SeparationProposal {
@@ -572,7 +583,7 @@ fn separation(
     })
 }
 
-/// Where the error sits that matters: what is left unexplained, or that of the model as it is.
+/// Regions of the unexplained residual, or, without one, of the error of the model as it is.
 fn regions(findings: &DiagnosisFindings) -> Vec<ErrorRegion> {
     let diagnosis = &findings.answer.diagnosis;
     if diagnosis.verdict != DiagnosisVerdict::Unexplained {
@@ -595,7 +606,7 @@ fn regions(findings: &DiagnosisFindings) -> Vec<ErrorRegion> {
     regions
 }
 
-/// A channel whose error sits nowhere in particular.
+/// The whole time as a region, for a drive whose residual is largest nowhere in particular.
 fn overall_region(findings: &DiagnosisFindings, channel: usize) -> ErrorRegion {
     let name = findings.answer.problem.layout.channels[channel].clone();
     let version = findings.final_version();
@@ -607,7 +618,7 @@ fn overall_region(findings: &DiagnosisFindings, channel: usize) -> ErrorRegion {
     let again = 100.0 * findings.answer.diagnosis.repeatable_share[channel];
     ErrorRegion {
         says: format!(
-            "what is left of {name} is spread over all of the time, and {again:.0} % of its square comes again with the state"
+            "the residual of {name} is spread over the whole time, and {again:.0} % of its square is repeatable"
         ),
         channel: name,
         variable: modelmill_identify::TIME_COLUMN.to_owned(),
@@ -617,7 +628,7 @@ fn overall_region(findings: &DiagnosisFindings, channel: usize) -> ErrorRegion {
     }
 }
 
-/// Where the error of a model lives on the recordings that are judged.
+/// Regions of the error of a model, on the recordings on which errors are judged.
 fn judged_error_locations(version: &ModelVersion) -> Outcome<ErrorLocations> {
     let judged = version.validation_runs();
     let (first, last) = (

@@ -1,7 +1,6 @@
-//! Gears between an encoder and what moves: they yield by the torque that they carry, and where they have backlash their load
-//! lies on one flank or the other. The encoder reads the motor's side, so that the load is elsewhere, by an angle that is known
-//! but for its size; forces change by that as by an error of the encoder. The inertia of the motor and the blow
-//! between flanks do not show in this.
+//! Candidates for compliance and backlash of gears. The encoder measures the motor side. The load is displaced by torque times
+//! compliance, or by half the play towards the loaded flank. This acts on the forces like an error of the encoder. Inertia of the motor
+//! and impacts between flanks are neglected.
 
 use modelmill_identify::diagnose::{
     CandidateEffect, CandidateNature, ColumnChoice, ColumnSource, EffectParameter, ForceColumn,
@@ -16,18 +15,18 @@ use crate::regressors::SegmentList;
 
 use super::numbers::stack;
 
-/// What the load's position is off by, of each kind: torque times compliance, or half the play to either side.
+/// Kinds with their parameters. The displacement of the load is torque times compliance, or half the play to either side.
 const KINDS: [(&str, &str); 2] = [("drive_compliance", "compliance"), ("backlash", "play")];
 
-/// Compliance and backlash of every drive that turns or pushes a joint; `slopes` say what forces change by with position,
-/// rate and acceleration of each coordinate, and `values` are base parameters.
+/// Compliance and backlash of every drive on a joint. `slopes` are the derivatives of the forces by position, rate and acceleration of
+/// each coordinate; `values` are the base parameters.
 pub(crate) fn gears(
     model: &Model,
     all: &SegmentList<'_>,
     values: &[f64],
     slopes: &[Option<[ForceColumn; 3]>],
 ) -> Outcome<Vec<CandidateEffect>> {
-    // Friction of motor and gear does not pass through the gear.
+    // Friction of motor and gear does not load the gear, so effects are left out of the load.
     let carried: Vec<f64> = (values.iter().enumerate())
         .map(|(k, value)| if model.is_effect(k) { 0.0 } else { *value })
         .collect();
@@ -43,6 +42,7 @@ pub(crate) fn gears(
             };
             (0..values.len()).map(slope).collect()
         };
+        // The displacement of the load has a rate and an acceleration too, in proportion to those of the torque.
         let rates: Vec<Vec<f64>> = loads.iter().map(|load| rate(load)).collect();
         let bends = rates.iter().map(|of| rate(of)).collect::<Vec<_>>();
         Ok(loads.into_iter().chain(rates).chain(bends).collect())
@@ -67,6 +67,7 @@ pub(crate) fn gears(
             let is_yielding = kind == "drive_compliance";
             let shift = |order: usize, sample: usize| match (is_yielding, order) {
                 (true, order) => loads[order * n + d][sample],
+                // Half the play, towards the side that the load presses.
                 (false, 0) => 0.5 * loads[d][sample].signum(),
                 (false, _) => 0.0,
             };
@@ -78,6 +79,7 @@ pub(crate) fn gears(
                         *x *= shift(order, sample);
                     }
                 }
+                // Forces belong to the true position, so the error enters with a minus sign.
                 column.add(-1.0, &part);
             }
             if column.is_zero() {

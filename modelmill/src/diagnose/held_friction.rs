@@ -1,5 +1,5 @@
-//! Friction that is not what the values say that are held: it is another on another day, and a model that has friction does not
-//! lack it.
+//! Candidates for changed friction, used if the friction of the model is fixed at earlier values. Friction differs from day to day;
+//! such a change is a disturbance, not a missing effect.
 
 use modelmill_identify::diagnose::{
     CandidateEffect, CandidateNature, ColumnChoice, ColumnSource, EffectParameter, ForceColumn,
@@ -12,13 +12,13 @@ use crate::model::Model;
 /// Kinds of friction whose values change from day to day.
 const KINDS: [&str; 2] = ["coulomb_friction", "viscous_friction"];
 
-/// A change of the friction that the model has, for each set of drives at which it has the same; `base` are the columns of all
-/// base parameters.
+/// A change of the friction that the model has, for each set of drives that share it; `base` are the columns of all base parameters.
 pub(crate) fn changes(model: &Model, base: &[ForceColumn]) -> Vec<CandidateEffect> {
     let effects = &model.derivation.mechanism.effects;
     let own = effects
         .iter()
         .filter(|effect| KINDS.contains(&effect.kind.as_str()));
+    // Dry and viscous friction at the same drives change together.
     let mut of_places: Vec<(&[EffectPlace], Vec<&EffectTerm>)> = Vec::new();
     for effect in own {
         match of_places
@@ -34,6 +34,7 @@ pub(crate) fn changes(model: &Model, base: &[ForceColumn]) -> Vec<CandidateEffec
     candidates.collect()
 }
 
+/// The candidate for one set of drives; `None` if a place is no drive or a term is no base parameter by itself.
 fn change(
     model: &Model,
     base: &[ForceColumn],

@@ -1,5 +1,5 @@
-//! Laws that no library holds, by the names of a model: where they may act, what they say as formulas over its coordinates, drives
-//! and loads, and the entry of a library by which `add` takes them.
+//! Laws for the residual that are in no library, with the names of a model: the places where they may act, their formulas over
+//! coordinates, drives and loads, and the entry of a library with which `add` can add them.
 
 use std::fmt::Write as _;
 
@@ -37,6 +37,7 @@ pub(crate) fn sites(
         if !matches!(spot.sort, ActsOn::Drive | ActsOn::Coordinate) {
             continue;
         }
+        // A place without a drive acts on the drives through the mechanism; its column comes from the derivation.
         let (force, channel) = match (spot.place, forces.iter().find(|(at, _)| *at == spot)) {
             (EffectPlace::Drive(d), _) => (drive_column(model, all, d.0), Some(d.0)),
             (_, Some((_, force))) => (force.clone(), None),
@@ -131,34 +132,34 @@ fn slopes(values: &[f64], time: &[f64]) -> Vec<f64> {
     (0..values.len()).map(at).collect()
 }
 
-/// A law that would explain what nobody explains; a hypothesis.
+/// A law that would explain the residual; a hypothesis.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ProposedLaw {
-    /// What it adds to the force of its place, over coordinates, rates (`_d`), lengths of drives (`_length`) and what drives carry
-    /// (by their names).
+    /// The force that it adds at its place, as a formula over coordinates, rates (`_d`), lengths of drives (`_length`) and loads of drives
+    /// (by the names of the drives).
     pub expression: String,
     /// The drive or coordinate on which it acts.
     pub at: String,
     /// Its parameters.
     pub parameters: Vec<EffectEstimate>,
-    /// Share of the squared error on the drives that feel it that it takes off where it was not fitted.
+    /// Share of the squared residual that it explains on data that were not fitted, on the drives on which it has an effect.
     pub gain: f64,
-    /// Effects that were found and that it makes needless.
+    /// Effects found that become unnecessary with it.
     pub instead_of: Vec<LocatedEffect>,
-    /// How a model file takes it; `None` where the law remembers the way, which no formula says.
+    /// Its entry; `None` if the law depends on the earlier motion, which no formula can express.
     pub entry: Option<LawEntry>,
 }
 
-/// A law as a kind of effect of a library.
+/// A law as a kind of effect for a library.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LawEntry {
-    /// The table of the library.
+    /// The table of the library, as TOML.
     pub text: String,
-    /// The effect by which a model has it.
+    /// The effect that adds it to a model.
     pub effect: NewEffect,
 }
 
-/// A law with those that do as well.
+/// A law with others that explain the recordings equally well.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LawHypothesis {
     /// The simplest.
@@ -186,6 +187,7 @@ pub(crate) fn hypotheses(model: &Model, diagnosis: &ModelDiagnosis) -> Vec<LawHy
     diagnosis.laws.iter().map(one).collect()
 }
 
+/// A law of the search with the names of the model.
 fn law(model: &Model, sites: &[LawSite], law: &Proposed) -> ProposedLaw {
     let site = &sites[law.site];
     let mut named = LawFormula::new(law);
@@ -246,13 +248,14 @@ fn variable_word(variable: LawVariable) -> &'static str {
     }
 }
 
-/// The table of a library, and the effect that a model has by it.
+/// The table of a library for a law, and the effect that adds it to a model; `None` for a law that depends on the earlier motion.
 fn library_entry(
     sites: &[LawSite],
     law: &Proposed,
     parameters: &[EffectEstimate],
 ) -> Option<LawEntry> {
     let mut products = law.terms.iter().map(|term| &term.product);
+    // A law that depends on the earlier motion has no formula over the state.
     if products.any(LawProduct::has_memory) {
         return None;
     }
@@ -276,7 +279,7 @@ fn library_entry(
     }
     let _ = writeln!(
         text,
-        "expression = \"{expression}\"\nsays = \"A hypothesis that recordings suggest: no law of a machine until it is understood.\""
+        "expression = \"{expression}\"\nsays = \"A hypothesis that recordings suggest. It is no law of the machine until its cause is understood.\""
     );
     text.push_str("[effect_kind.parameters]\n");
     for parameter in parameters {
@@ -316,13 +319,16 @@ fn library_entry(
 
 /// A law as a formula, with the symbols of its parameters and constants.
 struct LawFormula {
+    /// Symbols of the parameters.
     parameters: Vec<String>,
+    /// Symbols of the constants with their values and the factors in which they stand.
     constants: Vec<(String, f64, LawFactor)>,
     /// Whether constants stand as symbols rather than as numbers.
     with_symbols: bool,
 }
 
 impl LawFormula {
+    /// Symbols of the parameters: `k` for a term, `ks` and `kc` for sine and cosine, numbered if there are several terms.
     fn new(law: &Proposed) -> Self {
         let several = law.terms.len() > 1;
         let of_term = |(k, term): (usize, &LawTerm)| {
@@ -345,6 +351,7 @@ impl LawFormula {
         }
     }
 
+    /// The formula of a law; `name` gives the name of each variable. Constants are collected on the way if they have symbols.
     fn text(
         &mut self,
         law: &Proposed,
@@ -370,6 +377,7 @@ impl LawFormula {
                 let parts: Vec<String> = parts
                     .map(|(text, symbol)| format!("{symbol}*{text}"))
                     .collect();
+                // A sum needs parentheses only next to other factors or terms.
                 let is_alone = factors.len() == 1 && law.terms.len() == 1;
                 let sum = parts.join(" + ");
                 product.push(if is_alone { sum } else { format!("({sum})") });
@@ -390,6 +398,7 @@ impl LawFormula {
         }
         let of_name =
             |one: &&(String, f64, LawFactor)| one.0.trim_end_matches(char::is_numeric) == symbol;
+        // Several constants of one name are numbered from the second on.
         let symbol = match self.constants.iter().filter(of_name).count() {
             0 => symbol.to_owned(),
             n => format!("{symbol}{}", n + 1),
@@ -491,6 +500,7 @@ impl LawFormula {
     }
 }
 
+/// `z` to a whole power, with the sign of `z` if `is_odd`.
 fn integer_power(z: &str, power: i32, is_odd: bool) -> String {
     match (power, is_odd) {
         (0, _) => format!("sign({z})"),

@@ -1,8 +1,8 @@
-//! Long recordings in fewer samples: where the parallel filter keeps few of many, states are picked and forces filtered before
-//! anything is made of them, so that memory and time are those of the samples that count.
+//! Long recordings in fewer samples. If the parallel filter keeps few samples, states are decimated and forces filtered before any column
+//! is computed. This saves memory and time.
 //!
-//! States that were smoothed change little between samples; after a first step as many are left for every one that is kept in
-//! the end as the parallel filter needs to filter regressor and forces alike.
+//! Smoothed states change little between samples. This first step leaves four samples for each one that the parallel filter keeps,
+//! which it needs to filter regressor and forces alike.
 //!
 //! Decision: a diagnosis holds some thousand columns. Beyond 150 000 samples the parallel filter keeps one of four,
 //! and 20 000 at most, unless that would remove more than three quarters of the band in which forces follow the
@@ -15,30 +15,30 @@ use crate::model::Model;
 use crate::recording::PreparedRecording;
 use crate::stretch::RecordingSegment;
 
-/// Shorter stretches stay as they are.
+/// Segments with fewer samples are not decimated here. By judgement.
 const LONG: usize = 150_000;
-/// Samples that are kept at most, where that leaves enough of the band in which forces follow the motion.
+/// Samples that are kept at most, if that leaves enough of the band in which forces follow the motion. By judgement.
 const KEPT: usize = 12_000;
-/// The parallel filter passes this part of the band: what many samples say of it is more than enough.
+/// The parallel filter must pass at least this part of the band of the motion. By judgement.
 const PART_OF_BAND: f64 = 0.25;
-/// Samples that are left for the parallel filter to keep one of.
+/// Samples that are left for each one that the parallel filter keeps.
 const LEFT: usize = 4;
 /// Order of the low-pass of the forces. It is Butterworth's, which is flat where the parallel filter passes: one with ripples
-/// would change forces that are held against states as they were.
+/// would change the forces relative to the states, which are not filtered.
 const ORDER: usize = 4;
 
 impl PreparedRecording {
-    /// The recording with long stretches in the fewer samples that a diagnosis looks at: for those who need it for nothing else,
-    /// since it takes less memory so.
+    /// The recording with long segments in the fewer samples that a diagnosis uses. Use it to save memory if the recording is needed for
+    /// nothing else.
     ///
-    /// Fails when a stretch cannot be filtered.
+    /// Fails if a segment cannot be filtered.
     pub fn for_diagnosis(&self, model: &Model) -> Outcome<Self> {
         let stretches = self.segments.iter().map(|one| thin_out(model, one));
         Ok(self.with_segments(stretches.collect::<Outcome<_>>()?))
     }
 }
 
-/// A stretch in fewer samples, if it is long and the parallel filter keeps few of them.
+/// A segment in fewer samples, if it is long and the parallel filter keeps few of them.
 pub(crate) fn thin_out(model: &Model, stretch: &RecordingSegment) -> Outcome<RecordingSegment> {
     let (samples, every) = (stretch.samples(), stretch.decimation());
     let time = &stretch.run.time;
@@ -47,14 +47,16 @@ pub(crate) fn thin_out(model: &Model, stretch: &RecordingSegment) -> Outcome<Rec
         _ => return Ok(stretch.clone()),
     };
     let kept = samples.div_ceil(every);
-    // Beyond, the parallel filter would take too much of what tells effects apart.
+    // With more decimation the parallel filter would remove too much of the band in which effects differ.
     let most = (stretch.run.prepared.band_hz).map_or(every as f64, |band| {
         DECIMATION_PASSBAND / (PART_OF_BAND * band * step)
     });
+    // The largest decimation that keeps the band, down to `KEPT` samples.
     let wanted = (every + 1..=every * kept.div_ceil(KEPT))
         .rev()
         .find(|wanted| *wanted as f64 <= most);
     let factor = wanted.unwrap_or(every) / LEFT;
+    // A segment with weights stays as it is, since weights belong to single samples.
     if samples < LONG || factor < 2 || stretch.weights.is_some() {
         return Ok(stretch.clone());
     }
@@ -72,7 +74,7 @@ pub(crate) fn thin_out(model: &Model, stretch: &RecordingSegment) -> Outcome<Rec
         };
         all.iter().map(one).collect()
     };
-    // A force has heard of its neighbours through the filter.
+    // The filter mixes neighbouring forces, so a kept sample is left out if any of them is.
     let heard = |out: &Vec<bool>| -> Vec<bool> {
         let about = |k: usize| {
             let from = (factor * k).saturating_sub(factor - 1);
@@ -103,8 +105,8 @@ pub(crate) fn thin_out(model: &Model, stretch: &RecordingSegment) -> Outcome<Rec
     thinned.run.prepared.decimate = LEFT;
     let passed = DECIMATION_PASSBAND / (step * (factor * LEFT) as f64);
     let says = format!(
-        "{} is long: the diagnosis looks at one in {} of its {samples} samples, after the parallel filter, which passes what \
-         is below {} Hz.",
+        "{} is long: the diagnosis uses every {}th of its {samples} samples, after a low-pass at {} Hz on forces and \
+         regressor.",
         run.file,
         factor * LEFT,
         crate::text::table::significant(passed, 3)
@@ -120,7 +122,7 @@ mod tests {
     use super::*;
     use crate::Host;
 
-    /// A long stretch of a pendulum, of which the parallel filter keeps one in ten samples.
+    /// A long segment of a pendulum, of which the parallel filter keeps one in ten samples.
     fn long(samples: usize, band_hz: f64) -> RecordingSegment {
         let time: Vec<f64> = (0..samples).map(|i| 1e-3 * i as f64).collect();
         let of = |f: &dyn Fn(f64) -> f64| vec![time.iter().map(|t| f(*t)).collect::<Vec<f64>>()];

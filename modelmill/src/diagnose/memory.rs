@@ -1,5 +1,5 @@
-//! Friction that remembers where it reversed (P. R. Dahl, AIAA Journal 14, 1976): over a length after each reversal it grows to
-//! its bound, as bristles that bend before they slip. It depends on the way that was gone, so no term of a model file says it.
+//! Candidates for Dahl friction (P. R. Dahl, AIAA Journal 14, 1976): after each reversal it builds up over a distance, like bristles
+//! that bend before they slip. It depends on the earlier motion, so a model file cannot contain it.
 
 use modelmill_codegen::ModelEvaluator;
 use modelmill_identify::diagnose::{
@@ -15,7 +15,7 @@ use crate::stretch::RecordingSegment;
 use super::numbers::stack;
 use crate::regressors::SegmentList;
 
-/// Lengths that are tried, as parts of the travel.
+/// Distances that are tried, as parts of the travel of the drive.
 const LENGTHS: [f64; 12] = [
     0.001, 0.002, 0.004, 0.007, 0.012, 0.02, 0.035, 0.06, 0.1, 0.17, 0.3, 0.5,
 ];
@@ -33,6 +33,7 @@ pub(crate) fn dahl_candidates(
         columns.truncate(drives.len());
         Ok(columns)
     };
+    // The travel over all recordings sets the scale of the distances.
     let mut travels = vec![[f64::INFINITY, f64::NEG_INFINITY]; drives.len()];
     for (one, _) in all {
         for (travel, values) in travels.iter_mut().zip(positions(one)?) {
@@ -83,7 +84,8 @@ pub(crate) fn dahl_candidates(
     Ok(candidates)
 }
 
-/// The state of the bristles along a position, between minus and plus one: `dz/dx = (sign - z) / length`.
+/// The state of the bristles along a position, between -1 and 1, by `dz/dx = (sign - z) / length`. Each step uses the exact solution of
+/// this equation, so large steps are stable.
 fn bristle_states(position: &[f64], length: f64) -> Vec<f64> {
     let mut state = 0.0_f64;
     let mut before = position.first().copied().unwrap_or(0.0);
@@ -91,6 +93,7 @@ fn bristle_states(position: &[f64], length: f64) -> Vec<f64> {
         let moved = x - before;
         before = *x;
         let bound = if moved < 0.0 { -1.0 } else { 1.0 };
+        // The sign of the motion is constant between two samples.
         state = bound + (state - bound) * (-moved.abs() / length).exp();
         state
     };

@@ -1,12 +1,12 @@
-//! `diagnose`: which physical effect a model lacks. Candidates come from the effect library, their columns from the model's
-//! own derivation, and a search over sets of them decides.
+//! `diagnose`: which physical effect a model lacks. Input are a model and recordings, output are [`Findings`]. Candidates come from
+//! the effect library, their columns from the derivation of the model, and a search over sets of them decides.
 //!
-//! `places` -> `candidates` (what `add` would add) -> `columns` (numbers along the recordings) -> `problem` (posed and solved)
-//! with `long` (recordings in fewer samples), `faults` (of recordings, taken off), and candidates that no entry of a model
-//! file says: `encoders`, `gears`, `memory`, `payloads`, `constants`
-//! -> `added` (the model file with what was found) -> `versions` (both models identified, along all recordings) -> `off_nominal`
-//! (what base parameters say against the file) -> `findings`.
-//! `chosen` does the same for effects that the user names; `words` puts verdicts into sentences.
+//! `places` -> `candidates` (the effects that `add` could add) -> `columns` (their forces along the recordings) -> `problem`
+//! (states and solves the search), with `long` (fewer samples of long recordings), `faults` (faults of recordings, subtracted
+//! first), and candidates that a model file cannot contain: `encoders`, `gears`, `memory`, `payloads`, `constants`
+//! -> `added` (the model file with the effects found) -> `versions` (both models, identified, along all recordings)
+//! -> `off_nominal` (base parameters that differ from the file) -> `findings`.
+//! `chosen` does the same for effects that the user names, `words` writes sentences, `thresholds` has the numbers that decide.
 
 pub(crate) mod added;
 mod candidates;
@@ -26,6 +26,7 @@ mod off_nominal;
 mod payloads;
 mod places;
 mod problem;
+mod thresholds;
 mod tilt;
 mod versions;
 pub mod words;

@@ -1,4 +1,5 @@
-//! Numbers along all recordings of a diagnosis: regressors, motions of places, each channel stacked and decimated alike.
+//! Values along all recordings of a diagnosis: forces, variables and motions of places. Recordings are stacked one after the other, and
+//! all columns are decimated alike.
 
 use modelmill_codegen::ModelEvaluator;
 use modelmill_identify::diagnose::{SampleLayout, SampleSegment as LaidOut};
@@ -10,7 +11,7 @@ use crate::model::Model;
 use crate::regressors::SegmentList;
 use crate::stretch::RecordingSegment;
 
-/// Names of the channels and lengths of the stretches.
+/// Names of the channels, lengths of the segments, and samples that are left out.
 pub(crate) fn layout(model: &Model, all: &SegmentList<'_>) -> SampleLayout {
     let stretch = |(one, is_check): &(&RecordingSegment, bool)| {
         let time = one.time();
@@ -34,6 +35,7 @@ pub(crate) fn layout(model: &Model, all: &SegmentList<'_>) -> SampleLayout {
         };
         all.iter().flat_map(of).collect()
     };
+    // Without left-out samples the layout has no masks, which saves memory.
     let drives = if all_count { 0 } else { model.drives().len() };
     SampleLayout {
         channels: model.drives(),
@@ -58,7 +60,7 @@ pub(crate) fn stack(
     Ok(stacked)
 }
 
-/// Variables on which an unknown force may depend.
+/// Variables on which an unknown force may depend: position, rate and acceleration of each active coordinate.
 pub(crate) fn variables(model: &Model, all: &SegmentList<'_>) -> Vec<(String, Vec<f64>)> {
     let mut variables = Vec::new();
     for (i, name) in model.active_coordinates().into_iter().enumerate() {
@@ -79,16 +81,22 @@ pub(crate) fn variables(model: &Model, all: &SegmentList<'_>) -> Vec<(String, Ve
     variables
 }
 
-/// Largest rate and travel of a place; zero where it has none.
+/// Motions of drives and coordinates along all recordings.
 pub(crate) struct PlaceMotions {
+    /// Positions of the drives, then their rates, then derivatives by the active coordinates.
     drives: Vec<Vec<f64>>,
+    /// Indices of the active coordinates.
     active: Vec<usize>,
+    /// Their positions and rates.
     active_motion: Vec<[Vec<f64>; 2]>,
+    /// Indices of the passive coordinates.
     passive: Vec<usize>,
+    /// Their positions, then their rates.
     passive_motion: Vec<Vec<f64>>,
 }
 
 impl PlaceMotions {
+    /// Evaluates all motions once.
     pub(crate) fn new(model: &Model, all: &SegmentList<'_>) -> Outcome<Self> {
         let evaluator = ModelEvaluator::new(&model.derivation);
         let (active, passive) = model.derivation.coordinates();
@@ -115,8 +123,9 @@ impl PlaceMotions {
         })
     }
 
-    /// Largest rate and travel.
+    /// Largest rate (per s) and travel of a place; zero for a place that does not move.
     pub(crate) fn scale(&self, place: EffectPlace) -> [f64; 2] {
+        // Columns of the evaluator: positions, rates, and one derivative for each active coordinate.
         let n = self.drives.len() / (2 + self.active.len()).max(1);
         let found = match place {
             EffectPlace::Drive(d) => Some((&self.drives[n + d.0], &self.drives[d.0])),
@@ -143,6 +152,7 @@ impl PlaceMotions {
     }
 }
 
+/// Values of a function of the states along all recordings, one after the other, without decimation.
 fn stack_states(
     all: &SegmentList<'_>,
     model: &Model,

@@ -1,5 +1,5 @@
-//! A further body on every body of the model: a tool, a workpiece, a forgotten cover. Beside free base parameters it is no
-//! effect, since these take it up; where they are held, as from an unloaded run, its columns are known.
+//! Candidates for a payload on every body of the model: a tool, a workpiece, a forgotten cover. They are tried only if base
+//! parameters are fixed, as from an unloaded run; estimated base parameters would absorb a payload.
 
 use modelmill_codegen::ModelEvaluator;
 use modelmill_identify::diagnose::{
@@ -13,6 +13,8 @@ use crate::model::Model;
 use crate::regressors::{SegmentList, regressor};
 use crate::runs::payload::{PayloadColumns, TEN};
 
+use super::thresholds::PAYLOAD_LEAST_EFFECT;
+
 /// Symbols of the parameters, their units, and the sign that is possible.
 const PARAMETERS: [(&str, &str, SignConstraint); 7] = [
     ("mass", "kg", SignConstraint::Positive),
@@ -23,45 +25,42 @@ const PARAMETERS: [(&str, &str, SignConstraint); 7] = [
     ("syy", "kg m^2", SignConstraint::Positive),
     ("szz", "kg m^2", SignConstraint::Positive),
 ];
-/// Those of a mass at a place; the others say how it spreads.
+/// The first of them belong to a point mass; the others are second moments.
 const POINT_MASS_PARAMETERS: usize = 4;
-/// A column whose largest value is below this part of the largest of all says nothing.
-const NEGLIGIBLE: f64 = 1e-9;
 
-/// A mass at a place of every body, and the same with what it spreads about that place.
+/// For every body a point mass, and the same with second moments.
 pub(crate) fn payloads(model: &Model, all: &SegmentList<'_>) -> Outcome<Vec<CandidateEffect>> {
     let payloads = PayloadColumns::new(model)?;
     let columns = regressor(all, &ModelEvaluator::new(&payloads.derivation), model)?;
     let reach = reach(&model.derivation.mechanism);
     let largest = columns.iter().map(size).fold(0.0, f64::max);
     let mut candidates = Vec::new();
-    // The farthest body first: of two that carry alike it is the one that tools are put on.
+    // The last body first: of two with the same effect it is the one that carries tools.
     for (frame, which) in payloads.frames.iter().zip(&payloads.columns).rev() {
         let of = |k: &Option<usize>| -> ForceColumn {
             let column = k.map(|k| &columns[k]);
-            let column = column.filter(|column| size(column) > NEGLIGIBLE * largest);
-            column.map_or_else(
-                || ForceColumn(vec![None; model.drives().len()]),
-                Clone::clone,
-            )
+            let column = column.filter(|column| size(column) > PAYLOAD_LEAST_EFFECT * largest);
+            column.map_or_else(|| ForceColumn(vec![None; model.drives().len()]), Clone::clone)
         };
         let ten: [ForceColumn; TEN] = which.each_ref().map(of);
-        let is_felt = |k: &usize| match *k {
+        let has_effect = |k: &usize| match *k {
             k @ 0..POINT_MASS_PARAMETERS => !ten[k].is_zero(),
             k => {
+                // A second moment acts through the two inertias about the other axes.
                 let across = [[7, 9], [4, 9], [4, 7]][k - POINT_MASS_PARAMETERS];
                 across.iter().any(|entry| !ten[*entry].is_zero())
             }
         };
-        // Without weight or leverage it is another inertia of the drive.
-        if !(0..POINT_MASS_PARAMETERS).any(|k| is_felt(&k)) {
+        // Without weight and leverage it is the same as an inertia of the drive.
+        if !(0..POINT_MASS_PARAMETERS).any(|k| has_effect(&k)) {
             continue;
         }
+        // A point mass has four parameters, a general payload seven.
         for (most, refines) in [
             (POINT_MASS_PARAMETERS, "point_mass"),
             (PARAMETERS.len(), "payload"),
         ] {
-            let free: Vec<usize> = (0..most).filter(is_felt).collect();
+            let free: Vec<usize> = (0..most).filter(has_effect).collect();
             let parameter = |k: &usize| {
                 let (symbol, unit, sign) = PARAMETERS[*k];
                 EffectParameter {
@@ -92,12 +91,13 @@ pub(crate) fn payloads(model: &Model, all: &SegmentList<'_>) -> Outcome<Vec<Cand
     Ok(candidates)
 }
 
+/// Largest magnitude of a column.
 fn size(column: &ForceColumn) -> f64 {
     let values = column.0.iter().flatten().flatten();
     values.fold(0.0_f64, |most, x| most.max(x.abs()))
 }
 
-/// The largest distance between two frames in the nominal pose, m: nothing that a machine carries is farther away.
+/// Largest distance between two frames in the nominal pose, m; it bounds the distance of a payload from its frame.
 pub(crate) fn reach(mechanism: &Mechanism) -> f64 {
     let nominal: Vec<f64> = mechanism.coordinates.iter().map(|c| c.nominal).collect();
     let poses = Kinematics::new(mechanism).poses(&nominal);

@@ -7,12 +7,18 @@ use modelmill_spec::{
 
 use crate::recording::free::free_bodies;
 
-/// A place with its name and what it carries.
+use super::thresholds::WAVE_SHORTEST_TRAVEL;
+
+/// A place of the mechanism at which an effect may act.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct CandidatePlace {
+    /// Its name in the model file.
     pub name: String,
+    /// Whether it transmits a force or a torque, which decides about units.
     pub carries: PlaceLoad,
+    /// Drive, coordinate, point, body, base or force.
     pub sort: ActsOn,
+    /// Its index in the mechanism.
     pub place: EffectPlace,
 }
 
@@ -79,7 +85,7 @@ pub(crate) fn is_free(mechanism: &Mechanism, coordinate: usize) -> bool {
     })
 }
 
-/// Whether a kind may act at a place and could say something there.
+/// Whether a kind may act at a place and can have an effect there.
 pub(crate) fn is_applicable(
     mechanism: &Mechanism,
     kind: &EffectKind,
@@ -95,30 +101,29 @@ pub(crate) fn is_applicable(
         && mechanism.points[point.0].frame.0 == 0
         && !kind.mechanics.is_some_and(joins_points)
     {
-        // What is fixed to the base feels nothing.
+        // A point that is fixed to the base does not move, so no effect acts there.
         return false;
     }
     if let Some(mechanics) = kind.mechanics {
         return mechanics.has_effect_at(mechanism, spot.place);
     }
     match spot.place {
-        // Of the points that a loop joins one is enough.
+        // A loop joins two points to one place; the first of them is enough.
         EffectPlace::Point(p) => {
             let mut loops = mechanism.loops.iter();
             has_units && loops.all(|l| l.joins[1] != p)
         }
-        // Waves along the travel come from drives.
+        // Waves along the travel, such as cogging, come from drives.
         EffectPlace::Coordinate(_) => has_units && !is_wave(kind),
         _ => has_units,
     }
 }
 
-/// Whether a kind repeats itself along the travel of its place, several times at least where it is shortest.
+/// Whether a kind repeats along the travel of its place, at least twice at its shortest wavelength.
 pub(crate) fn is_wave(kind: &EffectKind) -> bool {
     use modelmill_spec::{ConstantSearch, Scale};
-    const SEVERAL: f64 = 0.5;
     kind.constants.iter().any(|c| match c.search {
-        Some(ConstantSearch::Range { from, of, .. }) => of == Scale::Travel && from < SEVERAL,
+        Some(ConstantSearch::Range { from, of, .. }) => of == Scale::Travel && from < WAVE_SHORTEST_TRAVEL,
         _ => false,
     })
 }
@@ -189,6 +194,7 @@ pub(crate) fn place_sets<'a>(
         EffectPlace::Coordinate(i) => mechanism.coordinates[i.0].passive,
         _ => false,
     };
+    // In mechanisms with loops, limbs are often built alike: their places may share parameters.
     for sort in [ActsOn::Drive, ActsOn::Coordinate] {
         for passive in [false, true] {
             for carries in [PlaceLoad::Force, PlaceLoad::Torque] {

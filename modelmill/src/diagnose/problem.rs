@@ -1,4 +1,5 @@
-//! A diagnosis from a model and its recordings: the problem is posed in numbers, and solved.
+//! States the search for missing effects in numbers and solves it. Input are a model and recordings, output is an [`Answer`] with
+//! the problem, the diagnosis and the candidates.
 
 use modelmill_codegen::ModelEvaluator;
 use modelmill_identify::diagnose::{
@@ -26,30 +27,31 @@ use super::laws::sites;
 use super::memory::dahl_candidates;
 use super::numbers::{layout, stack, variables};
 use super::payloads::payloads;
+use super::thresholds::FEWEST_SAMPLES;
 use super::words;
 use crate::regressors::{SegmentList, regressor};
 
-/// Which parameters keep their nominal values.
+/// Which parameters are fixed at their nominal values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FixedParameters {
-    /// Those that are numbers of the file.
+    /// Those that are marked as known in the model file.
     Known,
     /// All.
     All,
 }
 
-/// Samples that each recording must have.
-const FEWEST: usize = 60;
-
-/// What was asked and what was found.
+/// The problem, its solution and the candidates.
 pub(crate) struct DiagnosisSolution {
+    /// The problem in numbers, without columns.
     pub problem: DiagnosisProblem,
+    /// Its solution.
     pub diagnosis: ModelDiagnosis,
+    /// Candidates that `add` could add, with their derivation.
     pub candidates: DerivedCandidates,
 }
 
 impl DiagnosisSolution {
-    /// What is left of all forces in the mean square, each drive relative to its own.
+    /// Sum of the squared residuals of all drives, each relative to the squared force of the drive (1).
     pub(crate) fn mean_square_residual(&self) -> f64 {
         let parts = self.diagnosis.budgets.iter().map(|budget| {
             let squares = budget.noise.powi(2) + budget.model.powi(2);
@@ -59,19 +61,19 @@ impl DiagnosisSolution {
     }
 }
 
-/// What is asked.
+/// Options of the search.
 #[derive(Clone, Copy)]
 pub(crate) struct DiagnosisQuery<'a> {
     /// Which parameters keep their nominal values.
     pub fixed: FixedParameters,
-    /// Whether all is looked for that may explain something: not while a model file's own values are only held against those that
-    /// were found, where every wrong value of a body would be a further body, and nobody is told of laws and doubles.
+    /// Whether to search for payloads, laws and alternatives too. Not in the second diagnosis with nominal values: there every wrong
+    /// value of a body would look like a payload.
     pub in_full: bool,
-    /// What the recordings do not share.
+    /// Differences between the recordings.
     pub run_differences: &'a [RecordingDifference],
 }
 
-/// Finds what a model lacks.
+/// Finds the effects that a model lacks; `fit` are the fitted recordings, `check` the validation runs.
 pub(crate) fn find_missing_effects(
     model: &Model,
     fit: &[RecordingSegment],
@@ -81,14 +83,14 @@ pub(crate) fn find_missing_effects(
     let held = asked.fixed;
     let candidates = model
         .host()
-        .run_job("writing down what may be missing", 0, |_| candidates(model))??;
+        .run_job("deriving all candidates", 0, |_| candidates(model))??;
     let all: Vec<(&RecordingSegment, bool)> = (fit.iter().map(|one| (one, false)))
         .chain(check.iter().map(|one| (one, true)))
         .collect();
     let (mut problem, made) =
         model
             .host()
-            .run_job("computing what each would add", 0, |_| {
+            .run_job("computing the forces of all candidates", 0, |_| {
                 problem(&candidates, model, &all)
             })??;
     let mut origins = made.origins;
@@ -102,6 +104,7 @@ pub(crate) fn find_missing_effects(
     let units: Vec<String> = (0..model.drives().len())
         .map(|d| model.force_unit(d).to_owned())
         .collect();
+    // Candidates that a model file cannot contain: faults of signals, of encoders, of gears and of lengths.
     let mut further = reading_fault_candidates(&problem);
     further.extend(drift_candidates(&problem, &units));
     further.extend(dahl_candidates(model, &all)?);
@@ -116,7 +119,7 @@ pub(crate) fn find_missing_effects(
         further.extend(payloads(model, &all)?);
     }
     problem.candidates.extend(further);
-    // None of these is an entry of a model file.
+    // None of these can be an entry of a model file.
     origins.resize(problem.candidates.len(), None);
     let supply = ColumnSupply {
         candidates: &candidates,
@@ -127,7 +130,7 @@ pub(crate) fn find_missing_effects(
     };
     let mut diagnosis = model
         .host()
-        .run_job("looking for what is missing", 0, |_| {
+        .run_job("searching for missing effects", 0, |_| {
             diagnose(&mut problem, &supply)
         })?;
     for one in &mut diagnosis.disturbances {
@@ -148,7 +151,7 @@ pub(crate) fn find_missing_effects(
     })
 }
 
-/// Gives a disturbance the units of its place, and words.
+/// Completes a disturbance: the units of its place, and a sentence.
 fn describe_disturbance(one: &mut Disturbance, model: &Model) {
     let drives = model.drives();
     let place = one.at.first();
@@ -163,13 +166,17 @@ fn describe_disturbance(one: &mut Disturbance, model: &Model) {
     }
 }
 
-/// Columns that are made while the search goes on.
+/// Computes columns that the search requests while it runs.
 struct ColumnSupply<'a> {
+    /// Candidates that `add` could add.
     candidates: &'a DerivedCandidates,
+    /// The entry that each candidate of the problem comes from.
     origins: &'a [CandidateOrigin],
     /// Values that are tried for the constant of each single candidate.
     grids: &'a [Vec<f64>],
+    /// The model without the effects.
     model: &'a Model,
+    /// Fitted recordings, then validation runs.
     all: &'a SegmentList<'a>,
 }
 
@@ -222,7 +229,7 @@ impl ColumnProvider for ColumnSupply<'_> {
     }
 }
 
-/// The middle of a grid: near enough to see whether anything is there, and no more columns to make than without a constant.
+/// The middle of a grid: close enough to detect an effect, at the cost of one value.
 fn grid_middle(grid: &[f64]) -> Vec<f64> {
     grid.get(grid.len() / 2).copied().into_iter().collect()
 }
@@ -242,10 +249,10 @@ fn problem(
     }
     for (one, _) in all {
         let samples = one.time().len();
-        if samples < FEWEST {
+        if samples < FEWEST_SAMPLES {
             return Err(Error::input(format!(
-                "{}: {} to be looked at, too few to tell effects from chance; give a longer recording or decimate less, \
-                 so that at least {FEWEST} are left",
+                "{}: {} after decimation, too few to distinguish effects from chance. Give a longer recording or decimate less: \
+                 at least {FEWEST_SAMPLES} are needed",
                 one.run.file,
                 count(samples, "sample is left", "samples are left"),
             )));
@@ -282,8 +289,8 @@ fn is_fixed(model: &Model, held: FixedParameters, k: usize) -> bool {
     held == FixedParameters::All || model.is_known(k)
 }
 
-/// Takes what is not free off the measured forces. What a fit knows to its own deviations stays in the base, and is expected
-/// to be off by no more than these.
+/// Subtracts the forces of fixed parameters from the measured ones. Parameters of an earlier fit stay in the base, with their standard
+/// deviations as prior.
 fn fix_parameters(problem: &mut DiagnosisProblem, model: &Model, held: FixedParameters) {
     let is_held = |k: usize| is_fixed(model, held, k);
     let fitted: Vec<usize> = (0..model.base.len())
@@ -292,6 +299,7 @@ fn fix_parameters(problem: &mut DiagnosisProblem, model: &Model, held: FixedPara
     problem.prior = model.information(&fitted);
     let has_prior = problem.prior.is_some();
     let is_fitted = |k: usize| has_prior && fitted.contains(&k);
+    // The force of fixed parameters is summed; columns of the others stay.
     let mut known = ForceColumn(vec![None; model.drives().len()]);
     let (mut free, mut is_part_of_load) = (Vec::new(), Vec::new());
     for (k, column) in std::mem::take(&mut problem.base).into_iter().enumerate() {
@@ -326,11 +334,12 @@ fn fix_parameters(problem: &mut DiagnosisProblem, model: &Model, held: FixedPara
     }
 }
 
-/// Viscous and dry friction and an offset of every drive by itself.
+/// Columns of viscous friction, dry friction and an offset of every drive, in this order.
 fn friction(model: &Model, all: &SegmentList<'_>) -> Outcome<Vec<ForceColumn>> {
     let rates = stack(all, |one| drive_rates(model, one))?;
     let mut friction = Vec::new();
     for (d, rate) in rates.iter().enumerate() {
+        // At exact standstill dry friction has no direction.
         let sign = |v: &f64| if *v == 0.0 { 0.0 } else { v.signum() };
         let signs = rate.iter().map(sign).collect();
         for values in [rate.clone(), signs, vec![1.0; rate.len()]] {
@@ -342,7 +351,7 @@ fn friction(model: &Model, all: &SegmentList<'_>) -> Outcome<Vec<ForceColumn>> {
     Ok(friction)
 }
 
-/// White noise of each force. Where few samples are kept motion passes for noise: it is no more than that of the recorded ones.
+/// White noise of each force, N or N m. After decimation motion may look like noise, so the noise of all recorded samples bounds it.
 fn noise_levels(measured: &[Vec<f64>], all: &SegmentList<'_>) -> Outcome<Vec<f64>> {
     let mut noises = Vec::with_capacity(measured.len());
     for (d, kept) in measured.iter().enumerate() {
@@ -355,7 +364,7 @@ fn noise_levels(measured: &[Vec<f64>], all: &SegmentList<'_>) -> Outcome<Vec<f64
     Ok(noises)
 }
 
-/// White noise of a force, but not less than what rounding leaves of it.
+/// White noise of a force, at least the rounding of its numbers.
 fn noise(force: &[f64]) -> f64 {
     let squares = force.iter().map(|f| f * f).sum::<f64>();
     let size = (squares / force.len().max(1) as f64).sqrt();

@@ -1,4 +1,4 @@
-//! What forces change by with gravity along each axis of the base, for a base that may be tilted.
+//! Change of the forces with gravity along each axis of the base, for a base that may be tilted.
 
 use modelmill_codegen::{Derivation, ModelEvaluator};
 use modelmill_identify::diagnose::{ForceColumn, ForceSensitivity, TiltCandidate};
@@ -7,13 +7,14 @@ use nalgebra::{Matrix3, Rotation3, Vector3};
 use crate::error::Outcome;
 use crate::model::Model;
 
+use super::thresholds::TILT_LEAST_EFFECT;
 use crate::regressors::{SegmentList, regressor};
 
 /// Constants of a tilt, about x, y and z.
 pub(crate) const TILTS: [&str; 3] = ["tx", "ty", "tz"];
 
-/// What each base column changes by with gravity along each axis of the base, those of known parameters included, and the
-/// axes about which a tilt is felt. Gravity is turned into each axis, both ways: forces are linear in it.
+/// Derivative of each base column by gravity along each axis of the base (per m/s^2), and the axes about which a tilt has an
+/// effect. Forces are linear in gravity, so two evaluations for each axis, with gravity in both directions, are exact.
 pub(crate) fn tilt(
     derivation: &Derivation,
     model: &Model,
@@ -28,6 +29,7 @@ pub(crate) fn tilt(
         axes: Vec::new(),
         components: std::array::from_fn(|_| ForceSensitivity::default()),
     };
+    // Without gravity a tilt has no effect.
     if size == 0.0 {
         return Ok(tilt);
     }
@@ -60,6 +62,7 @@ pub(crate) fn tilt(
                 .position(|p| reduction.products[*p] == *product);
             let mut change = ForceColumn(vec![None; model.drives().len()]);
             if let Some(place) = place {
+                // The difference of both directions, per unit of gravity.
                 change.add(0.5 / size, &after[place]);
                 change.add(-0.5 / size, &before[place]);
             }
@@ -71,15 +74,15 @@ pub(crate) fn tilt(
         ..tilt.clone()
     };
     for (axis, direction) in every.directions(&[0.0; 3]).into_iter().enumerate() {
-        let is_felt = (0..own.retained.len()).any(|k| {
+        let has_effect = (0..own.retained.len()).any(|k| {
             let mut change = ForceColumn(vec![None; model.drives().len()]);
             for (share, component) in direction.iter().zip(&tilt.components) {
                 change.add(*share, &component.base[k]);
             }
             let values = change.0.iter().flatten().flatten();
-            values.fold(0.0_f64, |m, x| m.max(x.abs())) > 1e-6
+            values.fold(0.0_f64, |m, x| m.max(x.abs())) > TILT_LEAST_EFFECT
         });
-        if is_felt {
+        if has_effect {
             tilt.axes.push(axis);
         }
     }

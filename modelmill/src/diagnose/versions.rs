@@ -1,4 +1,4 @@
-//! The model as it is and with what was found, each identified and run along all recordings.
+//! The model before and after the effects, each identified and evaluated along all recordings.
 
 use crate::along;
 use crate::diagnose::FixedParameters;
@@ -8,15 +8,15 @@ use crate::identify::{EquationWeights, EstimatorOptions};
 use crate::model::Model;
 use crate::stretch::RecordingSegment;
 
-/// A model along the recordings.
+/// A model with its forces along the recordings.
 pub struct ModelVersion {
     /// The model.
     pub model: Model,
-    /// How it was identified; `None` where all parameters are held.
+    /// Result of the identification; `None` if all parameters are fixed.
     pub identified: Option<Identification>,
-    /// The recordings of the fit, then those of the check.
+    /// Forces along the fitted recordings, then along the validation runs.
     pub runs: Vec<ForceComparison>,
-    /// The recordings themselves.
+    /// The recordings in the same order.
     pub data: Vec<RecordingSegment>,
 }
 
@@ -24,18 +24,18 @@ pub struct ModelVersion {
 pub struct ForceComparison {
     /// The recording's name.
     pub name: String,
-    /// Whether it was kept for the check.
+    /// Whether it is a validation run.
     pub is_check: bool,
     /// Times of the samples, s.
     pub time: Vec<f64>,
-    /// Measured forces.
+    /// Measured forces, N or N m.
     pub measured: Vec<Vec<f64>>,
-    /// The model's.
+    /// Forces of the model, N or N m.
     pub forces: Vec<Vec<f64>>,
 }
 
 impl ForceComparison {
-    /// What is measured and not said by the model.
+    /// Measured minus calculated force of a drive, N or N m.
     pub fn error(&self, drive: usize) -> Vec<f64> {
         let pairs = self.measured[drive].iter().zip(&self.forces[drive]);
         pairs.map(|(y, m)| y - m).collect()
@@ -43,8 +43,8 @@ impl ForceComparison {
 }
 
 impl ModelVersion {
-    /// Identifies a model from the recordings of the fit, as the diagnosis does: drives of different size count alike. With
-    /// held parameters the nominal values are taken.
+    /// Identifies a model from the fitted recordings, with each drive weighted by its residual as in the diagnosis. If all parameters are
+    /// fixed, the nominal values are used.
     pub fn new(
         model: Model,
         fit: Vec<RecordingSegment>,
@@ -65,6 +65,7 @@ impl ModelVersion {
             Some(result) => result.values(),
             None => model.nominal.clone(),
         };
+        // Fitted recordings come first, so the index shows which are validation runs.
         let n_fit = fit.len();
         let data: Vec<RecordingSegment> = fit.into_iter().chain(check).collect();
         let mut runs = Vec::new();
@@ -85,7 +86,7 @@ impl ModelVersion {
         })
     }
 
-    /// The recordings on which errors are judged: those of the check, or those of the fit if there are none.
+    /// Indices of the recordings on which errors are judged: the validation runs, or the fitted ones without any.
     pub fn validation_runs(&self) -> Vec<usize> {
         let has_check = self.runs.iter().any(|run| run.is_check);
         (0..self.runs.len())

@@ -1,4 +1,4 @@
-//! What a variant changes, as JSON and for people.
+//! Differences between two models (entries, parameters, base, operations), as JSON for scripts and as text for people.
 
 use modelmill_codegen::review::NumericMethod;
 use serde_json::{Value, json};
@@ -7,7 +7,8 @@ use crate::model::{EntryChange, Model, ModelChanges};
 use crate::text::TerminalStyle;
 
 impl ModelChanges {
-    /// All changes as one JSON object.
+    /// All changes as one JSON object: base parameters of both models, changed entries, products (eq. (5)), dependencies (eq. (6)),
+    /// base parameters (eq. (16)), and operations for each call.
     pub fn json(&self, before: &Model, after: &Model) -> Value {
         let list = |changes: &[EntryChange]| -> Vec<Value> {
             changes
@@ -74,7 +75,7 @@ impl ModelChanges {
                 }
             }
         };
-        section("entries of the model", "no change", &self.entries);
+        section("entries of the model file", "no change", &self.entries);
         let n = |model: &Model| model.derivation.reduction.products.len();
         section(
             &format!("p_g, eq. (5): {} -> {} products", n(before), n(after)),
@@ -92,7 +93,7 @@ impl ModelChanges {
             &self.base,
         );
         lines.push(String::new());
-        lines.push(style.bold("operations per call"));
+        lines.push(style.bold("Operations per call"));
         for (name, before, after) in &self.operations {
             if before == after {
                 lines.push(format!("  {name}: {after} (no change)"));

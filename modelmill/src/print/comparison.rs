@@ -1,4 +1,4 @@
-//! How far a model is off, as JSON and for people.
+//! Errors of a model on recordings, as JSON for scripts and as text for people.
 
 use serde_json::{Value, json};
 
@@ -9,7 +9,7 @@ use crate::text::TerminalStyle;
 use crate::text::table::count;
 
 impl ModelComparison {
-    /// Figures, regions and remarks as one JSON object; `parameters` says whose values they are: `nominal` or a file.
+    /// Errors, regions and notes as one JSON object; `parameters` is `nominal` or the file that the values come from.
     pub fn json(&self, parameters: &str, spelling: &dyn RemedySpelling) -> Outcome<Value> {
         let mut object = json!({ "model": self.model, "parameters": parameters });
         let figures = serde_json::to_value(&self.figures);
@@ -34,7 +34,7 @@ impl ModelComparison {
         lines.push(String::new());
         lines.extend(tables::figures(&[("error", &self.figures)]));
         lines.push(String::new());
-        lines.push(style.bold("where the error lives"));
+        lines.push(style.bold("Where the error is largest"));
         lines.extend(tables::places(&self.places));
         lines.join("\n")
     }

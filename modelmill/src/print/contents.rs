@@ -1,4 +1,4 @@
-//! What a recording holds, as JSON and for people.
+//! Contents of a recording (tables, columns, sample rates), as JSON for scripts and as text for people.
 
 use std::fmt::Write as _;
 
@@ -10,7 +10,7 @@ use crate::text::TerminalStyle;
 use crate::text::table::{ColumnAlignment, count, number, significant, table};
 
 impl RecordingContents {
-    /// The tables as one JSON object.
+    /// The tables as one JSON object: names, types, number of samples, rate (Hz), start and end (s), and columns.
     pub fn json(&self) -> Value {
         let of_table = |table: &TableInfo| {
             let columns = table.columns.iter();

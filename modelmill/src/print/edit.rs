@@ -1,4 +1,4 @@
-//! An edit of a model file: its difference, and the effect that was added.
+//! An edit of a model file: its difference as text, and the added effect as JSON.
 
 use modelmill_spec::edit::NewEffect;
 use serde_json::{Value, json};
@@ -6,7 +6,7 @@ use similar::TextDiff;
 
 use crate::text::TerminalStyle;
 
-/// Lines around a change that the difference shows.
+/// Unchanged lines that the difference shows before and after a change.
 const CONTEXT: usize = 3;
 
 /// The change as a unified diff.
@@ -21,6 +21,7 @@ pub fn difference(old: &str, new: &str, [before, after]: [&str; 2]) -> String {
 /// A diff for the terminal.
 pub fn colour_diff(difference: &str, style: TerminalStyle) -> String {
     let lines = difference.lines().map(|line| {
+        // The lines with file names begin like added and removed lines, so they are tested first.
         if line.starts_with("+++") || line.starts_with("---") {
             style.bold(line)
         } else if line.starts_with('+') {

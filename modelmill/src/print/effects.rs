@@ -1,4 +1,4 @@
-//! `effects`: the library of effects, as a list or one kind in words.
+//! Output of `effects`: the library of effects as JSON, as a table, or one kind in detail.
 
 use modelmill_spec::{
     ActsOn, ConstantSearch, EffectKind, KindConstant, KindParameter, PlaceLoad, Scale, Sign,
@@ -9,10 +9,10 @@ use crate::error::{Error, Outcome};
 use crate::text::TerminalStyle;
 use crate::text::table::{ColumnAlignment, table};
 
-/// Letters of a line of text.
+/// Width of a line of text, letters.
 const WIDTH: usize = 96;
 
-/// The kinds as one JSON object.
+/// The kinds as one JSON object: where each acts, its expression, and its parameters and constants with units.
 pub fn json(kinds: &[EffectKind]) -> Value {
     json!({ "kinds": kinds.iter().map(kind_json).collect::<Vec<_>>() })
 }
@@ -31,16 +31,19 @@ pub fn kind_table(kinds: &[EffectKind]) -> Vec<String> {
     table(0, &columns, &rows)
 }
 
-/// A kind by its name; fails, with those that are known, if there is none of that name.
+/// A kind by its name.
+///
+/// Fails if there is no kind of that name; the message lists the known ones.
 pub fn kind<'a>(kinds: &'a [EffectKind], name: &str) -> Outcome<&'a EffectKind> {
     let found = kinds.iter().find(|kind| kind.name == name);
     found.ok_or_else(|| unknown_kind_error(name, kinds))
 }
 
+/// The error for an unknown kind; it lists the known ones.
 fn unknown_kind_error(name: &str, kinds: &[EffectKind]) -> Error {
     let names: Vec<&str> = kinds.iter().map(|kind| kind.name.as_str()).collect();
     Error::input(format!(
-        "there is no kind of effect `{name}`; known are {}",
+        "there is no kind of effect `{name}`; the known kinds are {}",
         names.join(", ")
     ))
 }
@@ -50,12 +53,16 @@ fn places(kind: &EffectKind) -> String {
     let all: Vec<&str> = kind.on.iter().map(|on| on.description()).collect();
     let joined = all.join(" or ");
     match (kind.places, kind.other) {
-        (_, Some(other)) => format!("{joined}, by another place that {}", other.description()),
+        (_, Some(other)) => format!(
+            "{joined}, as a function of another place that {}",
+            other.description()
+        ),
         (Some(2), None) => format!("two of: {joined}"),
         _ => joined,
     }
 }
 
+/// What a kind adds to the forces: its expression, or the change of the mechanics in words.
 fn addition_text(kind: &EffectKind) -> String {
     match kind.mechanics {
         Some(mechanics) => mechanics.description().to_owned(),
@@ -63,7 +70,7 @@ fn addition_text(kind: &EffectKind) -> String {
     }
 }
 
-/// One kind in words.
+/// Everything about one kind, as text.
 pub fn kind_text(kind: &EffectKind, style: TerminalStyle) -> String {
     let mut lines = vec![style.bold(&kind.name)];
     lines.extend(wrap_text(&kind.says, 0));
@@ -109,7 +116,7 @@ pub fn kind_text(kind: &EffectKind, style: TerminalStyle) -> String {
     }
     for (head, text) in [
         ("what it is", &kind.explains),
-        ("told from its doubles", &kind.doubles),
+        ("what it can be confused with", &kind.doubles),
     ] {
         if !text.is_empty() {
             lines.push(String::new());
@@ -120,7 +127,7 @@ pub fn kind_text(kind: &EffectKind, style: TerminalStyle) -> String {
     lines.join("\n")
 }
 
-/// Text in lines of even width.
+/// Text in lines of at most `WIDTH` letters.
 fn wrap_text(text: &str, indent: usize) -> Vec<String> {
     let mut lines = vec![" ".repeat(indent)];
     for word in text.split_whitespace() {
@@ -137,12 +144,15 @@ fn wrap_text(text: &str, indent: usize) -> Vec<String> {
     lines
 }
 
+/// Units for the places where a symbol may stand, without repetition.
 fn units(units: &[(PlaceLoad, String)]) -> String {
     let mut all: Vec<&str> = units.iter().map(|(_, unit)| unit.as_str()).collect();
+    // Forces and torques often have different units; equal ones are named once.
     all.dedup();
     all.join(" or ")
 }
 
+/// The bound of a parameter's sign in words; `None` if it may have either.
 fn sign(parameter: &KindParameter) -> Option<&'static str> {
     match parameter.sign {
         Sign::Positive => Some("not negative"),
@@ -151,22 +161,23 @@ fn sign(parameter: &KindParameter) -> Option<&'static str> {
     }
 }
 
-/// How a constant is found where it is not known.
+/// How a constant is determined if no value is given.
 fn search_text(constant: &KindConstant) -> String {
     match constant.search {
         None => String::new(),
-        Some(ConstantSearch::Linear) => "found linearly".to_owned(),
+        Some(ConstantSearch::Linear) => "estimated linearly".to_owned(),
         Some(ConstantSearch::Range { from, to, of }) => {
             let of = match of {
-                Scale::Rate => " of the largest rate",
-                Scale::Travel => " of the travel",
+                Scale::Rate => " times the largest rate",
+                Scale::Travel => " times the travel",
                 Scale::One => "",
             };
-            format!("sought from {from} to {to}{of}")
+            format!("searched from {from} to {to}{of}")
         }
     }
 }
 
+/// A kind as JSON.
 fn kind_json(kind: &EffectKind) -> Value {
     let by_place = |units: &[(PlaceLoad, String)]| -> Value {
         let name = |carries: &PlaceLoad| match carries {

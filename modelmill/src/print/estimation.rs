@@ -1,5 +1,5 @@
-//! What an estimate says beside its values: effective samples, weights, what was left out, bodies, bias; as JSON and for
-//! people.
+//! Properties of an estimate besides its values, as JSON and as text for people: independent samples, weights, parameters that
+//! are not essential, physical parameters, and the bias that instruments remove.
 
 use modelmill_identify::ParameterInfo;
 use modelmill_identify::estimate::PhysicalParameters;
@@ -10,7 +10,7 @@ use crate::identify::{EstimatorOptions, RefinementResult};
 use crate::model::Model;
 use crate::text::table::{ColumnAlignment, count, number, percent, significant, table};
 
-/// The median over the parameters that have any.
+/// Number of independent samples that the correlated ones are worth: the median over the parameters.
 fn effective_samples(found: &RegressionEstimate) -> Option<f64> {
     let mut all: Vec<f64> = found
         .deviations
@@ -19,11 +19,16 @@ fn effective_samples(found: &RegressionEstimate) -> Option<f64> {
         .copied()
         .filter(|x| *x > 0.0 && x.is_finite())
         .collect();
+    // The median, since a parameter that acts rarely has very few samples.
     all.sort_by(f64::total_cmp);
     all.get(all.len() / 2).copied()
 }
 
-/// What `identify --json` holds under `estimator`.
+/// The object `estimator` of `identify --json`.
+///
+/// `effective_samples` is the number of independent samples, `residual_correlation` the correlation of the residuals at lag 1 for
+/// each drive, `bandwidth` the lag (samples) up to which correlations are counted. With weights: `residual_scale` is the noise of
+/// each drive (N or N m). `prior`, `essential`, `physical` and `instruments` are there if the option was used.
 pub(crate) fn json(model: &Model, found: &RegressionEstimate, args: &EstimatorOptions) -> Value {
     let drives = model.drives();
     let by_drive = |values: &[f64]| -> Value {
@@ -40,6 +45,7 @@ pub(crate) fn json(model: &Model, found: &RegressionEstimate, args: &EstimatorOp
         "residual_correlation": by_drive(&found.deviations.residual_lag1),
         "bandwidth": found.deviations.bandwidth,
     });
+    // Optional parts are added only if the estimator computed them.
     let mut put = |name: &str, what: Value| value[name] = what;
     if let Some(weighting) = &found.weighting {
         put("residual_scale", by_drive(&weighting.scales));
@@ -127,32 +133,38 @@ pub(crate) fn text(
             .map(|c| significant(*c, 2))
             .collect();
         lines.push(format!(
-            "effective samples {} of {}: residuals correlate with themselves one sample later by {}",
-            significant(effective, 2),
+            "The residuals are correlated in time (at lag 1, per drive: {}), so these {} samples are worth about {} \
+             independent ones.",
+            correlations.join(", "),
             deviations.samples,
-            correlations.join(", ")
+            significant(effective, 2)
         ));
+        lines.push("The standard deviations above allow for that.".to_owned());
     }
     if let Some(weighting) = &found.weighting {
         let scales: Vec<String> = weighting
             .scales
             .iter()
-            .map(|s| significant(*s, 3))
+            .zip(model.drives())
+            .enumerate()
+            .map(|(d, (s, drive))| {
+                format!("{drive} {} {}", significant(*s, 3), model.force_unit(d))
+            })
             .collect();
         lines.push(format!(
-            "scale of the residuals {}, after {}{}",
+            "noise of each drive used as weight: {} ({}{})",
             scales.join(", "),
-            count(weighting.iterations, "solution", "solutions"),
+            count(weighting.iterations, "iteration", "iterations"),
             if weighting.converged {
                 ""
             } else {
-                ", which had not settled yet"
+                ", not converged"
             }
         ));
         if let Some(bound) = weighting.huber {
             lines.push(format!(
-                "robust: {} of the equations are beyond {bound} scales; of normal errors 18 % are \
-                 beyond 1.345",
+                "robust weights: {} of the residuals exceed {bound} times the noise (of normally distributed ones 18 % \
+                 exceed 1.345 times)",
                 percent(Some(weighting.outliers))
             ));
         }
@@ -169,7 +181,7 @@ pub(crate) fn text(
                 "all base parameters are essential".to_owned()
             } else {
                 format!(
-                    "not essential, kept at their nominal values (0 where there is none): {}; the residual rises by {}",
+                    "not essential, fixed at their nominal values (0 if there is none): {}; the residual grows by {}",
                     names.join(", "),
                     percent(Some(*rise))
                 )
@@ -185,7 +197,7 @@ pub(crate) fn text(
     }) = &found.instruments
     {
         lines.push(format!(
-            "instruments: smallest correlation with the regressor {} (1 is best, below 0.2 is weak)",
+            "instruments: smallest correlation with the regressor {} (1 is ideal, below 0.2 is weak)",
             significant(*strength, 3)
         ));
         let rows: Vec<Vec<String>> = (0..found.unknown.len())
@@ -209,7 +221,7 @@ pub(crate) fn text(
                 ("parameter", ColumnAlignment::Left),
                 ("instruments", ColumnAlignment::Right),
                 ("least squares", ColumnAlignment::Right),
-                ("apart, std", ColumnAlignment::Right),
+                ("difference / std", ColumnAlignment::Right),
             ],
             &rows,
         ));
@@ -217,34 +229,45 @@ pub(crate) fn text(
     lines
 }
 
-/// How many base parameters have a nominal value that counts.
+/// A body is named as nearly impossible if the smallest eigenvalue of its pseudo-inertia matrix is below this part of that of the
+/// nominal body. By judgement.
+const NEARLY_IMPOSSIBLE: f64 = 0.01;
+
+/// How many base parameters have a soft constraint at their nominal value.
 fn prior_text(beliefs: usize, unknown: usize) -> String {
-    let constraints = count(beliefs, "soft constraint", "soft constraints");
+    let constrained = count(beliefs, "base parameter", "base parameters");
     let without = match unknown - beliefs {
         0 => String::new(),
         n => format!(
-            "; {} without one, since their nominal values are 0 or not given",
-            count(n, "base parameter goes", "base parameters go")
+            "; {} none, since their nominal values are 0 or not given",
+            count(n, "base parameter has", "base parameters have")
         ),
     };
-    format!("{constraints} of nominal values count as measurements{without}")
+    format!("nominal values of {constrained} are used as soft constraints{without}")
 }
 
-/// What stands for a share where the recordings say something of a parameter, but not its value.
-const NOT_ALONE: &str = "not alone";
-/// Shares below this one say plainly enough that it is the nominal value that one sees.
+/// Stands in place of a share if the recordings determine a parameter only in combination with others.
+const NOT_ALONE: &str = "only in combination";
+/// Below this share a parameter has its nominal value, and the share is printed as it is. By judgement.
 const NEXT_TO_NOTHING: f64 = 0.01;
+/// Below this share only rounding is left of it. By judgement.
+const PRINTED_AS_ZERO: f64 = 1e-6;
 
-/// How much of a physical parameter the recordings say by themselves.
+/// Share of a physical parameter that the recordings determine, between 0 and 1, as text. The rest comes from nominal values and
+/// from the bounds of physical bodies.
 fn recording_share_text(physical: &PhysicalParameters, i: usize) -> String {
     let share = physical.from_recording[i];
-    if physical.individually_determined[i] || share < NEXT_TO_NOTHING {
+    if share < PRINTED_AS_ZERO {
+        "0 %".to_owned()
+    } else if physical.individually_determined[i] || share < NEXT_TO_NOTHING {
         percent(Some(share))
     } else {
         NOT_ALONE.to_owned()
     }
 }
 
+/// Physical parameters as a table, with the growth of the residual and bodies at the limit of what is possible. `before` is the
+/// residual norm without the bounds.
 fn physical_text(
     model: &Model,
     physical: &PhysicalParameters,
@@ -266,10 +289,25 @@ fn physical_text(
             ]
         })
         .collect();
+    // Parameters of effects that cannot be negative, such as friction, are in the same list as bodies.
+    let terms = model.derivation.mechanism.effects.iter();
+    let terms = terms.flat_map(|effect| &effect.terms);
+    let of_effects: Vec<&str> = terms
+        .map(|term| parameters[term.parameter.0].name.as_str())
+        .collect();
+    let is_of_effect = |name: &&String| of_effects.contains(&name.as_str());
+    let others = bodies.iter().filter(is_of_effect).count();
     let mut lines = vec![
         format!(
-            "physical parameters of {} that can be; the residual rises by {}",
-            count(bodies.len(), "body", "bodies"),
+            "physical parameters of {}, all physically possible{}; the residual grows by {}",
+            count(bodies.len() - others, "body", "bodies"),
+            match others {
+                0 => String::new(),
+                n => format!(
+                    ", and {}",
+                    count(n, "parameter of effects", "parameters of effects")
+                ),
+            },
             percent(Some(physical.residual_norm / before - 1.0))
         ),
         String::new(),
@@ -288,18 +326,19 @@ fn physical_text(
     ));
     if (0..rows.len()).any(|i| recording_share_text(physical, i) == NOT_ALONE) {
         lines.push(format!(
-            "{NOT_ALONE}: the recordings tell combinations of this parameter with others, not it by itself; nominal values and \
-             what a body can be do the rest, also in `std`"
+            "{NOT_ALONE}: the recordings determine sums of this parameter and others, not the parameter itself; its value and \
+             `std` also depend on nominal values and on the bounds of physical bodies"
         ));
     }
+    // A body at its bound shows that the data ask for an impossible one.
     let tight = bodies
         .iter()
         .zip(&physical.margins)
-        .filter(|(_, margin)| **margin < 0.01);
+        .filter(|(_, margin)| **margin < NEARLY_IMPOSSIBLE);
     for (body, margin) in tight {
         lines.push(format!(
-            "{body} is nearly impossible: its smallest eigenvalue is {} of the nominal one; least squares alone would leave \
-             what bodies can have, as where an effect is missing",
+            "{body} is at the limit of what is physically possible: its smallest eigenvalue is {} of the nominal one. Least \
+             squares alone would give an impossible body; a missing effect is a usual cause",
             percent(Some(*margin))
         ));
     }

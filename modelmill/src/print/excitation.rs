@@ -1,4 +1,4 @@
-//! An excitation as JSON and for people.
+//! An exciting trajectory, as JSON for scripts and as text for people: condition number, limits, coefficients.
 
 use modelmill_identify::excite::ExcitationCriterion;
 use serde_json::{Map, Value, json};
@@ -10,12 +10,19 @@ use crate::text::TerminalStyle;
 use crate::text::table::{ColumnAlignment, count, number, significant, table};
 
 impl ExcitationResult {
+    /// Number of limits that the trajectory exceeds.
     fn violations(&self) -> usize {
         let margins = self.found.margins.iter();
         margins.filter(|margin| margin.excess > 0.0).count()
     }
 
-    /// All that was found as one JSON object.
+    /// The trajectory and its quality as one JSON object.
+    ///
+    /// - `condition_number` of the regressor, `start` for the best random trajectory, `scaled_condition_number` with columns of
+    ///   equal norm
+    /// - `value` and `ends`: the criterion at the result and at the end of each start
+    /// - `limits`: the part of each limit that is used (1), and whether it is proven for all times
+    /// - `coefficients`: offset and Fourier coefficients of each coordinate (m or rad); `period` is in s
     pub fn json(&self) -> Value {
         let found = &self.found;
         let names = &self.coordinates;
@@ -23,6 +30,7 @@ impl ExcitationResult {
             let one = json!({ "offset": series.offset, "mu": series.mu, "nu": series.nu });
             (name.clone(), one)
         });
+        // A limit that is zero has no share that is used; JSON has null there.
         let limits = found.margins.iter().map(|margin| {
             json!({
                 "name": margin.name,
@@ -80,11 +88,11 @@ impl ExcitationResult {
         lines.join("\n")
     }
 
-    /// What the trajectory is worth for the base parameters.
+    /// How well the trajectory determines the base parameters.
     fn conditions(&self) -> Vec<String> {
         let found = &self.found;
         let mut lines = vec![format!(
-            "  condition number {}, against {} of the best of {} ({} times better)",
+            "  condition number {}; {} for the best of {} ({} times better)",
             number(found.condition_number),
             number(found.start_condition_number),
             count(
@@ -96,7 +104,7 @@ impl ExcitationResult {
         )];
         if let Some(scaled) = self.scaled {
             lines.push(format!(
-                "  {} with columns of equal norm; the regressor was evaluated for {}",
+                "  {} after scaling the columns to equal norm; {} evaluated",
                 number(scaled),
                 count(found.evaluations, "trajectory", "trajectories")
             ));

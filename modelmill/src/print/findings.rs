@@ -1,19 +1,36 @@
-//! What a diagnosis found as JSON and for people.
+//! Findings of a diagnosis, as JSON for scripts and as text for people: verdict, errors after each step, effects, disturbances,
+//! rejected candidates and next steps.
 
-use modelmill_identify::diagnose::{DiagnosisVerdict, SelectionStep};
+use modelmill_identify::diagnose::{Effect, DiagnosisVerdict, SelectionStep};
 use serde_json::{Map, Value, json};
 
 use super::laws;
-use crate::diagnose::{DiagnosisFindings, EffectEstimate, words};
+use crate::diagnose::{DiagnosisFindings, EffectEstimate, Untold, words};
 use crate::print::{OptionName, Remedy, StepSpelling, notes};
 use crate::text::TerminalStyle;
 use crate::text::table::{ColumnAlignment, number, percent, significant, table};
 
-/// Candidates that the text names.
+/// Rejected candidates that the text names at most.
 const MOST_CANDIDATES: usize = 6;
+/// Least share of the squared error that a rejected candidate must explain alone to be named. By judgement.
+const NAMED_LEAST_SHARE: f64 = 0.01;
 
 impl DiagnosisFindings {
-    /// All that was found as one JSON object; `spelling` says how its reader asks for what it advises.
+    /// All findings as one JSON object; `spelling` writes commands or calls for its reader.
+    ///
+    /// - `verdict`, `noise_floor` (relative to the force, as all errors here)
+    /// - `budget`: for each drive the parts of its residual relative to its force, whose `rms` is in `unit`
+    /// - `disturbances`: faults of the recordings, with estimates and times (`interval`, s)
+    /// - `steps`: errors after each added effect, on fitted (`fit`) and validation data (`check`)
+    /// - `effects`: missing effects with estimates, probability and alternatives
+    /// - `candidates`: all effects that were tried, with the share of the squared error that each explains alone and the reason
+    ///   of its rejection
+    /// - `untold`: effects that the recordings can neither show nor exclude
+    /// - `laws`: hypotheses for the residual
+    /// - `parameters_off_nominal`: base parameters that differ from the file, in standard deviations (`sigmas`)
+    /// - `unexplained`: drives with a repeatable residual that no effect explains
+    /// - `data`, `where`: notes on the recordings, and regions where the error is largest
+    /// - `with_nominal_parameters`: the diagnosis with all parameters fixed
     pub fn json(&self, spelling: &dyn StepSpelling) -> Value {
         let diagnosis = &self.diagnosis;
         let channels = self.channels();
@@ -43,6 +60,7 @@ impl DiagnosisFindings {
                 json!({"name": p.name, "expression": p.expression, "nominal": off.nominal, "value": p.value, "sigmas": off.sigmas, "unit": p.unit})
             })
             .collect();
+        // Parts of the residual are relative to the rms force of the drive.
         let budget: Map<String, Value> = (channels.iter().zip(&diagnosis.budgets).enumerate())
             .map(|(d, (channel, budget))| {
                 let part = |x: f64| {
@@ -117,7 +135,7 @@ impl DiagnosisFindings {
             .map(|line| style.bold(line))
             .collect();
         lines.push(String::new());
-        lines.push(style.bold("the ladder: relative error, step by step"));
+        lines.push(style.bold("Error after each added effect, relative to the force (nrms)"));
         let rows: Vec<Vec<String>> = (diagnosis.steps.iter())
             .map(|rung| {
                 vec![
@@ -142,54 +160,58 @@ impl DiagnosisFindings {
         lines.push(String::new());
         lines.push(
             style.bold(if diagnosis.verdict == DiagnosisVerdict::Unexplained {
-                "where what is left sits"
+                "Where the residual is largest"
             } else {
-                "where the error of the model as it is sits"
+                "Where the error without added effects is largest"
             }),
         );
         let places = &self.regions;
         lines.extend(places.iter().map(|region| format!("  {}.", region.says)));
         if places.is_empty() {
-            lines.push("  No region of coordinates, rates, loads or time stands out.".to_owned());
+            lines.push(
+                "  Nowhere in particular: no range of a coordinate, rate, load or time stands out."
+                    .to_owned(),
+            );
         }
         lines.extend(laws::text(&self.laws, &self.before.model, style, spelling));
         self.refused_text(style, &mut lines);
         self.undecided_text(style, &mut lines);
         self.off_nominal_text(style, spelling, &mut lines);
+        // Entries to add first, then advice for what a model file cannot contain.
         let mut next: Vec<String> = (self.entries_to_add().iter())
             .map(|entry| spelling.spell_effect(&self.before.model, entry))
             .collect();
         next.extend(self.further_action().map(str::to_owned));
         if !next.is_empty() {
             lines.push(String::new());
-            lines.push(style.bold("how to go on"));
+            lines.push(style.bold("Next steps"));
             lines.extend(next.iter().map(|line| format!("  {line}")));
         }
         if let Err(says) = &self.after
             && !says.is_empty()
         {
             lines.push(format!(
-                "  The model with what was found cannot be made: {}",
+                "  The model with the added effects cannot be built: {}",
                 says.spell(spelling)
             ));
         }
         lines
     }
 
-    /// What the recordings have besides, and where the error that is left comes from.
+    /// Disturbances of the recordings, and the parts of the residual of each drive.
     fn disturbances_text(&self, style: TerminalStyle, lines: &mut Vec<String>) {
         let diagnosis = &self.diagnosis;
         if !diagnosis.disturbances.is_empty() {
             lines.push(String::new());
-            lines.push(style.bold("what the recordings have besides, and the model does not lack"));
+            lines.push(style.bold("Disturbances in the recordings (not model errors)"));
             for one in &diagnosis.disturbances {
                 let says = format!("{}.", one.description.as_deref().unwrap_or_default());
-                let told = words::lines(&says, 98);
-                lines.extend(told.iter().map(|line| format!("  {line}")));
+                let wrapped = words::lines(&says, 98);
+                lines.extend(wrapped.iter().map(|line| format!("  {line}")));
             }
         }
         lines.push(String::new());
-        lines.push(style.bold("what is left of each drive, as a part of its force"));
+        lines.push(style.bold("Remaining error of each drive, % of its force (rms)"));
         let part = |x: f64, force: f64| percent((force > 0.0).then(|| x / force));
         let rows: Vec<Vec<String>> = (self.channels().iter().zip(&diagnosis.budgets))
             .map(|(channel, budget)| {
@@ -207,14 +229,15 @@ impl DiagnosisFindings {
             &[
                 ("drive", ColumnAlignment::Left),
                 ("noise", ColumnAlignment::Right),
-                ("not repeating", ColumnAlignment::Right),
-                ("model", ColumnAlignment::Right),
+                ("not repeatable", ColumnAlignment::Right),
+                ("unexplained by the model", ColumnAlignment::Right),
             ],
             &rows,
         ));
     }
 
-    /// What was found, with values and doubles.
+    /// Missing effects with their estimates, and effects that explain the recordings equally well. What a kind means and how to
+    /// separate it are printed once, at its first place.
     fn missing_text(
         &self,
         style: TerminalStyle,
@@ -225,8 +248,12 @@ impl DiagnosisFindings {
             return;
         }
         lines.push(String::new());
-        lines.push(style.bold("what is missing"));
+        lines.push(style.bold("Missing effects"));
+        let mut explained: Vec<&str> = Vec::new();
         for found in &self.missing {
+            let name = found.effect.kind.as_str();
+            let is_first = !explained.contains(&name);
+            explained.push(name);
             let values: Vec<String> = (found.estimates.iter())
                 .map(|e| {
                     let std = e
@@ -242,49 +269,48 @@ impl DiagnosisFindings {
                 words::effect(&found.effect),
                 values.join(", ")
             ));
+            // Kinds of the libraries have a text of their own; others are explained here.
             let mut kinds = self.answer.candidates.kinds.iter();
             let kind = kinds.find(|kind| kind.name == found.effect.kind);
             let meaning = kind.map_or_else(
                 || words::meaning(&found.effect.kind),
                 |kind| Some(kind.says.as_str()),
             );
-            if let Some(meaning) = meaning {
+            if let Some(meaning) = meaning.filter(|_| is_first) {
                 lines.push(style.dim(&format!("    {meaning}")));
             }
             if !found.indistinguishable_from.is_empty() {
                 lines.push(format!(
-                    "    These recordings cannot tell it from {}.",
+                    "    With these recordings it is not distinguishable from {}.",
                     words::effects(&found.indistinguishable_from)
                 ));
-                if let Some(says) = &found.separating_experiment {
+                if let Some(says) = found.separating_experiment.as_ref().filter(|_| is_first) {
                     let wrapped = words::lines(says, 96);
                     lines.extend(wrapped.iter().map(|line| style.dim(&format!("    {line}"))));
                 }
                 if let Some(asked) = &found.separation
                     && let Some(command) = spelling.spell_separation(&self.before.model, asked)
                 {
-                    lines.push("    Motion that tells them apart is sought by".to_owned());
+                    lines.push("    To plan a motion that distinguishes them:".to_owned());
                     lines.push(format!("      {command}"));
                 }
             }
         }
     }
 
-    /// The best of what was refused, with the reason.
+    /// The rejected candidates that explain most of the error alone, with the reason.
     fn refused_text(&self, style: TerminalStyle, lines: &mut Vec<String>) {
+        let has_effects = !self.diagnosis.effects.is_empty();
+        // Candidates are sorted by what they explain alone, so the first are the closest rivals.
         let candidates = self.diagnosis.candidates.iter();
         let rows: Vec<Vec<String>> = candidates
             .filter_map(|c| {
                 let why = c.rejection_reason.clone()?;
-                (c.explained > 0.01).then(|| {
+                (c.explained > NAMED_LEAST_SHARE).then(|| {
                     vec![
                         words::effect(&c.effect),
                         percent(Some(c.explained)),
-                        if why == "sign" {
-                            "beside what was found its sign makes no sense".to_owned()
-                        } else {
-                            why
-                        },
+                        words::refusal(&why, has_effects).to_owned(),
                     ]
                 })
             })
@@ -294,37 +320,56 @@ impl DiagnosisFindings {
             return;
         }
         lines.push(String::new());
-        lines.push(style.bold("what was considered and refused"));
+        lines.push(style.bold("Rejected candidates"));
         lines.extend(table(
             2,
             &[
                 ("candidate", ColumnAlignment::Left),
-                ("explains alone", ColumnAlignment::Right),
-                ("refused because", ColumnAlignment::Left),
+                ("alone it would explain", ColumnAlignment::Right),
+                ("rejected because", ColumnAlignment::Left),
             ],
             &rows,
         ));
     }
 
-    /// What the recordings leave open, with the experiment that would tell.
+    /// Effects that these recordings can neither show nor exclude, each with the experiment that would decide.
     fn undecided_text(&self, style: TerminalStyle, lines: &mut Vec<String>) {
         if self.undecided.is_empty() {
             return;
         }
         lines.push(String::new());
-        lines.push(style.bold("what these recordings cannot tell"));
+        lines.push(style.bold("Effects that these recordings can neither show nor exclude"));
+        // Effects of one kind share their text, so it is printed once with all places.
+        let mut groups: Vec<(&Untold, Vec<&Effect>)> = Vec::new();
         for one in &self.undecided {
-            let says = words::lines(
-                &format!("{}: {}.", words::effect(&one.effect), one.reason),
-                98,
-            );
+            let is_alike = |(first, _): &&mut (&Untold, _)| {
+                (&first.effect.kind, &first.reason) == (&one.effect.kind, &one.reason)
+            };
+            match groups.iter_mut().find(is_alike) {
+                Some((_, effects)) => effects.push(&one.effect),
+                None => groups.push((one, vec![&one.effect])),
+            }
+        }
+        for (first, effects) in groups {
+            let (title, experiment) = match effects.as_slice() {
+                [one] => (words::effect(one), first.separating_experiment.clone()),
+                all => {
+                    let kind = &first.effect.kind;
+                    let places: Vec<String> = all.iter().map(|one| one.at.join(", ")).collect();
+                    (
+                        format!("{} ({})", words::kind(kind), places.join("; ")),
+                        self.deciding_experiment(kind, "each of these places"),
+                    )
+                }
+            };
+            let reason = words::lines(&format!("{title}: {}.", first.reason), 98);
             lines.extend(says.iter().map(|line| format!("  {line}")));
-            let wrapped = words::lines(&one.separating_experiment, 96);
+            let wrapped = words::lines(&experiment, 96);
             lines.extend(wrapped.iter().map(|line| style.dim(&format!("    {line}"))));
         }
     }
 
-    /// Parameters that differ from what the file says.
+    /// Base parameters whose estimates differ from the nominal values of the file.
     fn off_nominal_text(
         &self,
         style: TerminalStyle,
@@ -348,45 +393,45 @@ impl DiagnosisFindings {
             })
             .collect();
         lines.push(String::new());
-        lines.push(style.bold("base parameters off their nominal values"));
+        lines.push(style.bold("Base parameters that differ from their nominal values"));
         lines.extend(table(
             2,
             &[
                 ("", ColumnAlignment::Left),
                 ("nominal", ColumnAlignment::Right),
                 ("identified", ColumnAlignment::Right),
-                ("sigmas", ColumnAlignment::Right),
+                ("difference / std", ColumnAlignment::Right),
                 ("unit", ColumnAlignment::Left),
-                ("", ColumnAlignment::Left),
+                ("expression", ColumnAlignment::Left),
             ],
             &rows,
         ));
         lines.push(
-            "  They make up for what the nominal values lack, such as a payload, a misplaced mass or a wrong length."
+            "  Possible causes: a payload, a misplaced mass or a wrong length that the nominal values do not contain."
                 .to_owned(),
         );
         let Some(held) = &self.with_nominal else {
             return;
         };
         let says = words::verdict(&held.diagnosis, self.channels(), self.validation);
-        let says = format!("With all parameters held at their nominal values: {says}");
+        let says = format!("With all parameters fixed at their nominal values: {says}");
         lines.extend(
             words::lines(&says, 98)
                 .iter()
                 .map(|line| format!("  {line}")),
         );
         let fix_parameters = Remedy::option(OptionName::Held).spell(spelling);
-        lines.push(format!("  ({fix_parameters} tells more.)"));
+        lines.push(format!("  (Details: {fix_parameters}.)"));
     }
 }
 
-/// Estimates as scripts read them.
+/// Estimates as JSON.
 pub(super) fn estimates(all: &[EffectEstimate]) -> Vec<Value> {
     let one = |e: &EffectEstimate| json!({"name": e.name, "value": e.value, "std": e.std, "unit": e.unit});
     all.iter().map(one).collect()
 }
 
-/// The ladder as scripts read it.
+/// The steps of the search as JSON.
 fn steps(ladder: &[SelectionStep]) -> Vec<Value> {
     let step = |rung: &SelectionStep| {
         json!({

@@ -1,4 +1,5 @@
-//! An identification as JSON and for people.
+//! Result of an identification, as JSON for scripts and as text for people: base parameters with standard deviations, errors
+//! and the next step.
 
 use modelmill_identify::ParameterStatus;
 use serde_json::{Value, json};
@@ -8,7 +9,7 @@ use crate::identify::Identification;
 use crate::model::Model;
 use crate::print::{RemedySpelling, estimation, notes, tables};
 use crate::text::TerminalStyle;
-use crate::text::table::{count, number};
+use crate::text::table::{count, significant};
 
 impl Identification {
     /// The fit with all figures as one JSON object, from which [`modelmill_identify::FitFile`] is read again.
@@ -23,6 +24,7 @@ impl Identification {
                 "nominal".to_owned(),
                 json!({ "fit": self.nominal_fit, "check": self.nominal_check }),
             );
+            // Figures of the estimator belong to this output only; a fit file is read without them.
             object.insert(
                 "estimator".to_owned(),
                 estimation::json(model, &self.found, &self.options),
@@ -64,15 +66,16 @@ impl Identification {
         lines.extend(tables::parameters(&fit.parameters));
         lines.push(String::new());
         lines.push(format!(
-            "  condition number {}, {} with columns of equal norm",
+            "  condition number {} ({} after scaling the columns to equal norm; below 100 is good)",
             fit.condition_number
-                .map_or_else(|| "infinite".to_owned(), number),
+                .map_or_else(|| "infinite".to_owned(), |value| significant(value, 4)),
             fit.scaled_condition_number
-                .map_or_else(|| "infinite".to_owned(), number),
+                .map_or_else(|| "infinite".to_owned(), |value| significant(value, 3)),
         ));
         lines.extend(estimator.iter().map(|line| format!("  {line}")));
         lines.push(String::new());
-        lines.push(style.bold("error"));
+        lines.push(style.bold("Error"));
+        // Errors with nominal values mean nothing if the file has none.
         let has_nominal = (0..model.base.len()).any(|k| model.has_nominal(k));
         let mut figures = Vec::new();
         if has_nominal {
@@ -81,9 +84,9 @@ impl Identification {
         figures.push(("fit, identified", &fit.fit));
         if let (Some(check), Some(nominal)) = (&fit.check, &self.nominal_check) {
             if has_nominal {
-                figures.push(("check, nominal", nominal));
+                figures.push(("validation, nominal", nominal));
             }
-            figures.push(("check, identified", check));
+            figures.push(("validation, identified", check));
         }
         lines.extend(tables::figures(&figures));
         lines.push(String::new());

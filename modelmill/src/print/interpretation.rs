@@ -1,4 +1,4 @@
-//! Physical parameters as JSON and for people.
+//! Physical parameters solved from base parameters, as JSON for scripts and as text for people.
 
 use modelmill_boundary::message;
 use modelmill_identify::interpret::{PhysicalInterpretation, PhysicalSolution};
@@ -10,7 +10,12 @@ use crate::text::TerminalStyle;
 use crate::text::table::{ColumnAlignment, count, number, significant, table};
 
 impl InterpretationResult {
-    /// All that was found as one JSON object.
+    /// All solutions as one JSON object; values in SI units.
+    ///
+    /// - `identifiable`, `method`: whether and how the base parameters determine the unknowns
+    /// - `solutions`: values with standard deviations, and whether each is plausible; `fit`: residuals of each solution
+    /// - `determined`: unknowns with a unique value; `undetermined`: sentences about the others
+    /// - `base_parameters`: those that were used as equations
     pub fn json(&self) -> Value {
         let parameters = &self.model.derivation.mechanism.parameters;
         let names = self.names();
@@ -36,11 +41,13 @@ impl InterpretationResult {
                 "residuals": Value::Object(entries.collect::<Map<_, _>>()),
             })
         };
+        // `none` means that the base parameters do not determine the unknowns.
         let method = match &self.found {
             PhysicalInterpretation::Exact { .. } => "exact",
             PhysicalInterpretation::LeastSquares { .. } => "least_squares",
             PhysicalInterpretation::Undetermined { .. } => "none",
         };
+        // If not all unknowns are determined, some may still be.
         let determined: Vec<&String> = match &self.found {
             PhysicalInterpretation::Undetermined { determined, .. } => {
                 let pairs = names.iter().zip(determined);
@@ -75,7 +82,7 @@ impl InterpretationResult {
                 self.model.name
             ),
             PhysicalInterpretation::Exact { .. } => format!(
-                "{}: {} for {unknowns} from {equations}, and no others",
+                "{}: {} for {unknowns} from {equations}; there are no others",
                 self.model.name,
                 count(solutions.len(), "real solution", "real solutions"),
             ),
@@ -86,10 +93,10 @@ impl InterpretationResult {
                 self.model.name
             ),
             PhysicalInterpretation::LeastSquares { starts, .. } => format!(
-                "{}: {} of weighted least squares for {unknowns} from {equations}, looked for from {}",
+                "{}: {} of weighted least squares for {unknowns} from {equations}, searched from {}",
                 self.model.name,
                 count(solutions.len(), "minimum", "minima"),
-                count(*starts, "start", "starts"),
+                count(*starts, "starting point", "starting points"),
             ),
         };
         let mut lines = vec![style.bold(&head)];
@@ -98,14 +105,14 @@ impl InterpretationResult {
         }
         if !self.directions().is_empty() {
             let how = message!(
-                "  Hold one parameter of each line at its nominal value, that is, leave it out of {}.",
+                "  Fix one parameter of each line at its nominal value: leave it out of {}.",
                 Remedy::option(OptionName::Unknown)
             );
             lines.push(how.spell(spelling));
         }
         if let (PhysicalInterpretation::Exact { .. }, []) = (&self.found, solutions) {
             lines.push(
-                "  No real values of these parameters give the base parameters; hold others at their nominal values."
+                "  No real values of these parameters give the base parameters. Fix other parameters at their nominal values."
                     .to_owned(),
             );
         }
@@ -122,6 +129,7 @@ impl InterpretationResult {
         lines.join("\n")
     }
 
+    /// A solution as a table: nominal and solved values, standard deviations, and objections to values that are not plausible.
     fn table(&self, one: &PhysicalSolution) -> Vec<String> {
         let parameters = &self.model.derivation.mechanism.parameters;
         let rows: Vec<Vec<String>> = (0..self.unknown.len())
@@ -152,6 +160,7 @@ impl InterpretationResult {
         table(2, &columns, &rows)
     }
 
+    /// Residuals of the base parameters for a solution by least squares, each in the unit of its base parameter.
     fn residuals(&self, one: &PhysicalSolution) -> Vec<String> {
         let rows: Vec<Vec<String>> = self
             .used

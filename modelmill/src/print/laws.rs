@@ -1,4 +1,4 @@
-//! Laws that a diagnosis proposes, as JSON and for people.
+//! Laws that a diagnosis proposes for the residual, as JSON for scripts and as text for people.
 
 use serde_json::{Value, json};
 
@@ -9,30 +9,31 @@ use crate::print::StepSpelling;
 use crate::text::TerminalStyle;
 use crate::text::table::{number, percent, significant};
 
-/// What is said of every law.
-pub(crate) const HYPOTHESIS: &str =
-    "A hypothesis that these recordings suggest, no finding: nothing says that the machine has it.";
-/// What an entry of a library needs to be known, and where the law cannot be written down.
+/// The caution that goes with every law.
+pub(crate) const HYPOTHESIS: &str = "A hypothesis that these recordings suggest, not a finding: nothing proves that the machine has it.";
+/// Name of the file that the text suggests for the entry of a library.
 pub(crate) const LIBRARY: &str = "laws.toml";
-pub(crate) const PATH_DEPENDENT_NOTE: &str = "It depends on the way there, which no formula of a library says; it is told so that it can be looked for.";
+/// Why a law with memory has no entry.
+pub(crate) const PATH_DEPENDENT_NOTE: &str = "It depends on the earlier motion, which no formula of a library can express. It is reported so that you can search for the cause.";
 
-/// Laws as scripts read them.
+/// Laws as JSON, the best first, each with its alternatives.
 pub(super) fn laws(
     laws: &[LawHypothesis],
     model: &Model,
     spelling: &dyn StepSpelling,
 ) -> Vec<Value> {
     let one = |hypothesis: &LawHypothesis| {
-        let mut told = law(&hypothesis.law, model, spelling);
+        let mut object = law(&hypothesis.law, model, spelling);
         let ties = hypothesis.near_ties.iter();
-        told["near_ties"] = ties.clone().map(|tie| json!(tie.label())).collect();
-        told["ties"] = ties.map(|tie| law(tie, model, spelling)).collect();
-        told["says"] = json!(HYPOTHESIS);
-        told
+        object["near_ties"] = ties.clone().map(|tie| json!(tie.label())).collect();
+        object["ties"] = ties.map(|tie| law(tie, model, spelling)).collect();
+        object["says"] = json!(HYPOTHESIS);
+        object
     };
     laws.iter().map(one).collect()
 }
 
+/// A law as JSON, with its entry for a library and the step that adds it.
 fn law(law: &ProposedLaw, model: &Model, spelling: &dyn StepSpelling) -> Value {
     let entry = law.entry.as_ref();
     json!({
@@ -60,7 +61,7 @@ pub(super) fn text(
         return lines;
     }
     lines.push(String::new());
-    lines.push(style.bold("which law would explain what is left: a hypothesis, to be tried"));
+    lines.push(style.bold("Laws that would explain the residual (hypotheses, to be tested)"));
     for hypothesis in laws {
         let law = &hypothesis.law;
         lines.push(format!("  {}", law.label()));
@@ -68,21 +69,21 @@ pub(super) fn text(
         let wrapped = words::lines(&gain(law), 96);
         lines.extend(wrapped.iter().map(|line| format!("    {line}")));
         if !hypothesis.near_ties.is_empty() {
-            lines.push("    As near to these recordings are".to_owned());
+            lines.push("    These explain the recordings equally well:".to_owned());
             for tie in &hypothesis.near_ties {
                 lines.push(format!("      {}", tie.label()));
             }
         }
         match &law.entry {
             Some(entry) => {
-                lines.push(format!("    As a library, {LIBRARY}:"));
+                lines.push(format!("    As a library file, {LIBRARY}:"));
                 lines.extend(
                     entry
                         .text
                         .lines()
                         .map(|line| style.dim(&format!("      {line}"))),
                 );
-                lines.push("    and with it".to_owned());
+                lines.push("    and to add it:".to_owned());
                 let command = spelling.spell_effect_of_library(model, &entry.effect, LIBRARY);
                 lines.push(format!("      {command}"));
             }
@@ -95,7 +96,7 @@ pub(super) fn text(
     lines
 }
 
-/// Parameters with their deviations and units.
+/// Parameters of a law with standard deviations and units.
 pub(crate) fn values(law: &ProposedLaw) -> String {
     let value = |p: &crate::diagnose::EffectEstimate| {
         let deviation =
@@ -108,14 +109,14 @@ pub(crate) fn values(law: &ProposedLaw) -> String {
     all.join(", ")
 }
 
-/// What it takes off, and what it makes needless.
+/// Which share of the residual a law explains, and which effects it makes unnecessary.
 pub(crate) fn gain(law: &ProposedLaw) -> String {
     let mut says = format!(
-        "takes off {} of the squared error that is left where it was not fitted",
+        "explains {} of the squared residual on data that were not fitted",
         percent(Some(law.gain))
     );
     if !law.instead_of.is_empty() {
-        says.push_str(", and then the recordings need no ");
+        says.push_str(", and makes these effects unnecessary: ");
         says.push_str(&words::effects(&law.instead_of));
     }
     says.push('.');

@@ -1,4 +1,5 @@
-//! Printers of results: JSON objects for scripts, text for people. Each prints a value of the library; none looks anything up.
+//! Output of results. Each module takes one value of the library and returns JSON for scripts and text for people; none reads
+//! files or computes.
 
 mod changes;
 mod comparison;
@@ -28,7 +29,7 @@ pub use spelling::{
 };
 pub use summary::{faults, refusal, warnings};
 
-/// Remarks as JSON.
+/// Notes as JSON.
 pub(crate) fn notes(notes: &[RecordingNote], spelling: &dyn RemedySpelling) -> Value {
     notes.iter().map(|note| note.json(spelling)).collect()
 }

@@ -1,4 +1,4 @@
-//! A reduction of a rig as JSON and for people.
+//! Reduction of a rig to a model, as JSON for scripts and as text for people.
 
 use std::fmt::Write as _;
 
@@ -22,7 +22,9 @@ impl RigReduction {
     /// The same for people.
     pub fn text(&self) -> String {
         let mut text = self.reduction.report.text();
-        text.push_str("Price - forces of the model against those of the rig, relative\n");
+        text.push_str(
+            "Error - forces of the model compared with those of the rig, relative (nrms)\n",
+        );
         for one in &self.forces {
             let _ = writeln!(text, "  {:<16}{:.1e}", one.drive, one.nrms);
         }
@@ -30,6 +32,7 @@ impl RigReduction {
     }
 }
 
+/// Findings of the reduction as JSON, with the sizes that led to each.
 fn findings(report: &ReductionReport) -> Vec<Value> {
     let findings = report.findings.iter();
     findings

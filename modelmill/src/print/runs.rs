@@ -1,4 +1,4 @@
-//! What differs between runs as JSON and for people.
+//! Differences between runs of one machine, as JSON for scripts and as text for people.
 
 use modelmill_identify::ParameterInfo;
 use serde_json::{Value, json};
@@ -12,7 +12,14 @@ use crate::text::TerminalStyle;
 use crate::text::table::{ColumnAlignment, count, table, with_deviation};
 
 impl RunsComparison {
-    /// All that was found as one JSON object.
+    /// All differences as one JSON object; values in SI units.
+    ///
+    /// - `together`: base parameters of one fit to all runs; `runs`: those of each run fitted separately
+    /// - `moved`: base parameters that differ between the first run and another, in standard deviations (`sigmas`)
+    /// - `changes`: physical changes of a run relative to the first
+    /// - `change_points`: lasting changes, from four runs on
+    /// - `unread`: files that could not be evaluated, with the reason
+    /// - `per_run`: the joint fit in which runs have some values for themselves, if it was requested
     pub fn json(&self, spelling: &dyn RemedySpelling) -> Value {
         let later = || self.runs.iter().enumerate().skip(1);
         let moved = later().flat_map(|(k, run)| {
@@ -45,6 +52,7 @@ impl RunsComparison {
         })
     }
 
+    /// A lasting change as JSON: the run from which on it is there, means before and since, and physical causes.
     fn point_json(&self, point: &ChangePoint) -> Value {
         let steps = point.steps.iter().map(|step| {
             json!({
@@ -64,7 +72,7 @@ impl RunsComparison {
         })
     }
 
-    /// The fit in which some values are each run's own.
+    /// The joint fit, in which some values are shared and each run has others for itself.
     fn shared_json(&self, fit: &SharedFit) -> Value {
         let shared = self.parameters.iter().zip(&fit.shared);
         let shared = shared.filter_map(|(info, value)| {
@@ -94,6 +102,7 @@ impl RunsComparison {
         })
     }
 
+    /// Base parameters with one fitted value each as JSON.
     fn parameters_json(&self, fitted: &[FittedValue]) -> Vec<Value> {
         let pairs = self.parameters.iter().zip(fitted);
         let one = |(info, fitted): (&ParameterInfo, &FittedValue)| {
@@ -129,11 +138,12 @@ impl RunsComparison {
             return String::new();
         };
         let mut lines = vec![style.bold(&format!(
-            "{}: {} against {}",
+            "{}: {} compared with {}",
             self.model,
             count(later.len(), "run", "runs"),
             first.file
         ))];
+        // With many runs the lasting changes come first, since single runs fill pages.
         if later.len() > MOST_DETAILED_RUNS {
             self.write_change_points(&mut lines, style);
         }
@@ -156,13 +166,13 @@ impl RunsComparison {
         for one in &self.unread {
             lines.push(String::new());
             let why = one.error.spell(spelling);
-            lines.push(format!("{} gave no answer: {why}", one.file));
+            lines.push(format!("{} was not evaluated: {why}", one.file));
         }
         lines.push(String::new());
         lines.join("\n")
     }
 
-    /// A run against the first.
+    /// A run compared with the first one.
     fn write_run(
         &self,
         first: &RunReport,
@@ -173,15 +183,16 @@ impl RunsComparison {
         lines.push(String::new());
         lines.push(style.bold(&run.file));
         write_changes(&run.changes, lines);
+        // A contact within a run is no change of the machine.
         let is_event = |one: &RunChange| matches!(one.change, PhysicalChange::ContactEvent { .. });
         if run.changes.iter().all(is_event) {
-            let else_ = if run.changes.is_empty() { "" } else { " else" };
+            let other = if run.changes.is_empty() { "" } else { "other " };
             lines.push(format!(
-                "  nothing{else_} changed beyond what chance, the noise of the runs and the errors of the model make"
+                "  No {other}change found that is larger than noise and model error."
             ));
         }
         if !run.moved.is_empty() {
-            lines.push("  Base parameters that moved, each run fitted alone:".to_owned());
+            lines.push("  Base parameters that changed (each run fitted separately):".to_owned());
             let rows: Vec<Vec<String>> = run
                 .moved
                 .iter()
@@ -191,7 +202,7 @@ impl RunsComparison {
                 ("name", ColumnAlignment::Left),
                 ("before", ColumnAlignment::Right),
                 ("now", ColumnAlignment::Right),
-                ("+-", ColumnAlignment::Right),
+                ("std", ColumnAlignment::Right),
                 ("unit", ColumnAlignment::Left),
                 ("expression", ColumnAlignment::Left),
             ];
@@ -199,17 +210,19 @@ impl RunsComparison {
         }
     }
 
-    /// When something changed and stayed changed.
+    /// Changes that last over two or more runs; nothing for fewer than four runs.
     fn write_change_points(&self, lines: &mut Vec<String>, style: TerminalStyle) {
+        // A lasting change needs two runs before and two after it.
         if self.runs.len() < 4 {
             return;
         }
         lines.push(String::new());
-        lines.push(style.bold("Over the order of the runs"));
+        lines.push(style.bold("Lasting changes, in the order of the runs"));
         if self.points.is_empty() {
-            lines.push("  no base parameter changed and stayed changed".to_owned());
+            lines.push("  No base parameter changed for two or more runs.".to_owned());
         }
         for point in &self.points {
+            // Six names are enough to recognise the change; the JSON has all.
             let names: Vec<&str> = (point.steps.iter().take(6))
                 .map(|step| self.parameters[step.parameter].name.as_str())
                 .collect();
@@ -231,6 +244,7 @@ impl RunsComparison {
         }
     }
 
+    /// A row of the table of changed base parameters. The standard deviation is that of the difference of both runs.
     fn moved_parameter_row(&self, first: &RunReport, run: &RunReport, k: usize) -> Vec<String> {
         let (before, now) = (first.alone[k], run.alone[k]);
         let info = &self.parameters[k];
@@ -246,27 +260,28 @@ impl RunsComparison {
     }
 }
 
-/// Up to so many later runs are told one after the other with their base parameters.
+/// Up to this number of later runs each run is listed with its base parameters; beyond, only changes are listed.
 const MOST_DETAILED_RUNS: usize = 12;
 
+/// Adds one line for each change, with the changes that explain the runs equally well.
 fn write_changes(changes: &[RunChange], lines: &mut Vec<String>) {
     for change in changes {
         lines.push(format!("  {}", change.says));
         if !change.rivals.is_empty() {
             lines.push(format!(
-                "    these runs cannot tell it from: {}",
+                "    with these runs it is not distinguishable from: {}",
                 change.rivals.join("; ")
             ));
         }
     }
 }
 
-/// Many runs, each with its changes alone; those without any are counted.
+/// Many runs: only those with changes are listed, the others are counted.
 fn write_many_runs(later: &[RunReport], lines: &mut Vec<String>, style: TerminalStyle) {
     let unchanged = later.iter().filter(|run| run.changes.is_empty()).count();
     lines.push(String::new());
     lines.push(format!(
-        "Against the first run {unchanged} of {} later ones changed in nothing",
+        "{unchanged} of {} later runs show no change relative to the first run",
         later.len()
     ));
     for run in later.iter().filter(|run| !run.changes.is_empty()) {
@@ -275,6 +290,7 @@ fn write_many_runs(later: &[RunReport], lines: &mut Vec<String>, style: Terminal
     }
 }
 
+/// A change as JSON; `between` are the indices of both runs.
 fn change_json(between: [usize; 2], change: &RunChange) -> Value {
     let (kind, at, estimates) = change.change.parts(change.unit);
     let estimates = estimates.iter().map(|(name, estimate, unit)| {
@@ -296,27 +312,29 @@ fn change_json(between: [usize; 2], change: &RunChange) -> Value {
     })
 }
 
-/// Values of the fit in which some are each run's own.
+/// The joint fit: factors of force signals, and values that each run has for itself.
 fn write_shared_fit(fit: &SharedFit, lines: &mut Vec<String>, style: TerminalStyle) {
     lines.push(String::new());
     let n = fit.shared.iter().flatten().count();
     lines.push(style.bold(&format!(
-        "One fit of all runs, with {} shared",
+        "Joint fit of all runs, with {} shared",
         count(n, "base parameter", "base parameters")
     )));
     let text = |value: FittedValue| match value.deviation {
         Some(deviation) => with_deviation(value.value, deviation),
-        None => ["not told".to_owned(), String::new()],
+        None => ["not identifiable".to_owned(), String::new()],
     };
     if !fit.gains.is_empty() {
-        lines.push("  True forces are the measured ones times".to_owned());
+        lines.push(
+            "  Factors of the force signals (true force = factor times measured force):".to_owned(),
+        );
         let rows: Vec<Vec<String>> = (fit.gains.iter())
             .map(|(drive, gain)| [vec![drive.clone()], text(*gain).to_vec()].concat())
             .collect();
         let columns = [
             ("drive", ColumnAlignment::Left),
             ("factor", ColumnAlignment::Right),
-            ("+-", ColumnAlignment::Right),
+            ("std", ColumnAlignment::Right),
         ];
         lines.extend(table(4, &columns, &rows));
     }
@@ -325,7 +343,7 @@ fn write_shared_fit(fit: &SharedFit, lines: &mut Vec<String>, style: TerminalSty
         let row = |one: &RunValue| {
             let [value, deviation] = text(one.value);
             let against = if one.is_against_first {
-                "against the first run"
+                "relative to the first run"
             } else {
                 ""
             };
@@ -340,23 +358,23 @@ fn write_shared_fit(fit: &SharedFit, lines: &mut Vec<String>, style: TerminalSty
             .map(str::to_owned)
             .to_vec()
         };
-        let told = values.iter().filter(|one| one.value.deviation.is_some());
-        let rows: Vec<Vec<String>> = told.map(row).collect();
+        let known = values.iter().filter(|one| one.value.deviation.is_some());
+        let rows: Vec<Vec<String>> = known.map(row).collect();
         let columns = [
             ("of", ColumnAlignment::Left),
             ("", ColumnAlignment::Left),
             ("value", ColumnAlignment::Right),
-            ("+-", ColumnAlignment::Right),
+            ("std", ColumnAlignment::Right),
             ("unit", ColumnAlignment::Left),
             ("", ColumnAlignment::Left),
         ];
         lines.extend(table(4, &columns, &rows));
-        let not_told = values.iter().filter(|one| one.value.deviation.is_none());
-        let not_told: Vec<String> = not_told
+        let unknown = values.iter().filter(|one| one.value.deviation.is_none());
+        let unknown: Vec<String> = unknown
             .map(|one| format!("{} of {}", one.name, one.quantity))
             .collect();
-        if !not_told.is_empty() {
-            lines.push(format!("    not told: {}", not_told.join(", ")));
+        if !unknown.is_empty() {
+            lines.push(format!("    not identifiable: {}", unknown.join(", ")));
         }
     }
 }

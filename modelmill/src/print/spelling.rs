@@ -1,6 +1,6 @@
-//! How the reader of a text asks for what the text advises: on a command line, in a notebook, in Rust.
+//! Spelling of advice for its reader: commands for a terminal, calls for a notebook or for Rust.
 //!
-//! [`RemedySpelling`] spells remedies inside of messages, [`StepSpelling`] whole steps with a model.
+//! [`RemedySpelling`] writes remedies inside of messages, [`StepSpelling`] complete steps with a model.
 
 use std::fmt::Write as _;
 
@@ -12,25 +12,25 @@ use modelmill_spec::edit::NewEffect;
 use crate::diagnose::SeparationProposal;
 use crate::model::Model;
 
-/// How the reader of a text asks for the steps that a diagnosis advises. The program spells commands, a notebook calls.
+/// Writes the next steps after a diagnosis for their reader. The program writes commands, a notebook calls.
 pub trait StepSpelling: RemedySpelling {
     /// Adds an effect to the file of a model.
     fn spell_effect(&self, model: &Model, effect: &NewEffect) -> String;
 
-    /// Adds an effect of a kind that a further library holds, which is kept in a file of some name.
+    /// Adds an effect whose kind is defined in the library file `library`.
     fn spell_effect_of_library(&self, model: &Model, effect: &NewEffect, library: &str) -> String {
         let effect = self.spell_effect(model, effect);
         format!("{effect}, with the library {library}")
     }
 
-    /// Identifies a model once more from the same recordings.
+    /// Identifies a model again from the same recordings.
     fn spell_identification(&self, model: &Model) -> String;
 
-    /// Seeks motion along which effects differ; `None` where that cannot be asked for.
+    /// Plans a motion that distinguishes effects; `None` if the reader has no command for it.
     fn spell_separation(&self, model: &Model, separation: &SeparationProposal) -> Option<String>;
 }
 
-/// Plain words, for whoever calls the library.
+/// Plain words for a caller of the library.
 impl StepSpelling for LibrarySpelling {
     fn spell_effect(&self, model: &Model, effect: &NewEffect) -> String {
         let mut says = format!(
@@ -57,7 +57,7 @@ impl StepSpelling for LibrarySpelling {
         let effect = &separation.effect.effect;
         let rivals: Vec<&str> = separation.rivals.iter().map(|r| r.kind.as_str()).collect();
         Some(format!(
-            "{}: seek motion that tells {} at {} from {}",
+            "{}: plan a motion that distinguishes {} at {} from {}",
             model.name,
             effect.kind,
             effect.at.join(", "),

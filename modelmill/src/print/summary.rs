@@ -1,4 +1,4 @@
-//! What a model file holds, as JSON and for people; and what is wrong with one that has no meaning, as JSON.
+//! Output of `check`: contents of a model file as JSON and as text for people, and the errors of an invalid file as JSON.
 
 use modelmill_boundary::text::plain;
 use modelmill_codegen::review::NumericMethod;
@@ -15,11 +15,12 @@ use crate::text::TerminalStyle;
 use crate::text::table::count;
 
 impl ModelCheck {
-    /// What the model holds as one JSON object, with all warnings.
+    /// Contents of the model as one JSON object, with all warnings.
     pub fn json(&self, spelling: &dyn RemedySpelling) -> Value {
         let model = &self.model;
         let loaded = &model.loaded;
         let mut warnings = self::warnings(loaded, spelling);
+        // Warnings of the derivation come after those of the file.
         let in_vain = ineffective_retained(&model.derivation).into_iter();
         warnings.extend(in_vain.map(|(k, says)| {
             let span = loaded.retain.get(k);
@@ -50,7 +51,7 @@ impl ModelCheck {
     }
 }
 
-/// Why a model that has a meaning cannot be used, as one JSON object.
+/// Why a valid model cannot be used, as one JSON object.
 pub fn refusal(says: &str, path: &str) -> Value {
     json!({
         "valid": false,
@@ -58,7 +59,7 @@ pub fn refusal(says: &str, path: &str) -> Value {
     })
 }
 
-/// What is wrong with a file that has no meaning, as one JSON object.
+/// Errors of an invalid model file, as one JSON object.
 pub fn faults(failure: &LoadFailure, spelling: &dyn RemedySpelling) -> Value {
     json!({
         "valid": false,
@@ -66,11 +67,12 @@ pub fn faults(failure: &LoadFailure, spelling: &dyn RemedySpelling) -> Value {
     })
 }
 
-/// What may not be intended in a file that has a meaning, each as a JSON object.
+/// Warnings of a valid model file, each as a JSON object.
 pub fn warnings(loaded: &LoadedModel, spelling: &dyn RemedySpelling) -> Vec<Value> {
     diagnostics(&loaded.warnings, &loaded.sources, spelling)
 }
 
+/// Diagnostics of a model file as JSON, with file, line and column where they are known.
 fn diagnostics(
     found: &[Diagnostic],
     sources: &SourceFiles,
@@ -131,7 +133,7 @@ impl ModelSummary {
         style: TerminalStyle,
     ) -> String {
         let m = &derivation.mechanism;
-        let mut lines = vec![style.bold(&format!("{}: sound", plain(name)))];
+        let mut lines = vec![style.bold(&format!("{}: valid", plain(name)))];
         if let Some(title) = &m.title {
             lines.push(format!("  {}", plain(title)));
         }
@@ -140,11 +142,12 @@ impl ModelSummary {
             [] => String::new(),
             names => format!(": {}", names.join(", ")),
         };
+        // Emitted code cannot use a reserved word as the name of a module.
         let module = module_name(&m.name);
         let whose = if module == m.name {
             "the file's `name`"
         } else {
-            "for the file's `name`, which is a word of Rust or of emitted code"
+            "instead of the file's `name`, which is a reserved word of Rust or of emitted code"
         };
         line("module", format!("{module} ({whose})"));
         line("bodies", self.bodies.to_string());
@@ -186,7 +189,7 @@ impl ModelSummary {
         line(
             "p_g and p_min",
             format!(
-                "{} with an effect on the actuators, {}",
+                "{} of parameters with an effect on the drives, {} (combinations that can be identified)",
                 count(reduction.products.len(), "product", "products"),
                 count(
                     reduction.retained.len(),
@@ -198,11 +201,14 @@ impl ModelSummary {
         match reduction.method {
             ReductionMethod::Numeric { .. } => line(
                 "reduced",
-                "numerically, on the values of this file".to_owned(),
+                "numerically, for the values of this file only".to_owned(),
             ),
             ReductionMethod::Exact {
                 at_values: true, ..
-            } => line("reduced", "for the values of this file alone".to_owned()),
+            } => line(
+                "reduced",
+                "exactly, for the values of this file only".to_owned(),
+            ),
             ReductionMethod::Exact { .. } | ReductionMethod::Unreduced => {}
         }
         if let Some(rank) = rank {
@@ -223,6 +229,7 @@ fn reduction(reduction: &BaseReduction) -> Value {
     }
 }
 
+/// Name of a joint, with its motion if it is not revolute, and `passive`.
 fn joint(motion: CoordinateMotion, name: &str, passive: bool) -> String {
     let unusual = (motion != CoordinateMotion::Revolute).then(|| motion.name());
     let remarks: Vec<&str> = unusual
@@ -235,6 +242,7 @@ fn joint(motion: CoordinateMotion, name: &str, passive: bool) -> String {
     format!("{name} ({})", remarks.join(", "))
 }
 
+/// Drives with the joint or the points between which they act, either the actuated or the undriven ones.
 fn drives(m: &Mechanism, is_driven: bool) -> Vec<String> {
     let shared = m.shared_drives.iter();
     m.drives

@@ -1,19 +1,21 @@
-//! Results in text, for people: parameters, figures and regions.
+//! Tables of text for people: base parameters, error figures, and regions where the error is largest.
 
 use modelmill_identify::{ErrorFigures, FitParameter, ParameterStatus, TRIMMED_PART};
 
 use crate::compare::{ErrorLocations, ROUNDING};
 use crate::model::Model;
-use crate::text::table::{ColumnAlignment, count, number, percent, significant, table};
+use crate::text::table::{ColumnAlignment, number, percent, significant, table};
 
-/// Identified base parameters beside their nominal values.
+/// Identified base parameters with nominal values and standard deviations, absolute and relative.
 pub fn parameters(parameters: &[FitParameter]) -> Vec<String> {
+    // One row for each parameter; the second `std` is relative to the value.
     let rows: Vec<Vec<String>> = parameters
         .iter()
         .map(|p| {
             vec![
                 p.name.clone(),
                 p.nominal.map_or_else(|| "-".to_owned(), number),
+                // Values that were not identified are in parentheses.
                 if p.status == ParameterStatus::Identified {
                     number(p.value)
                 } else {
@@ -51,7 +53,7 @@ pub fn parameters(parameters: &[FitParameter]) -> Vec<String> {
     )
 }
 
-/// Which name stands for which expression, as JSON and fits write it: `p1_min = ...`.
+/// Expressions of the base parameters as JSON and fit files write them: `p1_min = ...`.
 pub fn expressions(indent: usize, model: &Model) -> Vec<String> {
     let indent = " ".repeat(indent);
     let lines = model.base.iter();
@@ -60,11 +62,13 @@ pub fn expressions(indent: usize, model: &Model) -> Vec<String> {
         .collect()
 }
 
-/// Error figures of several comparisons, one line for the total, where there is one, and one for each channel.
+/// Error figures of several comparisons: a line for all drives together, where they have one unit, and a line for each drive.
+/// Errors are in the unit of the force, `nrms` and its like relative to it. The rows that a fit used follow as a second table.
 pub fn figures(named: &[(&str, &ErrorFigures)]) -> Vec<String> {
     let mut rows = Vec::new();
     for (name, figures) in named {
         let mut name = (*name).to_owned();
+        // A total needs one unit: forces and torques are not added up.
         if let Some(rms) = figures.rms {
             rows.push(vec![
                 std::mem::take(&mut name),
@@ -112,27 +116,50 @@ pub fn figures(named: &[(&str, &ErrorFigures)]) -> Vec<String> {
         ],
         &rows,
     );
+    lines.push("  nrms: rms of the error divided by rms of the measured force".to_owned());
     if let Some(band) = named.iter().find_map(|(_, figures)| figures.band.as_ref()) {
         lines.push(format!(
-            "  in band: nrms with both forces below {} Hz (Butterworth of order 4, both ways; {} of the samples dropped at \
-             each end)",
+            "  in band: the same error after both forces went through a low-pass at {} Hz, without {} of the samples at each \
+             end",
             significant(band.cutoff_hz, 3),
             percent(Some(TRIMMED_PART)),
         ));
     }
-    for (name, figures) in named {
-        let Some(rows) = &figures.rows else { continue };
-        let drives = rows.channels.iter();
-        let drives = drives.map(|(drive, one)| format!("{drive} {}", percent(one.nrms)));
-        let drives: Vec<String> = drives.collect();
-        lines.push(format!(
-            "  {name}: {} in the {} that are left of it, both forces below {} Hz ({})",
-            percent(rows.nrms),
-            count(rows.samples, "sample", "samples"),
-            significant(rows.cutoff_hz, 3),
-            drives.join(", ")
-        ));
+    lines.extend(rows_of_fits(named));
+    lines
+}
+
+/// Errors on the rows that the fits used, after low-pass and decimation: a column for each comparison that has them.
+fn rows_of_fits(named: &[(&str, &Figures)]) -> Vec<String> {
+    let fits = named.iter();
+    let fits = fits.filter_map(|(name, figures)| Some((*name, figures.rows.as_ref()?)));
+    let fits: Vec<_> = fits.collect();
+    let Some((_, first)) = fits.first() else {
+        return Vec::new();
+    };
+    let row = |title: &str, cell: &dyn Fn(usize) -> String| {
+        let cells = (0..fits.len()).map(cell);
+        std::iter::once(title.to_owned()).chain(cells).collect()
+    };
+    let mut rows: Vec<Vec<String>> = vec![
+        row("rows", &|k| fits[k].1.samples.to_string()),
+        row("low-pass, Hz", &|k| significant(fits[k].1.cutoff_hz, 3)),
+        row("nrms of all", &|k| percent(fits[k].1.nrms)),
+    ];
+    for drive in first.channels.keys() {
+        let cell = |k: usize| {
+            let one = fits[k].1.channels.get(drive);
+            one.map_or_else(String::new, |one| percent(one.nrms))
+        };
+        rows.push(row(drive, &cell));
     }
+    let heads = fits.iter().map(|(name, _)| (*name, Align::Right));
+    let columns: Vec<(&str, Align)> = std::iter::once(("", Align::Left)).chain(heads).collect();
+    let mut lines = vec![
+        String::new(),
+        "  On the rows that the fit used, after low-pass and decimation:".to_owned(),
+    ];
+    lines.extend(table(2, &columns, &rows));
     lines
 }
 
@@ -142,20 +169,24 @@ fn common_unit(figures: &ErrorFigures) -> String {
     first.map_or_else(String::new, |one| one.unit.clone())
 }
 
-/// Where an error lives, one sentence for each region.
+/// Where an error is largest, one sentence for each region.
 pub fn places(places: &ErrorLocations) -> Vec<String> {
     let regions = places.regions.iter();
     let mut lines: Vec<String> = regions
         .map(|region| format!("  {}.", region.says))
         .collect();
+    // Errors at the level of rounding have no place that means anything.
     if !places.rounding.is_empty() {
         lines.push(format!(
-            "  The error of {} is below {ROUNDING:e} of the force, which is rounding: there is nothing to find.",
+            "  The error of {} is rounding (below {ROUNDING:e} of the force): there is nothing to find.",
             places.rounding.join(", ")
         ));
     }
     if lines.is_empty() {
-        lines.push("  No region of coordinates, rates, loads or time stands out.".to_owned());
+        lines.push(
+            "  Nowhere in particular: no range of a coordinate, rate, load or time stands out."
+                .to_owned(),
+        );
     }
     lines
 }

@@ -1,4 +1,4 @@
-//! What a variant costs along motions, as JSON and for people.
+//! Forces, power and limits of two variants along the same motions, as JSON for scripts and as text for people.
 
 use serde_json::{Value, json};
 
@@ -9,17 +9,22 @@ use crate::variants::{
     DriveEffort, DriveVariants, LimitCrossing, LimitUse, TermShare, VariantComparison,
 };
 
-/// Summands of a drive's difference that are shown, at most; the rest is told in one line.
+/// Terms of a drive's difference that are shown at most; the others are added up in one line.
 const MOST_TERMS: usize = 6;
-/// Relative changes up to this are none.
+/// Relative changes up to this are rounding and print as none.
 const UNCHANGED: f64 = 5e-6;
 /// Products of p_g that are named, at most.
 const MOST_PRODUCTS: usize = 4;
-/// Summands below this share of the largest one are not shown by themselves.
+/// Terms below this share of the largest one are not shown separately.
 const LEAST_SHARE: f64 = 0.01;
 
 impl VariantComparison {
-    /// All figures as one JSON object.
+    /// All figures as one JSON object, `before` and `after` for the two variants.
+    ///
+    /// - `drives`: peak and rms force (N or N m), peak and rms power (W), positive and net work (J), and the terms that cause the
+    ///   difference; their shares sum to 1, and `by_value` is the part of a share that comes from the new value
+    /// - `limits`: range of each limit and the part of it that is used (1)
+    /// - `errors`: relative to measured forces, if the recordings have them
     pub fn json(&self, spelling: &dyn RemedySpelling) -> Value {
         let limits = self.limits.iter().map(|one| {
             let side = |m: usize| json!({ "range": one.ranges[m], "used": one.used[m] });
@@ -50,19 +55,19 @@ impl VariantComparison {
             significant(self.seconds, 3)
         ))];
         lines.push(String::new());
-        lines.push(style.bold("what the drives give"));
+        lines.push(style.bold("Forces and power of the drives"));
         lines.extend(efforts(&self.drives));
         lines.push(String::new());
-        lines.push(style.bold("what makes the difference"));
+        lines.push(style.bold("Causes of the difference"));
         for drive in &self.drives {
             lines.extend(shares(drive));
         }
         lines.push(String::new());
-        lines.push(style.bold("limits"));
+        lines.push(style.bold("Limits"));
         lines.extend(self.limits_text(style));
         if self.errors.iter().any(Option::is_some) {
             lines.push(String::new());
-            lines.push(style.bold("error against measured forces"));
+            lines.push(style.bold("Error relative to the measured forces"));
             let named = ["before", "after"].into_iter().zip(&self.errors);
             let named = named.filter_map(|(name, figures)| Some((name, figures.as_ref()?)));
             lines.extend(tables::figures(&named.collect::<Vec<_>>()));
@@ -70,6 +75,7 @@ impl VariantComparison {
         lines.join("\n")
     }
 
+    /// Limits that are exceeded by either variant, one line each, and a count of the others.
     fn limits_text(&self, style: TerminalStyle) -> Vec<String> {
         if self.limits.is_empty() {
             return vec!["  the files have no `[limits]`".to_owned()];
@@ -93,13 +99,14 @@ impl VariantComparison {
             .limits
             .iter()
             .filter(|l| l.crossing() == LimitCrossing::Kept);
+        // Of the limits that both variants keep, only the one nearest to its end is named.
         let most = kept.clone().max_by(|a, b| {
             let used = |one: &LimitUse| one.used.into_iter().flatten().fold(0.0, f64::max);
             used(a).total_cmp(&used(b))
         });
         if let Some(most) = most {
             lines.push(format!(
-                "  kept: {}; most is used of {}",
+                "  within: {}; the most used is {}",
                 count(kept.count(), "limit", "limits"),
                 limit_line(most)
             ));
@@ -185,6 +192,7 @@ fn limit_line(one: &LimitUse) -> String {
 
 /// The part of a limit that is used; close to the limit with more digits, which say on which side.
 fn part(used: f64) -> String {
+    // Next to 100 % three digits would not show on which side a value is.
     let digits = if (used - 1.0).abs() < 0.01 { 6 } else { 3 };
     format!("{} %", significant(100.0 * used, digits))
 }
@@ -218,13 +226,14 @@ fn efforts(drives: &[DriveVariants]) -> Vec<String> {
             ("", ColumnAlignment::Left),
             ("peak, W", ColumnAlignment::Right),
             ("rms, W", ColumnAlignment::Right),
-            ("work given, J", ColumnAlignment::Right),
-            ("net, J", ColumnAlignment::Right),
+            ("positive work, J", ColumnAlignment::Right),
+            ("net work, J", ColumnAlignment::Right),
         ],
         &rows,
     )
 }
 
+/// Peak and rms force (N or N m), peak and rms power (W), positive and net work (J).
 fn numbers(effort: &DriveEffort) -> [f64; 6] {
     let DriveEffort {
         peak,
@@ -240,6 +249,7 @@ fn numbers(effort: &DriveEffort) -> [f64; 6] {
 /// A change relative to what was, `+12.3 %`.
 fn change(before: f64, after: f64) -> String {
     let by = after - before;
+    // A change of rounding prints as a dash.
     if by.abs() <= UNCHANGED * before.abs() {
         return "-".to_owned();
     }
@@ -250,14 +260,14 @@ fn change(before: f64, after: f64) -> String {
     format!("{sign}{}", percent(Some((by / before).abs())))
 }
 
-/// What makes the difference of a drive.
+/// Terms that cause the difference of a drive, the largest first.
 fn shares(one: &DriveVariants) -> Vec<String> {
     let size = one.difference;
     if one.products.is_empty() {
         return vec![format!("  {}: no difference", one.drive)];
     }
     let mut lines = vec![format!(
-        "  {}: {} {unit} where they differ most, {} {unit} in the mean square",
+        "  {}: difference {} {unit} at most, {} {unit} rms",
         one.drive,
         significant(size.peak, 4),
         significant(size.rms, 4),
@@ -308,17 +318,19 @@ fn shares(one: &DriveVariants) -> Vec<String> {
         ("", ColumnAlignment::Left),
     ];
     lines.extend(table(4, &columns, &rows).into_iter().skip(1));
+    // The remaining terms are added up, so that the shares sum to 100 %.
     let rest: f64 = terms[n..].iter().map(|term| term.share).sum();
     if n < terms.len() {
         lines.push(format!(
-            "    {} by {}",
+            "    {} from {}",
             signed_percent(rest),
-            count(terms.len() - n, "other summand", "other summands")
+            count(terms.len() - n, "other term", "other terms")
         ));
     }
     lines
 }
 
+/// A share in per cent with its sign.
 fn signed_percent(share: f64) -> String {
     let size = percent(Some(share.abs()));
     if share < 0.0 {
@@ -328,23 +340,24 @@ fn signed_percent(share: f64) -> String {
     }
 }
 
-/// What of a share is the column's and not the value's; nothing where there is no such part.
+/// Which part of a share comes from the changed geometry (the column) instead of the changed value; empty without such a part.
 fn column_share_text(term: &TermShare) -> String {
     let by_column = term.share - term.by_value;
+    // A small rest is rounding of the split, not a change of geometry.
     if by_column.abs() <= LEAST_SHARE * term.share.abs() {
         String::new()
     } else if term.by_value == 0.0 {
-        "by its column alone".to_owned()
+        "from the changed geometry alone".to_owned()
     } else {
         format!(
-            "{} by its value, {} by its column",
+            "{} from the new value, {} from the changed geometry",
             signed_percent(term.by_value),
             signed_percent(by_column)
         )
     }
 }
 
-/// A summand's value, and what it was.
+/// Value of a term, and the one before.
 fn value(term: &TermShare) -> String {
     let unit = match term.unit.as_str() {
         "1" | "" => String::new(),
@@ -355,7 +368,7 @@ fn value(term: &TermShare) -> String {
             format!("{}{unit}", number(after))
         }
         (Some(before), Some(after)) => format!("{} -> {}{unit}", number(before), number(after)),
-        (Some(before), None) => format!("{}{unit}, then gone", number(before)),
+        (Some(before), None) => format!("{}{unit}, then removed", number(before)),
         (None, after) => format!("new, {}{unit}", number(after.unwrap_or(0.0))),
     }
 }

@@ -12,7 +12,7 @@ use crate::model::Model;
 use crate::text::svg::escape;
 use crate::text::table::significant;
 
-/// A mechanism of the page: what the atlas says of it, its model, and its picture as SVG.
+/// A mechanism of the page: its counts in the atlas, its model, and its picture as SVG.
 pub struct AtlasMechanism {
     /// Counts.
     pub entry: AtlasEntry,
@@ -36,7 +36,7 @@ pub fn atlas(mechanisms: &[AtlasMechanism]) -> String {
     page
 }
 
-/// Text with what stands between stars or backticks in type of its own.
+/// HTML of a text in which `*x*` is emphasised and `` `x` `` is code.
 fn emphasis_html(text: &str) -> String {
     let mut html = String::new();
     for (mark, tag) in [('*', "em"), ('`', "code")] {
@@ -55,6 +55,7 @@ fn emphasis_html(text: &str) -> String {
     html
 }
 
+/// The table of all mechanisms: numbers of joints, loops, drives and base parameters, operations, and seconds of the derivation.
 fn counts(mechanisms: &[AtlasMechanism]) -> String {
     let whole = |n: usize| TableCell::number(&n.to_string(), n as f64);
     let rows: Vec<Vec<TableCell>> = mechanisms
@@ -101,6 +102,7 @@ fn counts(mechanisms: &[AtlasMechanism]) -> String {
     table("sortable", &head, &rows)
 }
 
+/// The section of one mechanism: title, picture and base parameters.
 fn mechanism(one: &AtlasMechanism) -> String {
     let AtlasMechanism { entry, picture, .. } = one;
     let expressions = if entry.is_imported {
@@ -117,6 +119,7 @@ fn mechanism(one: &AtlasMechanism) -> String {
     )
 }
 
+/// Base parameters with expressions, nominal values and units, folded.
 fn expressions(model: &Model) -> String {
     let rows: Vec<Vec<TableCell>> = (model.base.iter().zip(&model.nominal).enumerate())
         .map(|(k, (base, value))| {

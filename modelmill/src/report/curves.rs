@@ -1,7 +1,6 @@
-//! Measured and calculated forces over time: pictures that stand by themselves, and the same numbers packed for the script
-//! that zooms into them.
+//! Measured and calculated forces over time: pictures that need no script, and the same numbers packed for the script that zooms.
 //!
-//! Long recordings keep the least and the largest value of each of many stretches, so that no peak is lost and the page
+//! Long recordings keep the least and the largest value of each of many segments, so that no peak is lost and the page
 //! stays small; values are packed as 16-bit steps between the least and the largest of a curve.
 //!
 //! Decision: every picture is an SVG that is complete without its script, so that the page reads on paper and under
@@ -28,21 +27,27 @@ pub(crate) const MOST_RUNS: usize = 6;
 /// Height of a panel.
 const HEIGHT: f64 = 190.0;
 
+/// A curve of one panel.
 struct PlotCurve {
+    /// Name in the key.
     name: String,
+    /// Class of the style, which gives the colour.
     class: &'static str,
+    /// Times of the first and the last value, s.
     span: [f64; 2],
+    /// Evenly spaced values, N or N m.
     values: Vec<f64>,
 }
 
-/// Measured and calculated forces over time and their errors, of all recordings, those of the check first and open; `names` are
-/// those of both models' curves. The same numbers stand beside them for the script of pages.
+/// Measured and calculated forces over time and their errors for each recording, validation runs first. `names` are the names of
+/// the curves before and after. The same numbers follow as JSON for the script of pages.
 pub fn section(before: &ModelVersion, after: Option<&ModelVersion>, names: [&str; 2]) -> String {
     let mut order: Vec<usize> = (0..before.runs.len()).collect();
     order.sort_by_key(|k| !before.runs[*k].is_check);
     let shown = order.len().min(MOST_RUNS);
     let drives = before.model.drives().len();
     let curves = shown * drives * if after.is_some() { 5 } else { 3 };
+    // Many recordings and drives share the budget, so that the page stays small.
     let most = (BUDGET / curves.max(1)).max(LEAST);
     let mut html = String::new();
     for (place, k) in order[..shown].iter().enumerate() {
@@ -50,9 +55,9 @@ pub fn section(before: &ModelVersion, after: Option<&ModelVersion>, names: [&str
         let title = format!(
             "{} {}",
             if run.is_check {
-                "Check run"
+                "Validation run"
             } else {
-                "Run of the fit"
+                "Fitted run"
             },
             run.name
         );
@@ -68,13 +73,14 @@ pub fn section(before: &ModelVersion, after: Option<&ModelVersion>, names: [&str
     if shown < order.len() {
         let _ = writeln!(
             html,
-            "<p>{} more recordings are in the figures and not drawn here.</p>",
+            "<p>{} more recordings are part of the error figures, but are not drawn here.</p>",
             order.len() - shown
         );
     }
     html
 }
 
+/// All panels of one recording, and their numbers as JSON for the script. `most` bounds the values of a curve.
 fn run_panels(
     before: &ModelVersion,
     after: Option<&ModelVersion>,
@@ -93,7 +99,7 @@ fn run_panels(
             packed.push(json!({ "title": title, "unit": unit, "curves": curves }));
         }
     }
-    // Text of a script must not hold what ends it.
+    // Text of a script must not contain `</`, which would end it.
     let text = json!({ "panels": packed }).to_string();
     let text = text.replace('<', "\\u003c");
     let _ = writeln!(
@@ -136,7 +142,7 @@ fn panels(
     }
     [
         (drive.to_owned(), forces),
-        (format!("{drive}: measured less model"), errors),
+        (format!("{drive}: measured minus model"), errors),
     ]
 }
 

@@ -11,12 +11,16 @@ pub(crate) const LEFT: f64 = 66.0;
 /// Room at the right.
 pub(crate) const RIGHT: f64 = 14.0;
 
-/// An axis from one value to another over a stretch of the picture.
+/// An axis from one value to another over a part of the picture.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PlotAxis {
+    /// Value at the start.
     pub from: f64,
+    /// Value at the end.
     pub to: f64,
+    /// Position of the start in the picture, its own units.
     pub start: f64,
+    /// Position of the end in the picture.
     pub end: f64,
     /// Whether decades are of equal length.
     pub log: bool,
@@ -29,6 +33,7 @@ impl PlotAxis {
         if !(from.is_finite() && to.is_finite()) {
             (from, to) = (0.0, 1.0);
         }
+        // A constant curve would divide by zero: it gets room on both sides.
         if to - from <= f64::EPSILON * from.abs().max(to.abs()) {
             let room = 0.5 * from.abs().max(f64::MIN_POSITIVE * 1e10);
             (from, to) = (from - room, to + room);
@@ -44,6 +49,7 @@ impl PlotAxis {
 
     /// An axis of decades; values must be positive.
     pub(crate) fn decades(range: [f64; 2], pixels: [f64; 2]) -> Self {
+        // Zero has no logarithm, and a range below a factor of 1.5 has too few ticks.
         let from = range[0].max(1e-300);
         let to = range[1].max(from * 1.5);
         Self {
@@ -90,9 +96,11 @@ impl PlotAxis {
         ticks
     }
 
+    /// Powers of ten along the axis, with steps between them if there are few.
     fn decade_ticks(&self, most: usize) -> Vec<(f64, String)> {
         let decades = (self.to / self.from).log10();
         let mut ticks = Vec::new();
+        // Up to two decades have room for steps of 1, 2 and 5.
         let steps: &[f64] = if decades <= 2.0 {
             &[1.0, 2.0, 5.0]
         } else {
@@ -132,9 +140,11 @@ fn round_step(rough: f64) -> f64 {
 
 /// A tick's label with as many digits as steps need.
 fn label(value: f64, step: f64) -> String {
+    // A sum of steps may miss zero by rounding.
     if value.abs() < 1e-9 * step.abs() {
         return "0".to_owned();
     }
+    // Longer numbers would not fit in front of the axis.
     if value.abs() >= 1e5 || step.abs() < 1e-4 {
         let text = format!("{value:.1e}");
         return text.replace(".0e", "e");
@@ -150,6 +160,7 @@ fn label(value: f64, step: f64) -> String {
 
 /// A picture as it grows.
 pub(crate) struct SvgPicture {
+    /// SVG elements so far.
     body: String,
     width: f64,
     height: f64,
@@ -267,6 +278,7 @@ pub(crate) fn line(
     let mut pen = 'M';
     for (i, value) in thin_out(values, points) {
         if !value.is_finite() {
+            // A value that is not finite interrupts the line.
             pen = 'M';
             continue;
         }

@@ -1,4 +1,5 @@
-//! The ladder: errors on fit and check step by step on an axis of decades, against the noise of the forces.
+//! Picture of the error after each added effect, on the fitted and on the validation runs, on a logarithmic axis with the noise
+//! of the forces.
 
 use modelmill_identify::diagnose::SelectionStep;
 
@@ -14,7 +15,7 @@ const LEFT: f64 = 290.0;
 /// Longest line of a label.
 const LETTERS: usize = 38;
 
-/// The picture.
+/// The picture as SVG; `noise` is relative to the force.
 pub(crate) fn picture(ladder: &[SelectionStep], noise: f64, judged: ValidationMethod) -> String {
     let errors = ladder.iter().flat_map(|rung| [rung.fit, rung.check]);
     let all: Vec<f64> = errors.chain([noise]).filter(|e| *e > 0.0).collect();
@@ -27,17 +28,20 @@ pub(crate) fn picture(ladder: &[SelectionStep], noise: f64, judged: ValidationMe
         .iter()
         .map(|rung| words::lines(&words::rung(rung), LETTERS))
         .collect();
+    // All rows have the height of the longest label.
     let longest = labels.iter().map(Vec::len).max().unwrap_or(1);
     let row = ROW.max(LINE * longest as f64 + 8.0);
     let bottom = TOP + row * ladder.len() as f64;
+    // The axis has room of a factor 1.6 at both ends.
     let percents = [100.0 * low / 1.6, 100.0 * high * 1.6];
-    let x = PlotAxis::decades(percents, [LEFT, WIDTH - 110.0]);
+    let x = PlotAxis::decades(percents, [LEFT, WIDTH - 176.0]);
     let y = PlotAxis::new([0.0, 1.0], [bottom, TOP]);
     let mut picture = SvgPicture::new(WIDTH, bottom + 40.0);
     picture.frame(&x, &y, "error / force, %", [7, 0]);
     if noise > 0.0 {
         let at = x.position(100.0 * noise);
         picture.path("noise", &format!("M{at:.1} {TOP:.1}V{bottom:.1}"));
+        // The label stays inside of the picture on either half of the axis.
         let anchor = if at > 0.5 * (x.start + x.end) {
             "end"
         } else {
@@ -48,7 +52,7 @@ pub(crate) fn picture(ladder: &[SelectionStep], noise: f64, judged: ValidationMe
             "tick",
             [at + aside, TOP - 8.0],
             anchor,
-            &format!("noise {}", percent(Some(noise))),
+            &format!("{} {}", words::floor_label(noise), percent(Some(noise))),
         );
     }
     let mut last: Option<[f64; 3]> = None;
@@ -72,7 +76,7 @@ pub(crate) fn picture(ladder: &[SelectionStep], noise: f64, judged: ValidationMe
         picture.dot("dot c-fit", [fit, middle - 7.0], 5.0);
         picture.dot("dot c-after", [check, middle + 7.0], 5.0);
         last = Some([fit, check, middle - 7.0]);
-        let right = WIDTH - 104.0;
+        let right = WIDTH - 170.0;
         picture.text(
             "tick c-fit",
             [right, middle - 3.0],
@@ -91,5 +95,5 @@ pub(crate) fn picture(ladder: &[SelectionStep], noise: f64, judged: ValidationMe
             picture.text("label", at, "end", line);
         }
     }
-    picture.finish("errors on the fit and where it was not fitted, step by step")
+    picture.finish("error after each added effect, on fitted and on validation data")
 }

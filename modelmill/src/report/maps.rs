@@ -9,11 +9,13 @@ use crate::diagnose::ModelVersion;
 use crate::text::svg::escape;
 use crate::text::table::significant;
 
+/// Cells of a map across; few enough that each holds several samples.
 const COLUMNS: usize = 22;
+/// Cells of a map upwards.
 const ROWS: usize = 14;
 /// Shades of the map; the page has a class for each.
 const SHADES: usize = 9;
-/// Samples that a cell must hold to be shown.
+/// Least number of samples of a cell that is shown.
 const LEAST: usize = 2;
 
 /// A variable along the recordings that are judged.
@@ -21,14 +23,18 @@ pub(crate) type MapVariable = (String, Vec<f64>);
 
 /// Where each sample lies in a map; the cells of both variables.
 struct ErrorGrid {
+    /// Least and largest value of the variable across.
     x: [f64; 2],
+    /// Least and largest value of the variable upwards.
     y: [f64; 2],
+    /// Index of the cell of each sample, row by row from below.
     cells: Vec<usize>,
 }
 
 impl ErrorGrid {
     fn new(x: &[f64], y: &[f64]) -> Option<Self> {
         let (of_x, of_y) = (range(x), range(y));
+        // A variable that does not change has no cells.
         if !(of_x[1] > of_x[0] && of_y[1] > of_y[0]) {
             return None;
         }
@@ -64,6 +70,7 @@ impl ErrorGrid {
 
     /// How much of the spread of the squared error is between cells, less what as many cells would show by chance.
     fn error_concentration(&self, error: &[f64]) -> f64 {
+        // Adjusted coefficient of determination of an analysis of variance, with the cell as the only factor.
         let n = error.len() as f64;
         let mean = error.iter().map(|e| e * e).sum::<f64>() / n;
         let total: f64 = error.iter().map(|e| (e * e - mean).powi(2)).sum();
@@ -123,6 +130,7 @@ pub(crate) fn figures(
             let Some(grid) = ErrorGrid::new(x, y) else {
                 continue;
             };
+            // The map is drawn over the pair of variables that concentrates the error most.
             let gathers = grid.error_concentration(&error);
             if best.as_ref().is_none_or(|(most, ..)| gathers > *most) {
                 best = Some((gathers, i, j, grid));
@@ -158,6 +166,7 @@ pub(crate) fn figures(
     html
 }
 
+/// Maps side by side with one scale of shades; `names` are the variables across and upwards, `unit` is that of the error.
 fn picture(
     maps: &[(&str, Vec<Option<f64>>)],
     grid: &ErrorGrid,
@@ -214,7 +223,7 @@ fn picture(
         [right, foot + 9.0],
         "start",
         &format!(
-            "0 to {} {unit} (root mean square in a cell); upwards: {}",
+            "0 to {} {unit} (rms in a cell); vertical axis: {}",
             significant(largest, 2),
             names[1]
         ),

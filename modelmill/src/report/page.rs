@@ -1,4 +1,5 @@
-//! The page: what a user asks, in that order; one file that needs no other.
+//! The page of a diagnosis: verdict, errors, effects, curves, maps, candidates, parameters, recordings and equations, in the order
+//! in which a user needs them. Input are findings, output is one HTML file that needs no other file.
 
 use std::fmt::Write as _;
 
@@ -13,20 +14,24 @@ use crate::print::{StepSpelling, laws as told};
 use crate::text::svg::escape;
 use crate::text::table::percent;
 
-/// The page's text; `spelling` says how its reader asks for what it advises.
+/// The HTML of the page; `spelling` writes commands or calls for its reader.
 ///
-/// Fails only when whoever watches stops it.
+/// Fails only if the derivation of the equations is cancelled.
 pub fn page(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) -> Outcome<String> {
+    // Equations are those of the model with the effects, if it could be built.
     let final_version = findings.final_version();
     let equations = final_version.model.equations(PageFormat::Html)?.text;
     let name = &findings.before.model.name;
-    let title = format!("{name}: what the model lacks");
+    let title = format!("{name}: effects that the model lacks");
     let mut page = pages::begin(&title);
     let sections = [
-        ("ladder", "How the error falls", ladder_section(findings)),
+        (
+            "ladder",
+            "Error after each added effect", ladder_section(findings),
+        ),
         (
             "found",
-            "What was found, and how to go on",
+            "Missing effects and next steps",
             missing_section(findings, spelling),
         ),
         (
@@ -34,17 +39,17 @@ pub fn page(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) -> Outcom
             "Measured and calculated forces",
             curves_section(findings),
         ),
-        ("where", "Where the error lives", location(findings)),
+        ("where", "Where the error is largest", location(findings)),
         (
             "frequency",
-            "At which frequencies",
+            "Spectrum of the error",
             spectrum::figures(&findings.before, findings.after.as_ref().ok()),
         ),
-        ("candidates", "What else was tried", candidates(findings)),
+        ("candidates", "All candidates", candidates(findings)),
         ("parameters", "Parameters", parameters(findings)),
         (
             "data",
-            "What was done to the recordings",
+            "Recordings and their preparation",
             tables::data(findings, spelling),
         ),
         (
@@ -53,6 +58,7 @@ pub fn page(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) -> Outcom
             embed_equations(findings, &equations),
         ),
     ];
+    // Links to all sections at the top of the page.
     page.push_str("<nav>");
     for (id, title, _) in &sections {
         let _ = write!(page, "<a href=\"#report-{id}\">{title}</a> ");
@@ -74,18 +80,18 @@ pub(super) fn end() -> String {
     pages::end(&[CURVES])
 }
 
-/// What makes curves that are drawn anew as they are zoomed, and tables that can be sorted.
+/// Script for curves that can be zoomed and tables that can be sorted.
 const CURVES: &str = include_str!("page.js");
 
 /// The style of all pages.
 pub use pages::STYLE;
 
-/// Scripts of pages, once they stand. Who puts parts of a page into another one later calls `enliven(element)` on them.
+/// Scripts of pages. If parts of a page are put into another page later, call `enliven(element)` on them.
 pub fn scripts() -> impl Iterator<Item = &'static str> {
     pages::SCRIPTS.into_iter().chain([CURVES])
 }
 
-/// What stands between two marks; empty if they are missing.
+/// Text between two marks; empty if they are missing.
 pub(super) fn text_between<'a>(text: &'a str, from: &str, to: &str) -> &'a str {
     let inner = text
         .split_once(from)
@@ -93,12 +99,13 @@ pub(super) fn text_between<'a>(text: &'a str, from: &str, to: &str) -> &'a str {
     inner.map_or("", |(inner, _)| inner)
 }
 
+/// Verdict and tiles with the main figures.
 fn summary(findings: &DiagnosisFindings) -> String {
     let diagnosis = &findings.diagnosis;
     let (class, word) = match diagnosis.verdict {
-        DiagnosisVerdict::Adequate => ("adequate", "adequate"),
+        DiagnosisVerdict::Adequate => ("adequate", "model is adequate"),
         DiagnosisVerdict::MissingEffect => ("missing", "an effect is missing"),
-        DiagnosisVerdict::Unexplained => ("unexplained", "unexplained"),
+        DiagnosisVerdict::Unexplained => ("unexplained", "error is not explained"),
     };
     let says = words::verdict(
         diagnosis,
@@ -112,7 +119,8 @@ fn summary(findings: &DiagnosisFindings) -> String {
             tiles.push(("with the effects", percent(Some(last.check))));
         }
     }
-    tiles.push(("noise", percent(Some(diagnosis.noise_floor))));
+    let noise = words::floor_label(diagnosis.noise_floor);
+    tiles.push((noise, percent(Some(diagnosis.noise_floor))));
     let tiles: Vec<String> = tiles
         .iter()
         .map(|(name, value)| format!("<div><dt>{name}</dt><dd>{}</dd></div>", escape(value)))
@@ -124,13 +132,14 @@ fn summary(findings: &DiagnosisFindings) -> String {
     )
 }
 
+/// Errors after each added effect, as picture and table, and errors of each drive.
 fn ladder_section(findings: &DiagnosisFindings) -> String {
     let diagnosis = &findings.diagnosis;
     format!(
         "<figure class=\"still\"><figcaption><b>Error relative to the force</b> <span class=\"key c-fit\">fit</span> \
          <span class=\"key c-after\">{}</span></figcaption>\n{}</figure>\n{}\n\
-         <p>An error is the root of the squared difference of measured and calculated forces over the squared measured ones. \
-         Steps were judged {}.</p>\n{}",
+         <p>All errors are nrms: rms of measured minus calculated force, divided by rms of the measured force. Each step was \
+         judged {}.</p>\n{}",
         findings.validation.phrase(),
         ladder::picture(&diagnosis.steps, diagnosis.noise_floor, findings.validation),
         tables::ladder(findings),
@@ -139,6 +148,7 @@ fn ladder_section(findings: &DiagnosisFindings) -> String {
     )
 }
 
+/// Missing effects with next steps, then laws.
 fn missing_section(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) -> String {
     let mut html = effects(findings, spelling);
     if !findings.laws.is_empty() {
@@ -147,11 +157,11 @@ fn missing_section(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) ->
     html
 }
 
-/// Laws that would explain what is left.
+/// Laws that would explain the residual.
 fn laws(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) -> String {
     let model = &findings.before.model;
     let mut html = format!(
-        "<h3>Which law would explain what is left</h3>\n<p>{}</p>\n",
+        "<h3>Laws that would explain the residual</h3>\n<p>{}</p>\n",
         escape(told::HYPOTHESIS)
     );
     for hypothesis in &findings.laws {
@@ -164,7 +174,7 @@ fn laws(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) -> String {
             escape(&told::gain(law))
         );
         if !hypothesis.near_ties.is_empty() {
-            html.push_str("<p>As near to these recordings are</p>\n<ul>\n");
+            html.push_str("<p>These laws explain the recordings equally well:</p>\n<ul>\n");
             for tie in &hypothesis.near_ties {
                 let _ = writeln!(html, "<li><code>{}</code></li>", escape(&tie.label()));
             }
@@ -175,7 +185,7 @@ fn laws(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) -> String {
                 let command = spelling.spell_effect_of_library(model, &entry.effect, told::LIBRARY);
                 let _ = writeln!(
                     html,
-                    "<p>As a library, <code>{}</code>, and with it:</p>\n<pre class=\"commands\"><code>{}</code></pre>\n\
+                    "<p>As a library file, <code>{}</code>, and the step that adds it:</p>\n<pre class=\"commands\"><code>{}</code></pre>\n\
                      <pre class=\"commands\"><code>{}</code></pre>",
                     told::LIBRARY,
                     escape(&entry.text),
@@ -190,18 +200,20 @@ fn laws(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) -> String {
     html
 }
 
+/// Missing effects and the steps that add them, or the reason why none should be added.
 fn effects(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) -> String {
+    // Without entries to add there may still be findings, such as a delayed force signal.
     if findings.entries_to_add().is_empty() {
         if let Some(says) = findings.further_action() {
             return format!("{}<p>{says}</p>\n", tables::effects(findings));
         }
         let says = match findings.diagnosis.verdict {
             DiagnosisVerdict::Adequate => {
-                "Nothing needs to be added. The parameters below are those that the recordings ask for."
+                "Nothing needs to be added. The parameters below are fitted to the recordings."
             }
             _ => {
-                "No effect of the library may be added in good faith. Below it says where the error lives; a kind of your own \
-                 can be given in the model file or a library."
+                "No effect of the library explains the error reliably. Look below where the error is largest. You can define a \
+                 kind of effect of your own in the model file or in a library."
             }
         };
         return format!("<p>{says}</p>\n");
@@ -210,7 +222,7 @@ fn effects(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) -> String 
     if let Err(says) = &findings.after {
         let _ = writeln!(
             html,
-            "<p class=\"alias\">The model with these effects could not be made: {}</p>",
+            "<p class=\"alias\">The model with these effects could not be built: {}</p>",
             escape(&says.spell(spelling))
         );
     }
@@ -223,17 +235,17 @@ fn effects(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) -> String 
     commands.push(spelling.spell_identification(model));
     let _ = writeln!(
         html,
-        "<p>Add it to the model file, which keeps its comments, and identify again:</p>\n<pre class=\"commands\"><code>{}</code></pre>",
+        "<p>Add the effects to the model file (its comments stay), and identify again:</p>\n<pre class=\"commands\"><code>{}</code></pre>",
         escape(&commands.join("\n"))
     );
     html
 }
 
+/// Forces over time, with help for the mouse.
 fn curves_section(findings: &DiagnosisFindings) -> String {
     format!(
-        "<p class=\"script-only\">Turn the wheel over a picture to zoom, drag to move, drag with Shift to mark a stretch, double \
-         click for the whole. With the keyboard: + and −, arrows, 0. A click on a name hides its curve, one on a number of a \
-         table copies its digits.</p>\n{}",
+        "<p class=\"script-only\">Mouse wheel: zoom. Drag: move. Shift and drag: zoom to a segment. Double click: show all. \
+         Keys: + and −, arrows, 0. Click on a name to hide its curve. Click on a number of a table to copy it.</p>\n{}",
         curves::section(
             &findings.before,
             findings.after.as_ref().ok(),
@@ -242,6 +254,7 @@ fn curves_section(findings: &DiagnosisFindings) -> String {
     )
 }
 
+/// Regions of the error before and after the effects, and error maps.
 fn location(findings: &DiagnosisFindings) -> String {
     let after = findings.after.as_ref().ok();
     let mut html = String::new();
@@ -252,7 +265,7 @@ fn location(findings: &DiagnosisFindings) -> String {
     if !findings.places.regions.is_empty() {
         let _ = writeln!(
             html,
-            "<p>Each picture shows mean and standard deviation of the error over its variable, the region shaded. {}</p>",
+            "<p>Each picture shows mean and standard deviation of the error over one variable. The region is shaded. {}</p>",
             legend(after.is_some())
         );
         html.push_str(&regions::figures(
@@ -263,8 +276,8 @@ fn location(findings: &DiagnosisFindings) -> String {
         ));
     }
     if let Some(left) = &findings.residual_locations {
-        html.push_str("<h3>What is left with the effects</h3>\n");
-        html.push_str(&sentences(left, "What is left"));
+        html.push_str("<h3>Residual with the effects</h3>\n");
+        html.push_str(&sentences(left, "The residual"));
         if !left.regions.is_empty() {
             html.push_str("<ul>\n");
             for region in &left.regions {
@@ -282,34 +295,36 @@ fn location(findings: &DiagnosisFindings) -> String {
     html
 }
 
-/// What there is to say where there is no region.
+/// A sentence in place of regions: the error is rounding, or no region stands out.
 fn sentences(places: &ErrorLocations, what: &str) -> String {
     let mut html = String::new();
     if !places.rounding.is_empty() {
         let _ = writeln!(
             html,
-            "<p>{what} of {} is rounding of the numbers in the recording: there is nothing to find.</p>",
+            "<p>{what} of {} is rounding of the recorded numbers: there is nothing to find.</p>",
             escape(&places.rounding.join(", "))
         );
     } else if places.regions.is_empty() {
         let _ = writeln!(
             html,
-            "<p>No region of coordinates, rates, loads or time stands out in {}.</p>",
-            what.to_lowercase()
+            "<p>{what} is largest nowhere in particular: no range of a coordinate, rate, load or time stands out.</p>",
         );
     }
     html
 }
 
+/// Table of all candidates with an explanation of its columns.
 fn candidates(findings: &DiagnosisFindings) -> String {
     format!(
-        "<p>Every kind of the library at every place that it fits. The first share is of the squared error of the model as it is; \
-         the gain is of what is left beside the effects that were found, for a found one what would be lost without it.\
-         <span class=\"script-only\"> A click on a head sorts.</span></p>\n{}",
+        "<p>Every kind of the library at every possible place. The first share is the part of the squared error that the candidate \
+         would explain alone. The gain is the part of the squared residual that it explains in addition to the effects found; for \
+         an effect that was found it is the loss without it.\
+         <span class=\"script-only\"> Click on a head to sort.</span></p>\n{}",
         tables::candidates(findings)
     )
 }
 
+/// Base parameters with the effects, and folded those without.
 fn parameters(findings: &DiagnosisFindings) -> String {
     if findings.before.identified.is_none() {
         return tables::parameters(&findings.before);
@@ -317,27 +332,28 @@ fn parameters(findings: &DiagnosisFindings) -> String {
     let mut html = String::new();
     match &findings.after {
         Ok(after) => {
-            html.push_str("<p>Base parameters of the model with the effects, identified from the recordings of the fit with drives weighted by their residuals. Deviations allow for residuals that resemble their neighbours.</p>\n");
+            html.push_str("<p>Base parameters of the model with the effects, fitted with each drive weighted by its residual. Standard deviations allow for residuals that are correlated in time.</p>\n");
             html.push_str(&tables::parameters(after));
             let _ = writeln!(
                 html,
-                "<details>\n<summary>The same without the effects</summary>\n{}</details>",
+                "<details>\n<summary>Parameters without the effects</summary>\n{}</details>",
                 tables::parameters(&findings.before)
             );
         }
         Err(_) => {
-            html.push_str("<p>Base parameters, identified from the recordings of the fit with drives weighted by their residuals. Deviations allow for residuals that resemble their neighbours.</p>\n");
+            html.push_str("<p>Base parameters, fitted with each drive weighted by its residual. Standard deviations allow for residuals that are correlated in time.</p>\n");
             html.push_str(&tables::parameters(&findings.before));
         }
     }
     html
 }
 
-/// The page of equations within this one: names of places on it get a prefix, headings go down two steps.
+/// The page of equations inside this page: its anchors get a prefix, its headings go down two levels.
 fn embed_equations(findings: &DiagnosisFindings, page: &str) -> String {
     let inner = text_between(page, "<main>", "</main>")
         .replace(" id=\"", " id=\"equations-")
         .replace("href=\"#", "href=\"#equations-");
+    // Headings become lower ones in an order in which no replacement meets the result of another.
     let mut inner = inner;
     for (from, to) in [("h3", "h5"), ("h2", "h4"), ("h1", "h3")] {
         inner = inner
@@ -351,6 +367,6 @@ fn embed_equations(findings: &DiagnosisFindings, page: &str) -> String {
         "The model"
     };
     format!(
-        "<details class=\"embedded\">\n<summary>{what}: how it was derived, p_g, dependences, p_min, programs</summary>\n{inner}</details>\n",
+        "<details class=\"embedded\">\n<summary>{what}: derivation, p_g, dependences, p_min, programs</summary>\n{inner}</details>\n",
     )
 }

@@ -1,4 +1,5 @@
-//! Where the error lives: a sentence and a picture for each region, the mean and the spread of the error over its variable.
+//! Regions where the error is largest: a sentence and a picture for each, with mean and standard deviation of the error over the
+//! variable of the region.
 
 use std::cmp::Ordering;
 use std::fmt::Write as _;
@@ -13,6 +14,7 @@ use crate::model::Model;
 use crate::text::svg::escape;
 use crate::text::table::significant;
 
+/// Segments of the variable in a picture.
 const BINS: usize = 44;
 const WIDTH: f64 = 420.0;
 const HEIGHT: f64 = 190.0;
@@ -43,10 +45,11 @@ pub(crate) fn sentence(region: &ErrorRegion, model: &Model) -> String {
     let unit = variable_unit(model, &region.variable);
     let [low, high] = region.range;
     let name = if region.variable == TIME_COLUMN {
-        "the time"
+        "time"
     } else {
         &region.variable
     };
+    // A range of equal size on both sides of zero is a range of magnitudes, as for rates near standstill.
     let is_around_zero = low < 0.0 && low.to_bits() == (-high).to_bits();
     let lies = if is_around_zero {
         format!("within {} {unit} of zero {name}", significant(high, 3))
@@ -57,6 +60,7 @@ pub(crate) fn sentence(region: &ErrorRegion, model: &Model) -> String {
             significant(high, 3)
         )
     };
+    // Times of several recordings overlap, so a region in time names its file.
     let file = region.says.split_once(": ").map(|(file, _)| file);
     let of = match file {
         Some(file) if region.variable == TIME_COLUMN => format!(" in {file}"),
@@ -71,6 +75,7 @@ pub(crate) fn sentence(region: &ErrorRegion, model: &Model) -> String {
     )
 }
 
+/// Picture of a region: mean and standard deviation of the error over the variable, before and after. `None` without samples.
 fn picture(
     region: &ErrorRegion,
     before: &ModelVersion,
@@ -80,7 +85,7 @@ fn picture(
     let model = &before.model;
     let d = model.drives().iter().position(|d| *d == region.channel)?;
     let judged = before.validation_runs();
-    // A stretch of time lies in one recording, which its sentence names if there are several.
+    // A segment of time belongs to one recording, which its sentence names if there are several.
     let runs: Vec<usize> = if region.variable == TIME_COLUMN {
         let named = |k: &usize| {
             region
@@ -156,14 +161,14 @@ fn picture(
     Some(picture.finish(&region.says))
 }
 
-/// A stretch of a variable: its middle, mean and standard deviation of the error there.
+/// A segment of a variable: its middle, mean and standard deviation of the error there.
 struct ErrorBin {
     at: f64,
     mean: f64,
     spread: f64,
 }
 
-/// Mean and standard deviation of an error in stretches of equal length that hold at least three samples.
+/// Mean and standard deviation of an error in segments of equal length; segments with fewer than three samples are left out.
 fn bin_errors(over: &[f64], error: &[f64]) -> Vec<ErrorBin> {
     let [low, high] = range(over);
     if high.partial_cmp(&low) != Some(Ordering::Greater) {

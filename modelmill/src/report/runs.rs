@@ -1,4 +1,4 @@
-//! What differs between runs as one self-contained page: what changed and when, and every base parameter over the runs.
+//! Differences between runs as one self-contained HTML page: changes, when they happened, and every base parameter over the runs.
 
 use std::fmt::Write as _;
 
@@ -19,25 +19,21 @@ const HEIGHT: f64 = 170.0;
 /// How many standard deviations a bar reaches up and down.
 const BARS: f64 = 2.0;
 
-/// The page's text, with advice in the words quantity whoever reads it.
+/// The HTML quantity the page; `spelling` writes commands or calls for its reader.
 pub fn runs_page(compared: &RunsComparison, spelling: &dyn RemedySpelling) -> String {
-    let title = format!("{}: what changed between runs", compared.model);
+    let title = format!("{}: changes between runs", compared.model);
     let mut page = pages::begin(&title);
     page.push_str(&summary(compared));
     let mut sections = vec![
-        (
-            "when",
-            "When something changed and stayed changed",
-            points(compared),
-        ),
+        ("when", "Lasting changes", points(compared)),
         (
             "against",
-            "Every run against the first",
-            changes_table(compared),
+            "Each run compared with the first",
+            against(compared),
         ),
     ];
     if let Some(shared) = &compared.shared {
-        sections.push(("own", "One fit of all runs", shared_fit_section(shared)));
+        sections.push(("own", "Joint fit of all runs", shared_fit_section(shared)));
     }
     sections.push((
         "parameters",
@@ -55,10 +51,12 @@ pub fn runs_page(compared: &RunsComparison, spelling: &dyn RemedySpelling) -> St
     page
 }
 
+/// The verdict: lasting changes, and how many runs differ from the first.
 fn summary(compared: &RunsComparison) -> String {
     let later = compared.runs.len() - 1;
     let changed = compared.runs.iter().skip(1);
     let changed = changed.filter(|run| !run.changes.is_empty()).count();
+    // The colour of the verdict.
     let class = if changed == 0 && compared.points.is_empty() {
         "adequate"
     } else {
@@ -70,19 +68,23 @@ fn summary(compared: &RunsComparison) -> String {
     };
     let _ = write!(
         says,
-        "{changed} of {later} later runs differ from {} by more than chance, noise and the errors of the model.",
+        "{changed} of {later} later runs differ from {} by more than noise and model error.",
         compared.runs[0].file
     );
     format!("<p class=\"verdict {class}\">{}</p>\n", escape(&says))
 }
 
+/// Changes as a list, each with those that explain the runs equally well.
 fn changes_list(changes: &[RunChange]) -> String {
     let mut html = String::from("<ul>\n");
     for one in changes {
         let _ = write!(html, "<li>{}", escape(&one.says));
         if !one.rivals.is_empty() {
             let rivals = escape(&one.rivals.join("; "));
-            let _ = write!(html, "<br><small>not told from: {rivals}</small>");
+            let _ = write!(
+                html,
+                "<br><small>not distinguishable from: {rivals}</small>"
+            );
         }
         html.push_str("</li>\n");
     }
@@ -90,17 +92,17 @@ fn changes_list(changes: &[RunChange]) -> String {
     html
 }
 
+/// Lasting changes, each with its physical causes and the base parameters before and since.
 fn points(compared: &RunsComparison) -> String {
     if compared.points.is_empty() {
-        return "<p>No base parameter changed and stayed changed over two or more runs.</p>\n"
-            .to_owned();
+        return "<p>No base parameter changed for two or more runs.</p>\n".to_owned();
     }
     let mut html = String::new();
     for point in &compared.points {
         let file = escape(&compared.runs[point.run].file);
         let _ = writeln!(html, "<h3>From run {} on: {file}</h3>", point.run + 1);
         if point.changes.is_empty() {
-            html.push_str("<p>No single change in physics explains it.</p>\n");
+            html.push_str("<p>No single physical change explains it.</p>\n");
         } else {
             html.push_str(&changes_list(&point.changes));
         }
@@ -128,6 +130,7 @@ fn points(compared: &RunsComparison) -> String {
     html
 }
 
+/// A value with its standard deviation as a cell.
 fn value(fitted: Option<FittedValue>) -> TableCell {
     match fitted {
         Some(FittedValue {
@@ -137,10 +140,11 @@ fn value(fitted: Option<FittedValue>) -> TableCell {
             &format!("{} ± {}", significant(value, 5), significant(deviation, 2)),
             value,
         ),
-        _ => TableCell::text("not told"),
+        _ => TableCell::text("not identifiable"),
     }
 }
 
+/// Runs that differ from the first one, with their changes.
 fn changes_table(compared: &RunsComparison) -> String {
     let rows: Vec<Vec<TableCell>> = (compared.runs.iter().enumerate())
         .filter(|(_, run)| !run.changes.is_empty())
@@ -155,20 +159,17 @@ fn changes_table(compared: &RunsComparison) -> String {
     if rows.is_empty() {
         return "<p>No run differs from the first.</p>\n".to_owned();
     }
-    table(
-        "changes",
-        &["#run", "recording", "what is different"],
-        &rows,
-    )
+    table("changes", &["#run", "recording", "differences"], &rows)
 }
 
+/// Values that each run has for itself in the joint fit.
 fn shared_fit_section(shared: &SharedFit) -> String {
     let mut html = String::from(
-        "<p>Base parameters are shared by all runs; these values are each run's own.</p>\n",
+        "<p>All runs share their base parameters. The values below belong to one run each.</p>\n",
     );
     if !shared.gains.is_empty() {
         html.push_str(
-            "<p>True forces are the measured ones times these factors, by the known load.</p>\n",
+            "<p>True force = factor times measured force, determined by the known load.</p>\n",
         );
         let rows: Vec<Vec<TableCell>> = (shared.gains.iter())
             .map(|(drive, gain)| vec![TableCell::text(drive), value(Some(*gain))])
@@ -196,27 +197,29 @@ fn shared_fit_section(shared: &SharedFit) -> String {
     html
 }
 
+/// Pictures of base parameters over the runs: those with lasting changes first, the others folded.
 fn parameters(compared: &RunsComparison) -> String {
     let has_changed = |k: &usize| {
         let mut steps = compared.points.iter().flat_map(|point| &point.steps);
         steps.any(|step| step.parameter == *k)
     };
-    let is_told = |k: &usize| {
+    let is_determined = |k: &usize| {
         compared
             .runs
             .iter()
-            .any(|run| known_value(run.alone[*k]).is_some())
+            .any(|run| determined(run.alone[*k]).is_some())
     };
-    let all = (0..compared.parameters.len()).filter(is_told);
+    let all = (0..compared.parameters.len()).filter(is_determined);
+    // Parameters with a lasting change are shown first, the others folded.
     let (changed, same): (Vec<usize>, Vec<usize>) = all.partition(has_changed);
     let mut html = String::from(
-        "<p>Each run fitted alone, with bars of two standard deviations; lines are means between the changes above.</p>\n",
+        "<p>Each run is fitted separately. Bars are two standard deviations, lines are means between the changes above.</p>\n",
     );
     for k in changed {
         html.push_str(&picture(compared, k));
     }
     if !same.is_empty() {
-        html.push_str("<details>\n<summary>Those that did not change</summary>\n");
+        html.push_str("<details>\n<summary>Parameters that did not change</summary>\n");
         for k in same {
             html.push_str(&picture(compared, k));
         }
@@ -225,8 +228,8 @@ fn parameters(compared: &RunsComparison) -> String {
     html
 }
 
-/// A value that the run tells, with its deviation.
-fn known_value(fitted: FittedValue) -> Option<[f64; 2]> {
+/// A value and its standard deviation, if the run determines it.
+fn determined(fitted: FittedValue) -> Option<[f64; 2]> {
     Some([fitted.value, fitted.deviation.filter(|d| *d > 0.0)?])
 }
 
@@ -234,7 +237,7 @@ fn known_value(fitted: FittedValue) -> Option<[f64; 2]> {
 fn picture(compared: &RunsComparison, k: usize) -> String {
     let runs = &compared.runs;
     let known: Vec<(usize, [f64; 2])> = (runs.iter().enumerate())
-        .filter_map(|(at, run)| Some((at, known_value(run.alone[k])?)))
+        .filter_map(|(at, run)| Some((at, determined(run.alone[k])?)))
         .collect();
     let steps = compared.points.iter().flat_map(|point| {
         let own = point.steps.iter().filter(|step| step.parameter == k);
@@ -244,8 +247,8 @@ fn picture(compared: &RunsComparison, k: usize) -> String {
     parameter_history(&compared.parameters[k], "run", runs.len(), &known, &steps)
 }
 
-/// A base parameter over `n` runs or days as a picture: values that are known, by place and with their deviations, and levels
-/// before and since each change, by the place from which on it is there.
+/// Picture of a base parameter over `n` runs or days (`what`). `known` has the index of a run with value and standard deviation;
+/// `steps` has the index of the first run of each change with the mean before and since.
 pub fn parameter_history(
     info: &ParameterInfo,
     what: &str,
@@ -253,6 +256,7 @@ pub fn parameter_history(
     known: &[(usize, [f64; 2])],
     steps: &[(usize, [f64; 2])],
 ) -> String {
+    // The axis has room for all bars.
     let ends: Vec<f64> = (known.iter())
         .flat_map(|(_, [x, d])| [x - BARS * d, x + BARS * d])
         .collect();
@@ -270,6 +274,7 @@ pub fn parameter_history(
         let start = if i == 0 { 0 } else { steps[i - 1].0 };
         let end = steps.get(i + 1).map_or(n, |next| next.0);
         let at = |run: usize| x.position(run as f64 + 0.5);
+        // The level before the first change belongs to no step.
         if i == 0 {
             let level = y.position(*before);
             let d = format!("M{:.1} {level:.1}H{:.1}", at(start), at(*run));
@@ -295,6 +300,7 @@ pub fn parameter_history(
     )
 }
 
+/// All runs with their sizes, and those that could not be evaluated with the reason.
 fn runs(compared: &RunsComparison, spelling: &dyn RemedySpelling) -> String {
     let mut rows: Vec<Vec<TableCell>> = (compared.runs.iter().enumerate())
         .map(|(k, run)| {
@@ -307,7 +313,7 @@ fn runs(compared: &RunsComparison, spelling: &dyn RemedySpelling) -> String {
         })
         .collect();
     rows.extend(compared.unread.iter().map(|one| {
-        let says = TableCell::text(&format!("gave no answer: {}", one.error.spell(spelling)));
+        let says = TableCell::text(&format!("not evaluated: {}", one.error.spell(spelling)));
         vec![
             TableCell::text(""),
             TableCell::text(&one.file),
@@ -317,7 +323,7 @@ fn runs(compared: &RunsComparison, spelling: &dyn RemedySpelling) -> String {
     }));
     table(
         "runs",
-        &["#run", "recording", "#samples", "#parameters that moved"],
+        &["#run", "recording", "#samples", "#parameters that changed"],
         &rows,
     )
 }

@@ -1,4 +1,4 @@
-//! Spectra of what the model leaves, by averaged windowed segments (P. Welch, IEEE Trans. Audio Electroacoustics 15 (1967)).
+//! Spectra of the residuals, by averaged windowed segments (P. Welch, IEEE Trans. Audio Electroacoustics 15 (1967)).
 
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
@@ -20,10 +20,12 @@ pub(crate) fn density(signal: &[f64], rate: f64) -> Vec<(f64, f64)> {
     if n < 32 || !(rate > 0.0 && rate.is_finite()) {
         return Vec::new();
     }
+    // The window of Hann, which keeps a strong line from hiding weak frequencies next to it.
     let window: Vec<f64> = (0..n)
         .map(|i| 0.5 - 0.5 * (TAU * (i as f64 + 0.5) / n as f64).cos())
         .collect();
     let power: f64 = window.iter().map(|w| w * w).sum();
+    // Segments overlap by half, as Welch recommends for this window.
     let starts: Vec<usize> = (0..=signal.len() - n).step_by(n / 2).collect();
     let segments: Vec<Vec<f64>> = starts
         .iter()
@@ -52,6 +54,7 @@ pub(crate) fn density(signal: &[f64], rate: f64) -> Vec<(f64, f64)> {
     bins.iter()
         .map(|bin| {
             let sum: f64 = segments.iter().map(|s| goertzel(s, *bin)).sum();
+            // One-sided density: the factor 2 adds the negative frequencies.
             let density = 2.0 * sum / (segments.len() as f64 * power * rate);
             (*bin as f64 * rate / n as f64, density)
         })
@@ -68,12 +71,12 @@ fn goertzel(values: &[f64], bin: usize) -> f64 {
     one * one + two * two - factor * one * two
 }
 
-/// A figure for each drive: what is left over frequency, before and after.
+/// A figure for each drive: density of the residual over frequency, before and after the effects.
 pub(crate) fn figures(before: &ModelVersion, after: Option<&ModelVersion>) -> String {
     let mut html = String::new();
     for (d, drive) in before.model.drives().iter().enumerate() {
         let of = |version: &ModelVersion| -> Vec<(f64, f64)> {
-            // The longest run says most about low frequencies.
+            // The longest run resolves the lowest frequencies.
             let judged = version.validation_runs();
             let longest = judged.iter().max_by_key(|k| version.runs[**k].time.len());
             let Some(run) = longest.map(|k| &version.runs[*k]) else {
@@ -106,6 +109,7 @@ pub(crate) fn figures(before: &ModelVersion, after: Option<&ModelVersion>) -> St
         let x = PlotAxis::decades(range(&frequencies), [LEFT, WIDTH - RIGHT]);
         let [low, high] = range(&roots);
         let y = PlotAxis::decades(
+            // At most eight decades are shown; what is below is rounding.
             [(low / 1.5).max(high * 1e-8), high * 1.5],
             [HEIGHT - 34.0, 8.0],
         );

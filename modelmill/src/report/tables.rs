@@ -1,8 +1,8 @@
-//! Tables of the page: steps, effects, candidates, parameters, remarks on the recordings.
+//! Tables of the page as HTML: steps, effects, candidates, parameters, recordings with notes.
 
 use std::fmt::Write as _;
 
-use modelmill_identify::diagnose::CandidateOutcome;
+use modelmill_identify::diagnose::{CandidateOutcome, FoundEffect};
 use modelmill_identify::{FitParameter, NoteSeverity, ParameterStatus};
 
 use super::draw::attribute;
@@ -12,10 +12,10 @@ use crate::print::StepSpelling;
 use crate::text::svg::escape;
 use crate::text::table::{percent, significant};
 
-/// Candidates that are shown at once.
+/// Candidates that are shown unfolded.
 const FIRST: usize = 20;
 
-/// A cell: its text, and the number by which it is sorted.
+/// A cell: its HTML, and the number by which a column is sorted.
 pub struct TableCell(String, Option<f64>);
 
 impl TableCell {
@@ -35,7 +35,7 @@ impl TableCell {
     }
 }
 
-/// A table; columns that begin with `#` hold numbers.
+/// A table as HTML. Heads that begin with `#` mark columns of numbers, which are aligned right and sorted by value.
 pub fn table(class: &str, head: &[&str], rows: &[Vec<TableCell>]) -> String {
     let mut html = format!("<div class=\"wide\"><table class=\"{class}\">\n<thead><tr>");
     for name in head {
@@ -60,7 +60,7 @@ pub fn table(class: &str, head: &[&str], rows: &[Vec<TableCell>]) -> String {
     html
 }
 
-/// The steps of the ladder with what spoke for them.
+/// Error after each added effect, with the evidence for it.
 pub(crate) fn ladder(findings: &DiagnosisFindings) -> String {
     let diagnosis = &findings.diagnosis;
     let rows: Vec<Vec<TableCell>> = diagnosis
@@ -78,6 +78,7 @@ pub(crate) fn ladder(findings: &DiagnosisFindings) -> String {
                 percents(rung.fit),
                 percents(rung.check),
                 of(&|| evidence.map(|e| (percent(Some(e.gain)), e.gain))),
+                // Without noise the ratio is huge and only its size class matters.
                 of(&|| evidence.map(|e| (significant(e.blocks_t.min(999.0), 2), e.blocks_t))),
                 of(&|| {
                     evidence.map(|e| (format!("{:.0}", e.effective_samples), e.effective_samples))
@@ -92,16 +93,17 @@ pub(crate) fn ladder(findings: &DiagnosisFindings) -> String {
             "step",
             "#error, fit",
             &check,
-            "#squared error that goes",
-            "#deviations above zero",
+            "#squared error explained",
+            "#that share / its std",
             "#independent samples",
         ],
         &rows,
     )
 }
 
-/// Errors of each drive before and after, beside the noise.
+/// Errors of each drive before and after the effects, with the noise of its force.
 pub(crate) fn drives(findings: &DiagnosisFindings) -> String {
+    // The same figure as in the text: rms of the error over rms of the measured force, on the data that are judged.
     let nrms = |version: &ModelVersion, d: usize| -> f64 {
         let runs = version.validation_runs();
         let error = version.errors(&runs, d);
@@ -137,65 +139,47 @@ pub(crate) fn drives(findings: &DiagnosisFindings) -> String {
             row
         })
         .collect();
-    let mut head = vec!["drive", "#error as it is"];
+    let mut head = vec!["drive", "#error of the model as it is"];
     if findings.after.is_ok() {
-        head.push("#with the effects");
+        head.push("#error with the effects");
     }
     head.push("#noise of the force");
     table("", &head, &rows)
 }
 
-/// What was found: values, what cannot be told from it, what it is.
+/// Missing effects: for each kind its meaning once, and for each place values and effects that explain the recordings equally
+/// well.
 pub(crate) fn effects(findings: &DiagnosisFindings) -> String {
     let answer = &findings.answer;
-    let mut html = String::new();
+    // Kinds in the order of their first effect, so that a text about a kind is not repeated for each of its places.
+    let mut kinds: Vec<(&str, Vec<&FoundEffect>)> = Vec::new();
     for found in &answer.diagnosis.effects {
-        let _ = writeln!(
-            html,
-            "<h3>{}</h3>",
-            escape(&capitalise(&words::effect(&found.effect)))
-        );
-        let kind = answer
-            .candidates
-            .kinds
-            .iter()
-            .find(|k| k.name == found.effect.kind);
+        let name = found.effect.kind.as_str();
+        match kinds.iter_mut().find(|(kind, _)| *kind == name) {
+            Some((_, all)) => all.push(found),
+            None => kinds.push((name, vec![found])),
+        }
+    }
+    let mut html = String::new();
+    for (name, all) in kinds {
+        let title = match all.as_slice() {
+            [one] => words::effect(&one.effect),
+            _ => format!("{} ({} times)", words::kind(name), all.len()),
+        };
+        let _ = writeln!(html, "<h3>{}</h3>", escape(&capitalise(&title)));
+        let kind = answer.candidates.kinds.iter().find(|k| k.name == name);
         if let Some(kind) = kind {
             let _ = writeln!(html, "<p>{}</p>", escape(&kind.says));
         }
-        let parameters = &answer.problem.candidates[found.candidate].parameters;
-        let values = parameters.iter().zip(&found.estimates).map(|(p, value)| {
-            format!(
-                "<code>{}</code> = {} {}",
-                escape(&p.symbol),
-                significant(*value, 4),
-                escape(&typographic_unit(&p.unit))
-            )
-        });
-        let constants = found.constants.iter().map(|(name, value)| {
-            format!(
-                "<code>{}</code> = {} (searched for)",
-                escape(name),
-                significant(*value, 3)
-            )
-        });
-        let all: Vec<String> = values.chain(constants).collect();
-        if !all.is_empty() {
-            let _ = writeln!(html, "<p>{}</p>", all.join(", "));
-        }
-        if !found.indistinguishable_from.is_empty() {
-            let _ = writeln!(
-                html,
-                "<p class=\"alias\">These recordings cannot tell it from: {}.</p>",
-                escape(
-                    &found
-                        .indistinguishable_from
-                        .iter()
-                        .map(words::effect)
-                        .collect::<Vec<_>>()
-                        .join("; ")
-                )
-            );
+        if let [one] = all.as_slice() {
+            html.push_str(&effect(findings, one, ""));
+        } else {
+            html.push_str("<ul>\n");
+            for one in all {
+                let places = format!("{}: ", one.effect.at.join(", "));
+                let _ = writeln!(html, "<li>{}</li>", effect(findings, one, &places));
+            }
+            html.push_str("</ul>\n");
         }
         if let Some(kind) = kind {
             let texts = [&kind.explains, &kind.doubles];
@@ -207,7 +191,7 @@ pub(crate) fn effects(findings: &DiagnosisFindings) -> String {
             if !texts.is_empty() {
                 let _ = writeln!(
                     html,
-                    "<details>\n<summary>What it is, and how to tell it from its doubles</summary>\n{}\n</details>",
+                    "<details>\n<summary>What it is, and what it can be confused with</summary>\n{}\n</details>",
                     texts.join("\n")
                 );
             }
@@ -216,6 +200,42 @@ pub(crate) fn effects(findings: &DiagnosisFindings) -> String {
     html
 }
 
+/// Values of one effect behind a label, and the effects that explain the recordings equally well.
+fn effect(findings: &DiagnosisFindings, found: &FoundEffect, label: &str) -> String {
+    let parameters = &findings.answer.problem.candidates[found.candidate].parameters;
+    let values = parameters.iter().zip(&found.estimates).map(|(p, value)| {
+        format!(
+            "<code>{}</code> = {} {}",
+            escape(&p.symbol),
+            significant(*value, 4),
+            escape(&typographic_unit(&p.unit))
+        )
+    });
+    let constants = found.constants.iter().map(|(name, value)| {
+        format!(
+            "<code>{}</code> = {} (found by search)",
+            escape(name),
+            significant(*value, 3)
+        )
+    });
+    let all: Vec<String> = values.chain(constants).collect();
+    let mut html = String::new();
+    if !all.is_empty() || !label.is_empty() {
+        let _ = writeln!(html, "<p>{}{}</p>", escape(label), all.join(", "));
+    }
+    if !found.indistinguishable_from.is_empty() {
+        let others = found.indistinguishable_from.iter().map(words::effect);
+        let others: Vec<String> = others.collect();
+        let _ = writeln!(
+            html,
+            "<p class=\"alias\">With these recordings it is not distinguishable from: {}.</p>",
+            escape(&others.join("; "))
+        );
+    }
+    html
+}
+
+/// Text with a capitalise first letter.
 fn capitalise(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().map_or_else(String::new, |first| {
@@ -223,20 +243,21 @@ fn capitalise(text: &str) -> String {
     })
 }
 
-/// What became of the candidates; those behind the first are folded.
+/// All candidates with the result of the search; those after the first `FIRST` are folded.
 pub(crate) fn candidates(findings: &DiagnosisFindings) -> String {
     let all = &findings.diagnosis.candidates;
     let head = [
         "kind",
         "places",
-        "#explains alone",
-        "#gain beside what was found",
-        "verdict",
+        "#alone it would explain",
+        "#gain in addition to the effects found",
+        "result",
     ];
+    let has_effects = !findings.diagnosis.effects.is_empty();
     let row = |c: &CandidateOutcome| -> Vec<TableCell> {
         let verdict = match &c.rejection_reason {
             None => TableCell::html("<b>found</b>".to_owned()),
-            Some(why) => TableCell::text(why),
+            Some(why) => TableCell::text(words::refusal(why, has_effects)),
         };
         vec![
             TableCell::text(&words::kind(&c.effect.kind)),
@@ -247,6 +268,7 @@ pub(crate) fn candidates(findings: &DiagnosisFindings) -> String {
         ]
     };
     let rows: Vec<Vec<TableCell>> = all.iter().map(row).collect();
+    // The table is folded after the first candidates, since a machine may have hundreds.
     let split = FIRST.min(rows.len());
     let mut html = table("sortable", &head, &rows[..split]);
     if split < rows.len() {
@@ -260,7 +282,7 @@ pub(crate) fn candidates(findings: &DiagnosisFindings) -> String {
     html
 }
 
-/// A share in per cent, of which less than a tenth is nothing.
+/// A share in per cent; less than 0.05 % is printed as 0.
 fn percent_cell(value: f64) -> TableCell {
     let percents = 100.0 * value;
     let text = if percents.abs() < 0.05 {
@@ -273,10 +295,10 @@ fn percent_cell(value: f64) -> TableCell {
     TableCell::number(&text.replace('-', "−"), value)
 }
 
-/// Identified parameters beside nominal ones.
+/// Identified base parameters, their nominal values and standard deviations.
 pub(crate) fn parameters(version: &ModelVersion) -> String {
     let Some(result) = &version.identified else {
-        return "<p>All parameters are held at their nominal values.</p>\n".to_owned();
+        return "<p>All parameters are fixed at their nominal values.</p>\n".to_owned();
     };
     let row = |(k, p): (usize, &FitParameter)| -> Vec<TableCell> {
         // The nominal value of an effect that was just added is its estimate.
@@ -326,15 +348,15 @@ pub(crate) fn parameters(version: &ModelVersion) -> String {
             "expression",
             "#nominal",
             "#identified",
-            "#deviation",
+            "#std",
             "unit",
-            "#deviations off nominal",
+            "#difference to nominal / std",
         ],
         &rows,
     )
 }
 
-/// Recordings and what was done to them.
+/// Recordings with their sizes, and notes on faults and preparation.
 pub(crate) fn data(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) -> String {
     let rows: Vec<Vec<TableCell>> = findings
         .before
@@ -353,7 +375,7 @@ pub(crate) fn data(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) ->
             };
             vec![
                 TableCell::text(&run.name),
-                TableCell::text(if run.is_check { "check" } else { "fit" }),
+                TableCell::text(if run.is_check { "validation" } else { "fit" }),
                 TableCell::number(&n.to_string(), n as f64),
                 TableCell::number(&format!("{} s", significant(span, 3)), span),
                 TableCell::number(&format!("{} Hz", significant(rate, 4)), rate),
@@ -362,11 +384,17 @@ pub(crate) fn data(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) ->
         .collect();
     let mut html = table(
         "",
-        &["recording", "for", "#samples", "#length", "#rate"],
+        &[
+            "recording",
+            "used for",
+            "#samples",
+            "#duration",
+            "#sample rate",
+        ],
         &rows,
     );
     if findings.notes.is_empty() {
-        html.push_str("<p>Nothing was changed, and nothing looked odd.</p>\n");
+        html.push_str("<p>The recordings were used unchanged. No fault was found in them.</p>\n");
         return html;
     }
     html.push_str("<ul class=\"notes\">\n");

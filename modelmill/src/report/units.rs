@@ -1,4 +1,4 @@
-//! Units of what a model's recordings hold.
+//! Units of forces and variables of recordings, for axes and sentences.
 
 use crate::model::Model;
 

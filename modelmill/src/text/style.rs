@@ -10,6 +10,7 @@ impl TerminalStyle {
     /// Without any mark.
     pub const PLAIN: Self = Self(false);
 
+    /// Text between the escape sequence of a code and the reset, if marks are on.
     fn paint(self, code: &str, text: &str) -> String {
         if self.0 {
             format!("\x1b[{code}m{text}\x1b[0m")
@@ -18,12 +19,12 @@ impl TerminalStyle {
         }
     }
 
-    /// What deserves attention.
+    /// Warnings.
     pub fn yellow(self, text: &str) -> String {
         self.paint("1;33", text)
     }
 
-    /// What went wrong.
+    /// Errors.
     pub fn bold_red(self, text: &str) -> String {
         self.paint("1;31", text)
     }
@@ -33,22 +34,22 @@ impl TerminalStyle {
         self.paint("1", text)
     }
 
-    /// What is there for reference.
+    /// Details for reference.
     pub fn dim(self, text: &str) -> String {
         self.paint("2", text)
     }
 
-    /// What got better or was added.
+    /// Improvements and added lines.
     pub fn green(self, text: &str) -> String {
         self.paint("32", text)
     }
 
-    /// What got worse or was removed.
+    /// Deteriorations and removed lines.
     pub fn red(self, text: &str) -> String {
         self.paint("31", text)
     }
 
-    /// What draws the eye.
+    /// Commands and positions.
     pub fn cyan(self, text: &str) -> String {
         self.paint("36", text)
     }

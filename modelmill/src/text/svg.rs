@@ -3,7 +3,9 @@
 use std::fmt::Write as _;
 
 const WIDTH: f64 = 900.0;
+/// Height of a panel.
 const PANEL: f64 = 150.0;
+/// Room between panels, for the names of curves.
 const GAP: f64 = 34.0;
 const LEFT: f64 = 80.0;
 const RIGHT: f64 = 16.0;
@@ -41,9 +43,12 @@ pub struct PanelStyle<'a> {
 
 /// A figure as it grows.
 pub struct SvgFigure<'a> {
+    /// Title as SVG text.
     title: String,
+    /// Times of the samples, s.
     time: &'a [f64],
     body: String,
+    /// Number of panels so far.
     panels: usize,
 }
 
@@ -72,6 +77,7 @@ impl<'a> SvgFigure<'a> {
             .fold(0.0_f64, |m, v| m.max(v.abs()));
         let limit = look.limit.unwrap_or(largest).max(f64::MIN_POSITIVE);
         let plot_width = WIDTH - LEFT - RIGHT;
+        // Zero is in the middle of the panel; larger values are cut off at its edge.
         let y = |value: f64| top + PANEL * (0.5 - 0.5 * (value / limit).clamp(-1.0, 1.0));
         let body = &mut self.body;
         let _ = writeln!(
@@ -97,7 +103,7 @@ impl<'a> SvgFigure<'a> {
                 top + PANEL
             );
         }
-        // A scale that was asked for is a round number.
+        // A given limit is a round number and is printed unchanged.
         let text = |value: f64| match look.limit {
             Some(_) => value.to_string(),
             None => format!("{value:.4}"),
@@ -177,8 +183,8 @@ pub fn sheet(title: &str, left: f64, height: f64, body: &str) -> String {
     )
 }
 
-/// Least and largest value of each of half as many stretches as points are wanted, with their places; all values where
-/// they are few enough.
+/// A curve in about `wanted` points, each with its index: the least and the largest value of each of many segments, so that no peak is
+/// lost. All values if they are few enough.
 pub fn thin_out(values: &[f64], wanted: usize) -> Vec<(usize, f64)> {
     if values.len() <= wanted {
         return values.iter().copied().enumerate().collect();

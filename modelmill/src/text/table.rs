@@ -17,6 +17,7 @@ pub fn table(
 ) -> Vec<String> {
     let head: Vec<String> = columns.iter().map(|(name, _)| (*name).to_owned()).collect();
     let all: Vec<&Vec<String>> = std::iter::once(&head).chain(rows).collect();
+    // A column is as wide as its longest cell, in letters rather than bytes.
     let widths: Vec<usize> = (0..columns.len())
         .map(|j| {
             all.iter()
@@ -39,6 +40,7 @@ pub fn table(
                 line.extend(parts);
                 line.push_str("  ");
             }
+            // Blanks at the end of a line would show as changes in quotations.
             line.trim_end().to_owned()
         })
         .collect()
@@ -51,6 +53,7 @@ pub fn number(value: f64) -> String {
 
 /// A value and its standard deviation, both to the second digit of the deviation.
 pub fn with_deviation(value: f64, deviation: f64) -> [String; 2] {
+    // Position of the first digit of the standard deviation.
     let exponent = deviation.abs().log10().floor();
     let decimals = 1.0 - exponent;
     if !(value.is_finite() && (0.0..=12.0).contains(&decimals)) {
@@ -73,11 +76,13 @@ pub fn significant(value: f64, digits: usize) -> String {
     if !value.is_finite() {
         return value.to_string();
     }
+    // Formatting rounds first, so that 999999.9 gets the exponent of 1e6.
     let scientific = format!("{value:.*e}", digits.saturating_sub(1));
     let exponent: i32 = scientific
         .split_once('e')
         .and_then(|(_, e)| e.parse().ok())
         .unwrap_or(0);
+    // Plain decimals up to this size are easier to read than exponents.
     if !(-4..9).contains(&exponent) {
         return scientific;
     }

@@ -1,6 +1,6 @@
-//! `tour`: the whole story on bundled recordings: derive, compare, see where it fails, learn what is missing, add it, watch
-//! the error fall; then the same for the paper's own treatment. Everything it uses and makes goes into one folder, so that
-//! each command can be repeated by hand.
+//! `tour`: all main steps on bundled recordings: derive, compare, find the missing effect, add it, identify again; then a diagnosis
+//! of the model as published in the paper. Its models, recordings and pages are written into one folder, so that each command can
+//! be repeated by hand.
 
 mod story;
 
@@ -26,10 +26,10 @@ use story::TourText;
 const RODS_PAGE: &str = "report.html";
 /// The page of the paper's treatment.
 const PAPER_PAGE: &str = "report-paper.html";
-/// The model with what was found.
+/// File of the model with the effects that were found.
 const EDITED: &str = "spidermill-completed.toml";
 
-/// Tells the story and writes its files.
+/// Prints the tour and writes its files.
 pub(crate) fn run(host: &Host, args: &TourArgs) -> CommandOutcome {
     let folder = args
         .out
@@ -39,6 +39,7 @@ pub(crate) fn run(host: &Host, args: &TourArgs) -> CommandOutcome {
     let place = TourFolder::unpack(&folder)?;
     let mut story = TourText::new(terminal::style());
 
+    // Steps 1 to 5: the recording has rods, the model does not.
     let model = place.model(host, "spidermill.toml")?;
     let runs = place.read(&model, &WITH_RODS)?;
     story.derive(&place.name("spidermill.toml"), &model);
@@ -46,6 +47,7 @@ pub(crate) fn run(host: &Host, args: &TourArgs) -> CommandOutcome {
     story.compare(&place, &model, &seen);
 
     let flags = place.flags(&WITH_RODS);
+    // Base parameters are estimated, as a user would do with an unknown machine.
     let rods = diagnose(&model, &runs, FixedParameters::Known)?;
     story.diagnose(&place, &rods);
     let edited = place.add(&rods, &flags)?;
@@ -53,8 +55,10 @@ pub(crate) fn run(host: &Host, args: &TourArgs) -> CommandOutcome {
     story.ladder(&rods);
     place.write(RODS_PAGE, &page(&rods, &flags)?)?;
 
+    // Step 6: the model as published, on a recording without rods.
     let model = place.model(host, "spidermill-paper.toml")?;
     let runs = place.read(&model, &PLAIN)?;
+    // Base parameters are fixed: estimated ones would absorb most of the error.
     let paper = diagnose(&model, &runs, FixedParameters::All)?;
     story.paper(&place, &paper);
     place.write(PAPER_PAGE, &page(&paper, &place.flags(&PLAIN))?)?;
@@ -63,20 +67,19 @@ pub(crate) fn run(host: &Host, args: &TourArgs) -> CommandOutcome {
     terminal::print(story.text.trim_start())
 }
 
-fn diagnose(
-    model: &Model,
-    [fit, check]: &[PreparedRecording; 2],
-    held: FixedParameters,
-) -> CommandOutcome<DiagnosisFindings> {
+/// Diagnoses the first recording as fit and the second as validation run.
+fn diagnose(model: &Model, [fit, check]: &[PreparedRecording; 2], held: Held) -> CommandOutcome<DiagnosisFindings> {
     let question = DiagnosisOptions {
-        fixed: held,
+        held,
+        // The second diagnosis would double the time of the tour.
         repeat_with_nominal: false,
     };
     Ok(model.diagnose(&[fit], &[check], &question)?)
 }
 
-/// The folder of the tour.
+/// The folder of the tour, with its models and recordings.
 struct TourFolder {
+    /// Its path.
     folder: PathBuf,
 }
 
@@ -101,12 +104,12 @@ impl TourFolder {
         output::write(&self.folder.join(name), text)
     }
 
-    /// A file of the folder as a command has it.
+    /// A file of the folder as an argument of a command, quoted.
     fn name(&self, file: &str) -> String {
         quote_word(&self.folder.join(file).display().to_string())
     }
 
-    /// Recordings as a command has them.
+    /// Recordings as flags of a command.
     fn recordings(&self, runs: &BundledRuns) -> String {
         format!(
             "--data {} --check {}",
@@ -128,13 +131,13 @@ impl TourFolder {
         Ok([read(runs.fit.0)?, read(runs.check.0)?])
     }
 
-    /// How the command line asks for the same.
+    /// The spelling of commands that use the same recordings.
     fn flags(&self, runs: &BundledRuns) -> CommandLineSpelling {
         let [fit, check] = [runs.fit.0, runs.check.0].map(|name| self.path(name));
         CommandLineSpelling::new(&[fit], &[check], &RecordingOptions::default())
     }
 
-    /// Writes the model with what was found beside the one it came from; the commands for it, and the difference.
+    /// Writes the model with the effects that were found. Returns the commands that do the same, and the difference of the files.
     fn add(
         &self,
         findings: &DiagnosisFindings,
@@ -149,6 +152,7 @@ impl TourFolder {
         let commands = commands
             .map(|entry| flags.spell_effect(model, entry))
             .collect();
+        // File names of the difference, as `diff` prints them.
         let names = ["spidermill.toml", EDITED];
         let difference = edit::difference(model.text(), &edited.text, names);
         let coloured = edit::colour_diff(&difference, terminal::style());
@@ -161,20 +165,24 @@ fn file_name(name: &str) -> &str {
     name.rsplit('/').next().unwrap_or(name)
 }
 
-/// The model with nominal parameters held against a recording.
+/// The model with nominal parameters compared with a recording.
 struct TourComparison {
     compared: ModelComparison,
+    /// Times of the samples, s.
     time: Vec<f64>,
+    /// Measured forces, N, `[drive][sample]`.
     measured: Vec<Vec<f64>>,
+    /// Measured minus calculated forces, N, `[drive][sample]`.
     errors: Vec<Vec<f64>>,
 }
 
 impl TourComparison {
     fn new(model: &Model, recording: &PreparedRecording) -> CommandOutcome<Self> {
         let one = recording.segments.first().ok_or_else(|| {
-            CommandFailure::Input("the bundled recording has no sample".to_owned())
+            CommandFailure::Input("the bundled recording has no samples".to_owned())
         })?;
         let measured = along::measured_forces(one)?;
+        // Samples of forces and measurements must agree, so both are decimated alike.
         let forces = along::filter_and_decimate(along::forces(model, one, &model.nominal)?, one)?;
         let errors = measured
             .iter()

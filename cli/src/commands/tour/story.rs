@@ -1,4 +1,4 @@
-//! The words of the tour: paragraphs, tables and figures in the order in which they are told.
+//! Text of the tour: paragraphs, tables and figures in the order in which they are printed.
 
 use modelmill::Model;
 use modelmill::diagnose::{DiagnosisFindings, SelectionStep, words};
@@ -9,16 +9,18 @@ use modelmill::text::table::{ColumnAlignment, count, percent, table};
 use super::{EDITED, PAPER_PAGE, PLAIN, RODS_PAGE, TourComparison, TourFolder, WITH_RODS, verdict};
 use crate::terminal::plot::{TerminalCurve, bar, time_axis};
 
-/// Width of a paragraph.
+/// Width of a paragraph, letters.
 const WIDTH: usize = 76;
-/// Width of the longest bar.
+/// Width of the longest bar, letters.
 const BAR: usize = 30;
-/// Candidates that are named beside those that were found.
+/// Rejected candidates that are listed after those that were found.
 const OTHERS: usize = 5;
 
 /// The text as it grows.
 pub(super) struct TourText {
+    /// All that was printed so far.
     pub(super) text: String,
+    /// Colours, or none if the output is no terminal.
     style: TerminalStyle,
 }
 
@@ -31,11 +33,13 @@ impl TourText {
         }
     }
 
+    /// A line without trailing blanks.
     fn line(&mut self, line: &str) {
         self.text.push_str(line.trim_end());
         self.text.push('\n');
     }
 
+    /// Several lines.
     fn lines(&mut self, lines: &[String]) {
         for line in lines {
             self.line(line);
@@ -63,15 +67,15 @@ impl TourText {
         self.line("");
     }
 
-    /// What the mill makes of the model file.
+    /// The derivation: from a model file to base parameters.
     pub(super) fn derive(&mut self, name: &str, model: &Model) {
-        self.heading("1  Derive: from a model file to what can be known");
+        self.heading("1  Derive: which parameters can be identified?");
         let mechanism = &model.derivation.mechanism;
         let reduction = &model.derivation.reduction;
         self.paragraph(&format!(
             "A parallel robot carries a platform on two cranks, each pushed by a ball screw. Its model file has {}, {} and {}. \
-             The forces of the screws are linear in {} of masses, lengths and inertias, but many say the same thing. These {} are \
-             all that any measurement can tell, found exactly and in symbols:",
+             The forces of the screws are linear in {} of masses, lengths and inertias, but many of these have the same effect. \
+             Only {} combinations can be identified from measurements. They are found symbolically, in exact arithmetic:",
             count(mechanism.parts.len(), "body", "bodies"),
             count(mechanism.loops.len(), "loop", "loops"),
             count(mechanism.drives.len(), "drive", "drives"),
@@ -83,20 +87,20 @@ impl TourText {
         self.command(&format!("equations {name}"));
     }
 
-    /// How far the model is off, and where.
+    /// The error of the model with nominal values, and where it is largest.
     pub(super) fn compare(&mut self, place: &TourFolder, model: &Model, seen: &TourComparison) {
         self.heading("2  Compare: where does the model fail?");
         self.paragraph(&format!(
-            "Another house's multibody code simulated the whole robot, eleven groups of bodies, and something besides that the \
-             model file does not know of. Held against that recording, with the masses of the drawings, the model misses the \
-             forces by {}. First the force of one screw, then what the model misses:",
+            "A third-party multibody simulation of the robot, with eleven groups of bodies, gives the recording. It contains one \
+             effect that the model file lacks. With the masses of the drawings the error of the model is {} of the force (nrms: \
+             rms of the error divided by rms of the measured force). First the force of one screw, then the error:",
             percent(seen.compared.figures.nrms)
         ));
         let drive = model.drives().first().cloned().unwrap_or_default();
         if let (Some(measured), Some(error)) = (seen.measured.first(), seen.errors.first()) {
             for (title, values, height) in [
                 (format!("{drive}, measured, N"), measured, 5),
-                (format!("{drive}, measured less model, N"), error, 5),
+                (format!("{drive}, measured minus model, N"), error, 5),
             ] {
                 let title = self.style.dim(&title);
                 self.line(&format!("{:>9}  {title}", ""));
@@ -110,10 +114,10 @@ impl TourText {
             self.line(&time_axis(&seen.time));
             self.line("");
         }
-        self.line("Where the error lives:");
+        self.line("Where the error is largest:");
         self.lines(&tables::places(&seen.compared.places));
         self.line("");
-        self.paragraph("True, but it does not say what is missing. This is as far as other tools go; the thinking is left to you.");
+        self.paragraph("This shows where the model fails, not why. The next step finds the cause.");
         self.command(&format!(
             "compare {} --data {}",
             place.name("spidermill.toml"),
@@ -121,38 +125,41 @@ impl TourText {
         ));
     }
 
-    /// What is missing, and what else was tried.
+    /// The missing effect, and the best rejected candidates.
     pub(super) fn diagnose(&mut self, place: &TourFolder, findings: &DiagnosisFindings) {
-        self.heading("3  Diagnose: what is missing?");
+        self.heading("3  Diagnose: which effect is missing?");
         let all = &findings.diagnosis.candidates;
         self.paragraph(&format!(
-            "modelmill writes down every effect of its library at every place of this mechanism, {} in all: friction of many \
-             kinds, springs, inertias, offsets, delays, rods. It fits them beside the model on one run, and believes only what \
-             also lowers the error on another, which it did not fit.",
+            "modelmill tries every effect of its library at every place of this mechanism, {} in all: friction of many kinds, \
+             springs, inertias, offsets, delays, rods. It fits them together with the model on one run. It accepts an effect \
+             only if the error also falls on a validation run, which is not fitted.",
             count(all.len(), "candidate", "candidates")
         ));
         self.paragraph(&verdict(findings));
+        // Effects that were found come first, then the best of the rejected ones.
         let shown = all.iter().filter(|c| c.rejection_reason.is_none());
         let others = all
             .iter()
             .filter(|c| c.rejection_reason.is_some())
             .take(OTHERS);
+        let has_effects = !findings.diagnosis.effects.is_empty();
         let rows: Vec<Vec<String>> = shown
             .chain(others)
             .map(|c| {
                 vec![
                     words::effect(&c.effect),
                     format!("{:.0} %", 100.0 * c.explained),
-                    c.rejection_reason
-                        .clone()
-                        .unwrap_or_else(|| "found".to_owned()),
+                    (c.rejection_reason
+                        .as_deref())
+                        .map_or("found", |why| words::refusal(why, has_effects))
+                        .to_owned(),
                 ]
             })
             .collect();
         let columns = [
             ("candidate", ColumnAlignment::Left),
-            ("explains alone", ColumnAlignment::Right),
-            ("verdict", ColumnAlignment::Left),
+            ("alone it would explain", ColumnAlignment::Right),
+            ("result", ColumnAlignment::Left),
         ];
         self.lines(&table(2, &columns, &rows));
         self.line("");
@@ -163,7 +170,7 @@ impl TourText {
             }
             if !found.indistinguishable_from.is_empty() {
                 self.paragraph(&format!(
-                    "This recording cannot tell it from {}.",
+                    "With this recording it is not distinguishable from {}.",
                     words::effects(&found.indistinguishable_from)
                 ));
             }
@@ -175,16 +182,16 @@ impl TourText {
         ));
     }
 
-    /// What changes in the model file.
+    /// The change of the model file.
     pub(super) fn add(&mut self, place: &TourFolder, edited: Option<&(Vec<String>, String)>) {
-        self.heading("4  Add: the model file learns it");
+        self.heading("4  Add: write the effect into the model file");
         let Some((commands, difference)) = edited else {
-            self.paragraph("Nothing was found that could be added.");
+            self.paragraph("No effect was found, so nothing is added.");
             return;
         };
         self.paragraph(&format!(
-            "An effect is some lines of the model file, with the estimates for nominal values. Comments and layout stay. Here \
-             the result is written to {}:",
+            "An effect takes a few lines of the model file. Its estimates become nominal values. Comments and layout stay. The \
+             tour writes the result to {}:",
             place.name(EDITED)
         ));
         let lines: Vec<String> = difference.lines().map(|line| format!("  {line}")).collect();
@@ -197,32 +204,35 @@ impl TourText {
         self.line("");
     }
 
-    /// Errors step by step, and the parameters in the end.
+    /// Errors after each added effect, and the identified parameters.
     pub(super) fn ladder(&mut self, findings: &DiagnosisFindings) {
-        self.heading("5  Identify again, and watch the error fall");
+        self.heading("5  Identify again: the error falls");
         let diagnosis = &findings.diagnosis;
         self.bars(&diagnosis.steps, diagnosis.noise_floor);
         if let Ok(after) = &findings.after
             && let Some(result) = &after.identified
         {
-            self.line("The parameters of the completed model, from the data alone:");
+            self.line("Base parameters of the completed model, identified from the recording:");
             self.lines(&tables::expressions(2, &after.model));
             self.line("");
             self.lines(&tables::parameters(&result.fit.parameters));
             self.line("");
         }
         self.paragraph(
-            "What was hidden: each screw is a rod of 8 kg and 0.9 m that swings about its base. Its moment of inertia is \
-             8 * 0.9^2 / 3 = 2.16 kg m^2, its first moment 8 * 0.9 / 2 = 3.6 kg m. Compare with Jr and Sr above.",
+            "The simulation contained this effect: each screw is a rod of 8 kg and 0.9 m that swings about its base. Its moment \
+             of inertia is 8 * 0.9^2 / 3 = 2.16 kg m^2, its first moment is 8 * 0.9 / 2 = 3.6 kg m. The estimates of Jr and Sr \
+             above agree.",
         );
     }
 
-    /// Errors on the check as bars over decades, down to the noise.
+    /// Errors on the validation run as logarithmic bars, down to the noise floor.
     fn bars(&mut self, ladder: &[SelectionStep], noise: f64) {
         let largest = ladder.iter().map(|rung| rung.check).fold(noise, f64::max);
         let least = ladder.iter().map(|rung| rung.check);
         let least = least.chain([noise]).filter(|e| *e > 0.0);
+        // The axis begins below the smallest error, so that its bar has a length.
         let least = least.fold(f64::INFINITY, f64::min) / 3.0;
+        // Length of a bar on the logarithmic axis, between 0 and 1.
         let share = |error: f64| {
             if error > 0.0 && largest > least {
                 (error / least).ln() / (largest / least).ln()
@@ -230,10 +240,11 @@ impl TourText {
                 0.0
             }
         };
-        let name = "the noise in the forces".to_owned();
+        let name = words::floor_label(noise).to_owned();
         let rungs = ladder.iter().map(|rung| (words::rung(rung), rung.check));
         for (name, error) in rungs.chain([(name, noise)]) {
             let bar = bar(share(error), 1.0, BAR);
+            // Green: within 30 % of the noise floor, so nothing is left to explain.
             let bar = if error > noise * 1.3 {
                 self.style.red(&bar)
             } else {
@@ -241,6 +252,7 @@ impl TourText {
             };
             let lines = words::lines(&name, 34);
             for (k, line) in lines.iter().enumerate() {
+                // Only the last line of a long name has the figure and the bar.
                 if k + 1 < lines.len() {
                     self.line(&format!("  {line}"));
                 } else {
@@ -249,18 +261,17 @@ impl TourText {
             }
         }
         self.line("");
-        self.paragraph(
-            "Error relative to the force on the check run, which was not fitted; bars are decades.",
-        );
+        self.paragraph("Error relative to the force (nrms) on the validation run; logarithmic bars.");
     }
 
-    /// The treatment of the paper.
+    /// The diagnosis of the model as published.
     pub(super) fn paper(&mut self, place: &TourFolder, findings: &DiagnosisFindings) {
-        self.heading("6  The same question to a published model");
+        self.heading("6  Diagnose a published model");
         self.paragraph(
-            "The paper that describes this robot lets the platform's mass m4 act at the joint in the balance of forces, and at \
-             the middle of the coupler in the balance of moments. Its parameters come from drawings, and its authors saw an \
-             error that they could not name. On a simulation of the robot exactly as the paper has it, with all parameters held:",
+            "The paper that describes this robot reports an error of its model. It names two causes: mainly the positions of the \
+             point masses of couplings and platform, and to a small part the contact points of the screws. In its equations the \
+             platform's mass m4 acts at the joint in the balance of forces, but at the middle of the coupler in the balance of \
+             moments. The diagnosis uses a simulation of the same robot, with all parameters fixed at their nominal values:",
         );
         self.paragraph(&verdict(findings));
         let diagnosis = &findings.diagnosis;
@@ -278,18 +289,18 @@ impl TourText {
         ));
     }
 
-    /// Where to look on.
+    /// The files of the pages, and the command for a mechanism of the user.
     pub(super) fn pages(&mut self, place: &TourFolder) {
-        self.heading("7  The pages");
+        self.heading("7  Open the reports");
         self.paragraph(
-            "All of this, with curves that can be zoomed, error maps, every candidate, parameters and equations, is on two pages \
-             that need no network. Open them in a browser:",
+            "Two pages contain all results: curves that can be zoomed, error maps, all candidates, parameters and equations. They \
+             need no network. Open them in a browser:",
         );
         for page in [RODS_PAGE, PAPER_PAGE] {
             self.line(&format!("  {}", place.name(page)));
         }
         self.line("");
-        self.paragraph("For a mechanism of yours:");
+        self.paragraph("For your own mechanism:");
         self.command("report MODEL --data RUN --check OTHER_RUN --out DIR");
     }
 }
