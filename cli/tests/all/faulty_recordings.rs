@@ -197,8 +197,7 @@ fn exchanged_columns_are_named() {
     let told = ran(&["identify", &spidermill(), "--data", &arm]);
     assert!(told.err.contains("exchanged"), "{}", told.err);
     let told = ran(&["diagnose", &spidermill(), "--data", &arm]);
-    let first =
-        "Check the recording and the model first: the coordinates theta1";
+    let first = "Check the recording and the model first: the coordinates theta1";
     assert!(told.out.starts_with(first), "{}", told.out);
     let found = json(&["diagnose", &spidermill(), "--data", &path, "--json"]);
     let kinds = found["disturbances"]

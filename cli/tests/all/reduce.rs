@@ -22,7 +22,13 @@ fn the_whole_robot_reduces_to_the_bundled_model() {
     ];
     let report = printed(&reduce);
     for part in [
-        "Step 1", "Step 2", "eq. (1)", "Step 3", "Step 4", "0.02 m", "Error - forces",
+        "Step 1",
+        "Step 2",
+        "eq. (1)",
+        "Step 3",
+        "Step 4",
+        "0.02 m",
+        "Error - forces",
     ] {
         assert!(report.contains(part), "{part}: {report}");
     }

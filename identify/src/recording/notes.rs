@@ -54,7 +54,10 @@ impl RecordingNote {
 }
 
 /// Writes remarks in the words of the library, which is how a fit keeps them that no front end has printed.
-pub(crate) fn serialize<S: Serializer>(notes: &[RecordingNote], serializer: S) -> Result<S::Ok, S::Error> {
+pub(crate) fn serialize<S: Serializer>(
+    notes: &[RecordingNote],
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
     serializer.collect_seq(notes.iter().map(|note| SpelledNote {
         severity: note.severity,
         says: note.says.in_library_words(),

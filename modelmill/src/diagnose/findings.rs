@@ -240,7 +240,9 @@ impl Model {
         if !between.is_empty() {
             // A missing effect may look like a difference between recordings.
             let without = find(&[])?;
-            if without.mean_square_residual() < DIFFERENCE_LEAST_GAIN * answer.mean_square_residual() {
+            if without.mean_square_residual()
+                < DIFFERENCE_LEAST_GAIN * answer.mean_square_residual()
+            {
                 answer = without;
                 between.clear();
             }

@@ -40,7 +40,10 @@ pub(crate) fn payloads(model: &Model, all: &SegmentList<'_>) -> Outcome<Vec<Cand
         let of = |k: &Option<usize>| -> ForceColumn {
             let column = k.map(|k| &columns[k]);
             let column = column.filter(|column| size(column) > PAYLOAD_LEAST_EFFECT * largest);
-            column.map_or_else(|| ForceColumn(vec![None; model.drives().len()]), Clone::clone)
+            column.map_or_else(
+                || ForceColumn(vec![None; model.drives().len()]),
+                Clone::clone,
+            )
         };
         let ten: [ForceColumn; TEN] = which.each_ref().map(of);
         let has_effect = |k: &usize| match *k {

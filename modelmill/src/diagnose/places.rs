@@ -123,7 +123,9 @@ pub(crate) fn is_applicable(
 pub(crate) fn is_wave(kind: &EffectKind) -> bool {
     use modelmill_spec::{ConstantSearch, Scale};
     kind.constants.iter().any(|c| match c.search {
-        Some(ConstantSearch::Range { from, of, .. }) => of == Scale::Travel && from < WAVE_SHORTEST_TRAVEL,
+        Some(ConstantSearch::Range { from, of, .. }) => {
+            of == Scale::Travel && from < WAVE_SHORTEST_TRAVEL
+        }
         _ => false,
     })
 }

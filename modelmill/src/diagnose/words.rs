@@ -1,7 +1,9 @@
 //! Sentences for people: verdict, effects with their places, disturbances, and reasons of rejection. Input are values of a
 //! diagnosis, output is English text without line breaks.
 
-use modelmill_identify::diagnose::{DiagnosisVerdict, Disturbance, LocatedEffect, ROUNDING, ModelDiagnosis, DiagnosisVerdict};
+use modelmill_identify::diagnose::{
+    DiagnosisVerdict, Disturbance, LocatedEffect, ModelDiagnosis, ROUNDING, SelectionStep,
+};
 
 use crate::audit::SUSPICIONS;
 use crate::text::table::{number, percent, significant};

@@ -1,11 +1,11 @@
 //! Findings of a diagnosis, as JSON for scripts and as text for people: verdict, errors after each step, effects, disturbances,
 //! rejected candidates and next steps.
 
-use modelmill_identify::diagnose::{Effect, DiagnosisVerdict, SelectionStep};
+use modelmill_identify::diagnose::{DiagnosisVerdict, LocatedEffect, SelectionStep};
 use serde_json::{Map, Value, json};
 
 use super::laws;
-use crate::diagnose::{DiagnosisFindings, EffectEstimate, Untold, words};
+use crate::diagnose::{DiagnosisFindings, EffectEstimate, UndecidedEffect, words};
 use crate::print::{OptionName, Remedy, StepSpelling, notes};
 use crate::text::TerminalStyle;
 use crate::text::table::{ColumnAlignment, number, percent, significant, table};
@@ -340,9 +340,9 @@ impl DiagnosisFindings {
         lines.push(String::new());
         lines.push(style.bold("Effects that these recordings can neither show nor exclude"));
         // Effects of one kind share their text, so it is printed once with all places.
-        let mut groups: Vec<(&Untold, Vec<&Effect>)> = Vec::new();
+        let mut groups: Vec<(&UndecidedEffect, Vec<&LocatedEffect>)> = Vec::new();
         for one in &self.undecided {
-            let is_alike = |(first, _): &&mut (&Untold, _)| {
+            let is_alike = |(first, _): &&mut (&UndecidedEffect, _)| {
                 (&first.effect.kind, &first.reason) == (&one.effect.kind, &one.reason)
             };
             match groups.iter_mut().find(is_alike) {
@@ -363,7 +363,7 @@ impl DiagnosisFindings {
                 }
             };
             let reason = words::lines(&format!("{title}: {}.", first.reason), 98);
-            lines.extend(says.iter().map(|line| format!("  {line}")));
+            lines.extend(reason.iter().map(|line| format!("  {line}")));
             let wrapped = words::lines(&experiment, 96);
             lines.extend(wrapped.iter().map(|line| style.dim(&format!("    {line}"))));
         }

@@ -130,7 +130,7 @@ pub fn figures(named: &[(&str, &ErrorFigures)]) -> Vec<String> {
 }
 
 /// Errors on the rows that the fits used, after low-pass and decimation: a column for each comparison that has them.
-fn rows_of_fits(named: &[(&str, &Figures)]) -> Vec<String> {
+fn rows_of_fits(named: &[(&str, &ErrorFigures)]) -> Vec<String> {
     let fits = named.iter();
     let fits = fits.filter_map(|(name, figures)| Some((*name, figures.rows.as_ref()?)));
     let fits: Vec<_> = fits.collect();
@@ -153,8 +153,10 @@ fn rows_of_fits(named: &[(&str, &Figures)]) -> Vec<String> {
         };
         rows.push(row(drive, &cell));
     }
-    let heads = fits.iter().map(|(name, _)| (*name, Align::Right));
-    let columns: Vec<(&str, Align)> = std::iter::once(("", Align::Left)).chain(heads).collect();
+    let heads = fits.iter().map(|(name, _)| (*name, ColumnAlignment::Right));
+    let columns: Vec<(&str, ColumnAlignment)> = std::iter::once(("", ColumnAlignment::Left))
+        .chain(heads)
+        .collect();
     let mut lines = vec![
         String::new(),
         "  On the rows that the fit used, after low-pass and decimation:".to_owned(),

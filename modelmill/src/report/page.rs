@@ -27,7 +27,8 @@ pub fn page(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) -> Outcom
     let sections = [
         (
             "ladder",
-            "Error after each added effect", ladder_section(findings),
+            "Error after each added effect",
+            ladder_section(findings),
         ),
         (
             "found",

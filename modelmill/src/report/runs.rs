@@ -29,7 +29,7 @@ pub fn runs_page(compared: &RunsComparison, spelling: &dyn RemedySpelling) -> St
         (
             "against",
             "Each run compared with the first",
-            against(compared),
+            changes_table(compared),
         ),
     ];
     if let Some(shared) = &compared.shared {

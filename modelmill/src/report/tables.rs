@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use modelmill_identify::diagnose::{CandidateOutcome, FoundEffect};
+use modelmill_identify::diagnose::{CandidateOutcome, IdentifiedEffect};
 use modelmill_identify::{FitParameter, NoteSeverity, ParameterStatus};
 
 use super::draw::attribute;
@@ -152,7 +152,7 @@ pub(crate) fn drives(findings: &DiagnosisFindings) -> String {
 pub(crate) fn effects(findings: &DiagnosisFindings) -> String {
     let answer = &findings.answer;
     // Kinds in the order of their first effect, so that a text about a kind is not repeated for each of its places.
-    let mut kinds: Vec<(&str, Vec<&FoundEffect>)> = Vec::new();
+    let mut kinds: Vec<(&str, Vec<&IdentifiedEffect>)> = Vec::new();
     for found in &answer.diagnosis.effects {
         let name = found.effect.kind.as_str();
         match kinds.iter_mut().find(|(kind, _)| *kind == name) {
@@ -201,7 +201,7 @@ pub(crate) fn effects(findings: &DiagnosisFindings) -> String {
 }
 
 /// Values of one effect behind a label, and the effects that explain the recordings equally well.
-fn effect(findings: &DiagnosisFindings, found: &FoundEffect, label: &str) -> String {
+fn effect(findings: &DiagnosisFindings, found: &IdentifiedEffect, label: &str) -> String {
     let parameters = &findings.answer.problem.candidates[found.candidate].parameters;
     let values = parameters.iter().zip(&found.estimates).map(|(p, value)| {
         format!(

@@ -68,9 +68,13 @@ pub(crate) fn run(host: &Host, args: &TourArgs) -> CommandOutcome {
 }
 
 /// Diagnoses the first recording as fit and the second as validation run.
-fn diagnose(model: &Model, [fit, check]: &[PreparedRecording; 2], held: Held) -> CommandOutcome<DiagnosisFindings> {
+fn diagnose(
+    model: &Model,
+    [fit, check]: &[PreparedRecording; 2],
+    fixed: FixedParameters,
+) -> CommandOutcome<DiagnosisFindings> {
     let question = DiagnosisOptions {
-        held,
+        fixed,
         // The second diagnosis would double the time of the tour.
         repeat_with_nominal: false,
     };

@@ -149,8 +149,7 @@ impl TourText {
                 vec![
                     words::effect(&c.effect),
                     format!("{:.0} %", 100.0 * c.explained),
-                    (c.rejection_reason
-                        .as_deref())
+                    (c.rejection_reason.as_deref())
                         .map_or("found", |why| words::refusal(why, has_effects))
                         .to_owned(),
                 ]
@@ -261,7 +260,9 @@ impl TourText {
             }
         }
         self.line("");
-        self.paragraph("Error relative to the force (nrms) on the validation run; logarithmic bars.");
+        self.paragraph(
+            "Error relative to the force (nrms) on the validation run; logarithmic bars.",
+        );
     }
 
     /// The diagnosis of the model as published.
