@@ -1,5 +1,5 @@
-"""From a model file of a mechanism to base parameters, equations and fast code, and from recordings to parameters and to the
-physical effect that a model lacks.
+"""Base parameters, equations and fast code from a model file of a mechanism; parameter values and missing physical effects
+from recordings.
 
 >>> import modelmill
 >>> m = modelmill.load("arm.toml")            # doctest: +SKIP

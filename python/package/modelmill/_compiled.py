@@ -1,4 +1,4 @@
-"""Functions of states compiled by a C compiler, where one is there."""
+"""Functions of states, compiled by a C compiler if one is installed."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from ._errors import ModelmillError
 
 Floats = NDArray[np.float64]
 
-# States from which on cores share the work.
+# Number of states per core from which several cores are used; below that, threads cost more than they save.
 _MANY = 20_000
 
 
 class Compiled:
-    """A compiled function of states."""
+    """A compiled function of states: arrays of shape (n, dof) in, numbers of all states out."""
 
     def __init__(self, source: str, shape: Sequence[int]) -> None:
         self.shape = shape
@@ -34,7 +34,7 @@ class Compiled:
         self._run.restype = ctypes.c_int
 
     def __call__(self, arrays: Sequence[Floats | None], values: Floats) -> Floats | None:
-        """The numbers of all states, or None where something is missing or the evaluator must look at them one by one."""
+        """Returns the numbers of all states, or None if the evaluator must process the states one by one."""
         first = arrays[0]
         assert first is not None
         n = len(first)
@@ -68,7 +68,7 @@ class Compiled:
 
 
 def _cores() -> int:
-    """Cores that this process may use."""
+    """Returns the number of cores that this process may use."""
     of_process = getattr(os, "sched_getaffinity", None)
     return (os.cpu_count() or 1) if of_process is None else len(of_process(0))
 
@@ -76,12 +76,16 @@ def _cores() -> int:
 def _built(source: str, folder: Path) -> Path:
     compiler = os.environ.get("CC") or next((name for name in ("cc", "gcc", "clang") if shutil.which(name)), None)
     if compiler is None or os.name == "nt":
-        raise ModelmillError("compile() needs GCC or Clang, which is not there; without it programs are evaluated as before")
+        raise ModelmillError(
+            "compile() needs GCC or Clang, and none was found. The functions work without it, but slower. "
+            "Install a C compiler, or set CC"
+        )
     path, library = folder / "model.c", folder / "model.so"
     path.write_text(source, encoding="utf-8")
-    # Warnings of the calling convention of wide vectors do not concern functions that are inlined.
+    # `-w`: warnings about the calling convention of wide vectors do not apply to inlined functions.
     flags = ["-O2", "-march=native", "-fPIC", "-shared", "-fno-math-errno", "-fno-trapping-math", "-w"]
-    # GCC puts the long program in an order that keeps the processor busy, a tenth faster; Clang does so by itself.
+    # With these flags GCC orders the long program better for the processor (10 % faster); Clang does this by default.
+    # The second try is for compilers that refuse the flags.
     for more in (["-fschedule-insns", "-fsched-pressure"], []):
         command = [*compiler.split(), *flags, *more, str(path), "-o", str(library), "-lm"]
         try:

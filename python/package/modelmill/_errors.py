@@ -1,4 +1,4 @@
-"""Faults of what was given, and remarks."""
+"""Errors about the input, and warnings."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from typing import Any
 
 
 class ModelmillError(ValueError):
-    """What was given has no answer; the text says where the fault is, what was expected, and what to do.
+    """The input has a fault; the text states where it is, what was expected, and what to do.
 
     Attributes
     ----------
     diagnostics : list of dict
-        Each with ``severity`` and ``says``; faults of a model file also with ``file``, ``line``, ``column``, ``expected`` and
-        ``help``.
+        Each with ``severity`` and ``says`` (the text). Faults of a model file also have ``file``, ``line``, ``column``,
+        ``expected`` and ``help``.
     """
 
     diagnostics: list[dict[str, Any]]
@@ -25,4 +25,4 @@ class ModelmillError(ValueError):
 
 
 class ModelmillWarning(UserWarning):
-    """Something about a model or a recording that may not be intended."""
+    """A property of a model or a recording that is possible but probably not intended."""

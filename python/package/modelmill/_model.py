@@ -56,29 +56,29 @@ class ReadingOptions(TypedDict, total=False):
     Attributes
     ----------
     columns : dict of str to str
-        Our names with what the recording calls them, or with a sum of its columns, in other units perhaps:
-        ``{"q6": "(pos6 - pos5)/32 - 90 [deg]"}``. Ours are ``t``, a coordinate, a coordinate with ``_d`` or ``_dd``, a drive, and
-        a drive with ``_var`` for the variance of its force.
+        Names that the model needs, each with the name of a column of the recording, or a sum of columns, with a unit if it is
+        not SI: ``{"q6": "(pos6 - pos5)/32 - 90 [deg]"}``. The model needs ``t``, coordinates, and drives. Optional are a
+        coordinate with ``_d`` or ``_dd``, and a drive with ``_var`` for the variance of its force.
     cutoff_hz : float
-        Cut-off of the low-pass on positions, Hz; chosen by what is left of the forces on held-out time if not given.
+        Cut-off of the low-pass on positions, Hz; default: chosen by cross-validation on the forces.
     order : int
-        Order of the low-pass, which runs forwards and backwards; 4 if not given.
+        Order of the low-pass, which is applied forwards and backwards; default 4.
     trim : int or (int, int)
         Samples dropped at the start and at the end.
     decimate : int
-        Keep every n-th sample, after a low-pass on forces and regressor alike.
+        Keep every n-th sample, after the same low-pass on forces and regressor.
     source : {"recorded", "positions"}
-        Whether recorded rates and accelerations are taken, or all are made from positions.
+        Whether recorded rates and accelerations are used, or all are computed from positions.
     smoothing : {"auto", "butterworth", "savitzky_golay", "fourier"}
         How positions are smoothed and differentiated.
     period : float
         Period of the motion, s, for a Fourier series.
     band_hz : float
-        Up to which frequency forces are compared beside the raw figures, Hz.
+        Cut-off of the low-pass for the error figures "in band", Hz.
     skip_bad_samples : bool
         Leave out samples with NaN instead of refusing the recording.
     leave_out_events : bool
-        Leave out forces of contacts and pushes.
+        Leave out the forces during contacts and pushes.
     between : (float, float)
         Read only the samples between these times, s.
     """
@@ -116,7 +116,7 @@ _READING: dict[str, Any] = {
 def _reading(options: Mapping[str, Any]) -> dict[str, Any]:
     unknown = [name for name in options if name not in _READING]
     if unknown:
-        raise TypeError(f"unknown keyword {', '.join(unknown)}; how a recording is read is said by {', '.join(_READING)}")
+        raise TypeError(f"unknown keyword {', '.join(unknown)}; the keywords for reading a recording are {', '.join(_READING)}")
     whole = {**_READING, **options}
     whole["columns"] = [(str(ours), str(theirs)) for ours, theirs in dict(whole["columns"] or {}).items()]
     trim = whole["trim"]
@@ -153,7 +153,7 @@ def _warn(notes: Remarks, level: int = 3) -> None:
 
 
 def _answered(progress: Progress, verb: Callable[[_core._Progress], AnswerT]) -> AnswerT:
-    """What a verb that tells its progress finds, once its warnings are given."""
+    """Runs a method with its progress, issues its warnings, and returns its result."""
     with told(progress) as hears:
         found = verb(hears)
     _warn(found.notes, 4)
@@ -164,7 +164,7 @@ def _wrong_shape(name: str, shape: tuple[int, ...], names: list[str]) -> str:
     width = len(names)
     says = f"{name} has shape {shape}; expected ({width},) for one state or (n, {width}) for many: {', '.join(names)}"
     if len(shape) == 2 and shape[0] == width:
-        return f"{says}. Here states stand in columns: pass {name}.T"
+        return f"{says}. Here the states are columns: pass {name}.T"
     if width == 1 and len(shape) == 1:
         return f"{says}. For many states of one coordinate pass {name}.reshape(-1, 1)"
     return says
@@ -172,7 +172,7 @@ def _wrong_shape(name: str, shape: tuple[int, ...], names: list[str]) -> str:
 
 @dataclass(frozen=True)
 class BaseParameter:
-    """A base parameter: ``expression`` in the parameters of the model file, nominal ``value`` (None if the file gives none)."""
+    """A base parameter: ``expression`` in the parameters of the model file, and nominal ``value`` (None if the file has none)."""
 
     name: str
     expression: str
@@ -187,7 +187,7 @@ class BaseParameters(Sequence[BaseParameter]):
     ----------
     names, expressions, units : list of str
     values : numpy.ndarray, shape (n_base,)
-        Nominal values; 0 where the file gives none.
+        Nominal values; 0 if the file gives none.
     """
 
     def __init__(self, core: _core.Model) -> None:
@@ -229,7 +229,7 @@ class BaseParameters(Sequence[BaseParameter]):
 
 
 class Equations:
-    """The reduced model for people: in a notebook the page of equations, as ``str`` its text."""
+    """The equations of the model: a page in a notebook, a text as ``str``."""
 
     def __init__(self, core: _core.Model) -> None:
         self._core = core
@@ -246,16 +246,16 @@ class Equations:
 
     @property
     def latex(self) -> str:
-        """LaTeX: a document of its own."""
+        """LaTeX: a complete document."""
         return self._core.equations("latex")
 
     @property
     def html(self) -> str:
-        """A page of its own."""
+        """HTML: a self-contained page."""
         return self._core.equations("html")
 
     def to_dict(self) -> dict[str, Any]:
-        """The same as ``modelmill equations --json`` prints it."""
+        """Returns what ``modelmill equations --json`` prints."""
         told: dict[str, Any] = json.loads(self._core.equations("json"))
         return told
 
@@ -268,7 +268,7 @@ class Equations:
     def _repr_latex_(self) -> str:
         lines = []
         for name, _, expression, _, _, _ in self._core.base:
-            # `\verb` is no part of what notebooks know; a text of LaTeX needs these marks in front of its special characters.
+            # Notebooks do not support `\verb`, so special characters of LaTeX are escaped one by one.
             left = "p_{" + name.removeprefix("p").removesuffix("_min") + ",\\min}"
             right = "".join("\\" + c if c in "_#%&{}$" else "\\hat{\\ }" if c == "^" else c for c in expression)
             lines.append(f"{left} &= \\texttt{{{right}}}")
@@ -276,14 +276,14 @@ class Equations:
 
 
 class Recording:
-    """A recording that was read and prepared for a model, once for several verbs.
+    """A recording that was read and prepared for a model, once for several methods.
 
     Attributes
     ----------
     name : str
-        What messages call it.
+        Name in messages.
     notes : list of (str, str)
-        What was done and what looks odd: severity and text.
+        Processing steps and warnings of the audit: severity and text.
     """
 
     def __init__(self, model: Model, source: Any, options: Mapping[str, Any], progress: Progress, name: str | None) -> None:
@@ -304,7 +304,7 @@ class Recording:
                 self._core = model._core.recording(name, read, whole, hears)
             except ModelmillError as error:
                 if left_out and hasattr(error, "add_note"):
-                    error.add_note(f"Columns that hold no numbers were left out: {', '.join(left_out)}")
+                    error.add_note(f"Columns without numbers were left out: {', '.join(left_out)}")
                 raise
         self.name = self._core.file
         self.notes = self._core.notes
@@ -337,17 +337,17 @@ class Recording:
         return f"recording {self.name}: {len(self.t)} samples{remarks}"
 
 
-#: What a method takes as one recording: a path, a tuple of paths of one run, a table, or what `Model.recording` returned.
+#: One recording: a path, a tuple of paths of one run, a table, or the result of `Model.recording`.
 Source = Any
 
 
 class Model:
     """A model that was read and derived; :func:`load` makes one.
 
-    Arrays of states have shape ``(dof,)`` for one state or ``(n, dof)`` for many, of any type of real numbers and in any order of
-    memory; columns stand in the order of `coordinates`, those of forces in the order of `drives`. Values of base parameters are the
-    file's nominal ones unless ``parameters`` says otherwise: an :class:`Identification`, the path of one, an array in the order of
-    `p_min`, or a dict that replaces some by name.
+    Arrays of states have shape ``(dof,)`` for one state or ``(n, dof)`` for many, with any real number type and any memory
+    order. Columns have the order of `coordinates`, those of forces the order of `drives`. Values of base parameters are the
+    nominal ones of the file, unless ``parameters`` is given: an :class:`Identification`, the path of one, an array in the order
+    of `p_min`, or a dict that replaces some of them by name.
     """
 
     def __init__(self, core: _core.Model) -> None:
@@ -359,12 +359,12 @@ class Model:
 
     @property
     def name(self) -> str:
-        """The file's name without folder and ending."""
+        """Name of the file without folder and ending."""
         return self._core.name
 
     @property
     def text(self) -> str:
-        """The text of the model file, with effects that were added."""
+        """The text of the model file, including effects that were added."""
         return self._core.text
 
     def save(self, path: PathText) -> None:
@@ -378,7 +378,7 @@ class Model:
 
     @property
     def passive(self) -> list[str]:
-        """Names of the passive coordinates, which loops settle."""
+        """Names of the passive coordinates (determined by loop closure)."""
         return self._core.passive
 
     @property
@@ -388,7 +388,7 @@ class Model:
 
     @property
     def dof(self) -> int:
-        """How many active coordinates there are."""
+        """Number of active coordinates."""
         return len(self._core.coordinates)
 
     @property
@@ -400,33 +400,33 @@ class Model:
 
     @property
     def notes(self) -> Remarks:
-        """Remarks on the model file: severity and text."""
+        """Notes on the model file: severity and text."""
         return self._core.notes
 
     def equations(self) -> Equations:
-        """p_g, dependences, p_min and programs, for people."""
+        """Returns the derivation: p_g, dependent columns, p_min and the equations."""
         return Equations(self._core)
 
     def check(self) -> Check:
-        """What the model consists of, and its numeric rank beside the exact one."""
+        """Returns the parts of the model, and its numeric rank next to the exact one."""
         return Check(self._core.check())
 
     def picture(self, at: Mapping[str, float] | None = None, view: tuple[float, float] | None = None) -> Picture:
-        """The mechanism at a pose.
+        """Draws the mechanism at a pose.
 
         Parameters
         ----------
         at : dict of str to float, optional
             Coordinates, rad or m; the others stay at the nominal pose.
         view : (float, float), optional
-            Direction from which it is seen: turn and rise, degrees.
+            Direction of view: azimuth and elevation, degrees.
         """
         return Picture(self._core.picture(list((at or {}).items()), view))
 
     def generate(
         self, language: str = "rust", *, dynamics: bool = False, reactions: bool = False, self_test: bool = False
     ) -> dict[str, str]:
-        """Code of the model: paths and texts of files. ``language`` is ``"rust"``, ``"c99"``, ``"c"`` or ``"python"``."""
+        """Returns code of the model: paths and texts of files. ``language`` is ``"rust"``, ``"c99"``, ``"c"`` or ``"python"``."""
         return dict(self._core.generate(language, dynamics, reactions, self_test))
 
     def __repr__(self) -> str:
@@ -442,7 +442,7 @@ class Model:
     # Functions of states.
 
     def _values(self, parameters: Values) -> tuple[Floats, str]:
-        """Values of the base parameters, and what the JSON calls them."""
+        """Returns values of the base parameters, and their name in the JSON."""
         if parameters is None:
             _warn(self._core.nominal_notes, 5)
             return self._core.nominal, "nominal"
@@ -451,7 +451,7 @@ class Model:
             own = list(zip(self.p_min.names, self.p_min.expressions))
             if of_fit != own:
                 raise ModelmillError(
-                    "the fit is of another model: its base parameters are not those of this one; identify this model"
+                    "the fit belongs to another model, because its base parameters are different; identify this model"
                 )
             return parameters.values, "fit"
         if isinstance(parameters, (str, os.PathLike)):
@@ -476,7 +476,7 @@ class Model:
         return array, "given"
 
     def _states(self, parts: Sequence[tuple[str, ArrayLike | None, list[str]]]) -> tuple[list[Floats | None], bool]:
-        """Arrays of shape (n, width), and whether there is a single state without an axis of its own."""
+        """Returns arrays of shape (n, width), and whether the input was a single state of shape (width,)."""
         found: list[Floats | None] = []
         first: tuple[str, tuple[int, ...]] | None = None
         for name, given, names in parts:
@@ -486,14 +486,14 @@ class Model:
             array = np.asarray(given)
             width = len(names)
             if array.dtype.kind not in "fiub":
-                raise ModelmillError(f"{name} holds {array.dtype}; real numbers are expected")
+                raise ModelmillError(f"{name} has the type {array.dtype}; real numbers are expected")
             if array.ndim not in (1, 2) or array.shape[-1] != width:
                 raise ModelmillError(_wrong_shape(name, array.shape, names))
             if first is None:
                 first = (name, array.shape[:-1])
             elif array.shape[:-1] != first[1]:
                 raise ModelmillError(
-                    f"{name} has shape {array.shape} and {first[0]} {(*first[1], len(parts[0][2]))}; both need as many states"
+                    f"{name} has shape {array.shape} and {first[0]} {(*first[1], len(parts[0][2]))}; give both as many states"
                 )
             array = np.atleast_2d(array.astype(np.float64, copy=False))
             if not (array.flags.c_contiguous or array.flags.f_contiguous):
@@ -531,7 +531,7 @@ class Model:
     def inverse_dynamics(
         self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, *, parameters: Values = None, load: ArrayLike | None = None
     ) -> Floats:
-        """Forces of the drives, tau = H_min p_min.
+        """Computes the forces of the drives, tau = H_min p_min.
 
         Parameters
         ----------
@@ -540,7 +540,7 @@ class Model:
         parameters : optional
             Values of the base parameters; nominal ones if not given.
         load : array_like, shape (drives,) or (n, drives), optional
-            Forces that the drives carry, N or N m, for effects that depend on the load.
+            Load of each drive, N or N m, for effects that depend on it.
 
         Returns
         -------
@@ -550,7 +550,7 @@ class Model:
         return self._at("inverse_dynamics", q, qd, qdd, load, parameters)
 
     def regressor(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, *, load: ArrayLike | None = None) -> Floats:
-        """H_min of eq. (4): forces are ``regressor @ p_min``.
+        """Computes H_min of eq. (4): forces are ``regressor @ p_min``.
 
         Parameters
         ----------
@@ -564,7 +564,7 @@ class Model:
         return self._at("regressor", q, qd, qdd, load, self._core.nominal)
 
     def mass_matrix(self, q: ArrayLike, *, parameters: Values = None) -> Floats:
-        """M of ``J' f = M q'' + b``.
+        """Computes the mass matrix M of ``J' f = M q'' + b``.
 
         Parameters
         ----------
@@ -582,7 +582,7 @@ class Model:
     def bias(
         self, q: ArrayLike, qd: ArrayLike, *, parameters: Values = None, load: ArrayLike | None = None
     ) -> Floats:
-        """b of ``J' f = M q'' + b``: generalised forces that rates, weight and effects ask for.
+        """Computes b of ``J' f = M q'' + b``: generalised forces due to velocity, gravity and effects.
 
         Parameters
         ----------
@@ -597,12 +597,12 @@ class Model:
         return self._at("bias", q, qd, None, load, parameters)
 
     def forward_dynamics(self, q: ArrayLike, qd: ArrayLike, forces: ArrayLike, *, parameters: Values = None) -> Floats:
-        """Accelerations of the coordinates under given forces of the drives.
+        """Computes the accelerations of the coordinates for given forces of the drives.
 
         Parameters
         ----------
         q, qd : array_like, shape (dof,) or (n, dof)
-            Positions and rates, rad or m and seconds.
+            Positions, rad or m, and rates, rad/s or m/s.
         forces : array_like, shape (drives,) or (n, drives)
             N or N m.
         parameters : optional
@@ -616,10 +616,10 @@ class Model:
         return self._at("forward_dynamics", q, qd, None, forces, parameters, "forces")
 
     def compile(self, *functions: str) -> None:
-        """Compiles functions of states for this model by the C compiler of the machine, for many states at once.
+        """Compiles functions of this model with the C compiler of the machine, for many states at once.
 
-        They give the same numbers as before to some units of the last place. Forward dynamics, and mechanisms whose loops are
-        followed by Newton's method, are not compiled.
+        Results differ from those without compilation by some units in the last place. Forward dynamics, and mechanisms whose
+        loops need Newton's method, are not compiled.
 
         Parameters
         ----------
@@ -631,11 +631,11 @@ class Model:
 
     @property
     def reaction_names(self) -> list[str]:
-        """Names of the columns of :meth:`reactions`, such as ``elbow.Fx``: what equations of motion determine."""
+        """Names of the columns of :meth:`reactions`, such as ``elbow.Fx``; no statically indeterminate ones."""
         return self._core.reaction_names()[0]
 
     def reactions(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, *, load: ArrayLike | None = None) -> Floats:
-        """What joints and the cuts of loops transmit, for the parameters of the model file.
+        """Computes reactions in joints and at cuts of loops, for the parameters of the model file.
 
         Parameters
         ----------
@@ -654,16 +654,16 @@ class Model:
     def recording(
         self, data: Source, *, name: str | None = None, progress: Progress = None, **reading: Unpack[ReadingOptions]
     ) -> Recording:
-        """Reads and prepares a recording, for use in several verbs.
+        """Reads and prepares a recording, for use in several methods.
 
         Parameters
         ----------
         data
-            A path (CSV, Parquet, MATLAB, HDF5, MCAP, rosbag2), a tuple of paths that are joined on time, or a table: a dict of arrays,
-            a table of pandas or polars, anything with ``__arrow_c_stream__``. It needs ``t`` (s), one column for each coordinate and
-            one for each drive; ``columns`` says what they are called.
+            A path (CSV, Parquet, MATLAB, HDF5, MCAP, rosbag2), a tuple of paths that are joined on time, or a table: a dict of
+            arrays, a table of pandas or polars, anything with ``__arrow_c_stream__``. It needs ``t`` (s), one column for each
+            coordinate (rad or m) and one for each drive (N or N m); ``columns`` gives other names and units.
         name : str, optional
-            What messages call a table.
+            Name of a table in messages.
         **reading
             See :class:`ReadingOptions`.
         """
@@ -684,7 +684,7 @@ class Model:
             if source._model is self:
                 if reading:
                     raise ModelmillError(
-                        f"{source.name} is prepared already; give {', '.join(reading)} where recording() reads it"
+                        f"{source.name} is prepared already; give {', '.join(reading)} to recording() instead"
                     )
                 return source
             # Another model may need other columns and other filters.
@@ -695,7 +695,7 @@ class Model:
     def compare(
         self, data: Source, *, parameters: Values = None, progress: Progress = None, **reading: Unpack[ReadingOptions]
     ) -> Comparison:
-        """Holds the model against recordings: how far it is off, and where.
+        """Compares the model with recordings: size of the error, and where it occurs.
 
         Parameters
         ----------
@@ -728,26 +728,26 @@ class Model:
         progress: Progress = None,
         **reading: Unpack[ReadingOptions],
     ) -> Identification:
-        """Base parameters from recordings.
+        """Identifies base parameters from recordings by least squares.
 
         Parameters
         ----------
         data, check
-            Recordings of the fit, and such that it does not see.
+            Recordings for the fit, and validation runs, which the fit does not use.
         weights : {"auto", "none", "channels", "variance"}
-            What each equation counts.
+            How equations are weighted: by the residuals of their drive, by the recorded variance, or equally.
         robust : float, optional
-            Huber's bound in standard deviations; 1.345 is usual.
+            Threshold of the Huber estimator, in standard deviations; 1.345 is usual.
         prior : float, optional
             Nominal values as soft constraints, with this relative standard deviation.
         physical : bool
-            Only parameters that bodies can have.
+            All bodies must be physically possible.
         essential : bool
-            Leave out base parameters that the recordings do not support.
+            Base parameters that the recordings do not support keep their nominal values.
         standstill : float, optional
-            Leave out equations while a drive is slower than this part of its fastest.
+            Leave out the equations of a drive while it is slower than this fraction of its maximum speed.
         instruments, instrument_period : optional
-            Instrumental variables: recordings of the motion that was asked for, or states one period (s) later.
+            Instrumental variables: recordings of the reference motion, or the states one period (s) later.
         progress, **reading
             As for :meth:`compare`.
         """
@@ -774,18 +774,19 @@ class Model:
         progress: Progress = None,
         **reading: Unpack[ReadingOptions],
     ) -> Diagnosis:
-        """Which physical effect the model lacks.
+        """Finds the physical effects that the model lacks.
 
         Parameters
         ----------
         data
-            Recordings to find it in.
+            Recordings in which effects are searched.
         check : optional
-            Recordings that decide what is believed; without any, blocks of ``data`` take turns.
+            Validation runs: an effect is accepted only if it lowers the error there. Without any, ``data`` is split into blocks
+            (cross-validation).
         held : bool
-            Hold all parameters, so that what is wrong with them shows too.
+            Fix all parameters at their nominal values, so that wrong nominal values are detected too.
         parameters : optional
-            What takes the place of the nominal values.
+            Values to use instead of the nominal ones; they are fixed.
         progress, **reading
             As for :meth:`compare`.
         """
@@ -795,7 +796,7 @@ class Model:
         return Diagnosis(found, None if found.model is None else Model(found.model))
 
     def report(self, data: Source, **options: Any) -> Page:
-        """What the model lacks as one page, inline in a notebook; takes what :meth:`diagnose` takes."""
+        """Returns the diagnosis as one page, inline in a notebook; arguments as for :meth:`diagnose`."""
         return self.diagnose(data, **options).report()
 
     def runs(
@@ -807,21 +808,23 @@ class Model:
         progress: Progress = None,
         **reading: Unpack[ReadingOptions],
     ) -> Runs:
-        """What changed between recordings of one machine.
+        """Finds what changed between recordings of one machine.
 
         Parameters
         ----------
         data : list
-            Two recordings or more; the first is how things were. Those that cannot be read are named, but the first.
+            Two recordings or more; the first is the reference. Recordings that cannot be read are named and left out; only the
+            first must be readable.
         per_run : list of str
-            What is each run's own in one fit of all: ``"payload@flange"``, ``"friction"``, a base parameter by its name.
+            Quantities with a separate value for each run, in one fit of all runs: ``"payload@flange"``, ``"friction"``, or the
+            name of a base parameter.
         loads : list of str
             Runs with a known load: ``"loaded.csv=2.8@flange"``.
         progress, **reading
             As for :meth:`compare`.
         """
         if isinstance(data, (str, os.PathLike)) or not isinstance(data, Sequence):
-            raise ModelmillError("runs() holds several recordings against the first: pass a list of them")
+            raise ModelmillError("runs() compares several recordings with the first: pass a list of recordings")
         read: list[_core.Recorded] = []
         unread: list[tuple[int, str, str]] = []
         for k, source in enumerate(data):
@@ -853,27 +856,28 @@ class Model:
         columns: Mapping[str, str] | None = None,
         progress: Progress = None,
     ) -> Excitation:
-        """The periodic motion that tells base parameters, or effects, apart best.
+        """Plans the periodic motion that determines base parameters best, or distinguishes effects best.
 
         Parameters
         ----------
         limits : dict or list of str
-            Beside those of the model file, or in their place: ``{"q1": (-1, 1), "q1_d": 2, "motor": 1500}``.
+            Limits that add to those of the model file or replace them: ``{"q1": (-1, 1), "q1_d": 2, "motor": 1500}``.
         harmonics : int
-            Of the Fourier series of each coordinate.
+            Number of harmonics of the Fourier series of each coordinate.
         period : float
-            s.
+            Period of the motion, s.
         criterion : {"condition", "log_det"}
-            What is made small.
+            What is minimised: the condition number, or the volume of the uncertainty.
         random, starts, seed : int
-            Random trajectories that are tried first, how many of them the search starts from, and the seed.
+            Number of random trajectories tried first, number of them from which the search starts, and the seed.
         rate : float
-            Samples per second.
+            Samples per second, Hz.
         separate, apart_from, beside, noise
-            Make the effect ``"coulomb_friction@motor:Fc=25.9"`` differ most from those of ``apart_from``, with those of ``beside`` in
-            either case; ``noise`` is the standard deviation in the forces, N or N m.
+            ``separate`` is the effect to be distinguished, such as ``"coulomb_friction@motor:Fc=25.9"``; ``apart_from`` the
+            effects it could be confused with; ``beside`` effects present in both cases; ``noise`` the standard deviation of the
+            force noise, N or N m.
         data, columns : optional
-            Recordings to compare with, and what they call our columns.
+            Recordings to compare with, and the names of their columns.
         """
         model = self if parameters is None else self.with_fit(parameters)
         if isinstance(limits, Mapping):
@@ -901,16 +905,16 @@ class Model:
     # Other models of the same mechanism.
 
     def with_effect(self, kind: str, at: str | Sequence[str], **settings: float | str) -> Model:
-        """The model with an effect added to its file.
+        """Returns the model with an effect added to its file.
 
         Parameters
         ----------
         kind : str
-            Such as ``"coulomb_friction"``; :func:`kinds` lists them.
+            For example ``"coulomb_friction"``; :func:`kinds` lists all kinds.
         at : str or list of str
             Where it acts: a drive, a coordinate, a point, ``"base"``.
         **settings
-            By the symbols of the kind: a value (SI), or the name that a parameter is to have.
+            Symbols of the kind, each with a value (SI), or with the name for its parameter.
         """
         values = [(name, float(one)) for name, one in settings.items() if not isinstance(one, str)]
         names = [(name, one) for name, one in settings.items() if isinstance(one, str)]
@@ -918,33 +922,33 @@ class Model:
         return Model(self._core.with_effect(kind, places, values, names))
 
     def with_fit(self, parameters: Values) -> Model:
-        """The model with other values of its base parameters, such as those of an :class:`Identification`."""
+        """Returns the model with other values of its base parameters, such as those of an :class:`Identification`."""
         return Model(self._core.with_values(self._values(parameters)[0]))
 
     def adopt(self, fit: Identification | PathText) -> Model:
-        """The model with a fit written into its file, in the place of nominal values; ``save`` keeps it.
+        """Returns the model with a fit in its file, instead of nominal values; ``save`` writes the file.
 
         Parameters
         ----------
         fit
-            What :meth:`identify` found, or the path of a file that it was saved to. A fit with ``physical=True`` becomes values of
-            parameters, which bodies can have; any other one values of base parameters, which say nothing of single bodies.
+            The result of :meth:`identify`, or the path of its file. A fit with ``physical=True`` is stored as values of physical
+            parameters; any other fit as values of base parameters, which do not determine single bodies.
         """
         model, notes = self._core.adopt(*_fit(fit))
         _warn(notes)
         return Model(model)
 
-    # What else can be asked of a model.
+    # Further methods.
 
     def interpret(self, fit: Identification | PathText, unknown: Sequence[str]) -> Interpretation:
-        """Physical parameters from identified base parameters, the others held at their nominal values: all real solutions.
+        """Solves identified base parameters for physical ones, with the others fixed at nominal values: all real solutions.
 
         Parameters
         ----------
         fit
-            What :meth:`identify` found, or the path of a file that it was saved to.
+            The result of :meth:`identify`, or the path of its file.
         unknown : list of str
-            Names of the parameters that are solved for.
+            Names of the parameters to solve for.
         """
         if isinstance(unknown, str):
             raise ModelmillError(f"unknown={unknown!r}: pass a list of names, as in unknown=[{unknown!r}]")
@@ -955,14 +959,15 @@ class Model:
     def diff(
         self, variant: Model, data: Source = None, *, progress: Progress = None, **reading: Unpack[ReadingOptions]
     ) -> Difference:
-        """What a variant changes; along recordings, what it costs: forces, power and work of each drive, limits, error.
+        """Shows what a variant changes; along recordings also forces, power and work of each drive, limits, and errors.
 
         Parameters
         ----------
         variant : Model
-            What this model is held beside.
+            The model to compare with.
         data : optional
-            A recording, or a list of them; motions alone will do. It is a path or a table, since both models read it.
+            A recording, or a list of them; motion without forces is sufficient. Give paths or tables, because both models read
+            them.
         progress, **reading
             As for :meth:`compare`.
         """
@@ -971,7 +976,7 @@ class Model:
         return Difference(_answered(progress, lambda hears: self._core.diff(variant._core, read, again, hears)))
 
     def export(self, format: str = "urdf", *, parameters: Identification | PathText | None = None) -> str:
-        """The model as a robot description of other programs; what the format cannot say is warned of.
+        """Returns the model as a robot description; a warning lists what the format cannot express.
 
         Parameters
         ----------
@@ -986,16 +991,16 @@ class Model:
 
 
 def _fit(fit: Identification | PathText) -> tuple[str | None, str]:
-    """The text of a fit with what messages call it, or no text and the path of its file."""
+    """Returns the text of a fit and its name in messages, or no text and the path of its file."""
     if isinstance(fit, Identification):
         return json.dumps(fit.to_dict()), "fit"
     if isinstance(fit, (str, os.PathLike)):
         return None, os.fspath(fit)
-    raise ModelmillError(f"a {type(fit).__name__} is no fit; expected is what identify() found, or the path of its file")
+    raise ModelmillError(f"a {type(fit).__name__} is no fit; give the result of identify(), or the path of its file")
 
 
 class Picture:
-    """A picture; a notebook shows it.
+    """A picture (SVG); a notebook shows it.
 
     Attributes
     ----------
@@ -1030,16 +1035,16 @@ def load(
     Parameters
     ----------
     source : path or str
-        Path of the file; a text of several lines is the file itself.
+        Path of the file, or its text if it has several lines.
     name : str, optional
-        What messages call a text.
+        Name of a text in messages.
     libraries : list of paths
-        Further kinds of effects.
+        Libraries with additional kinds of effects.
     at_values : bool
-        Derive for the file's values alone: fewer base parameters where geometry is special.
+        Derive only for the values of the file: fewer base parameters if the geometry is special.
     floating, round_angles, closures, pose
-        Of robot descriptions: whether the base of a URDF floats; whether angles near right ones are taken for these; a file of
-        closures; the assembly that is meant, by joints.
+        Only for robot descriptions: whether the base of a URDF is free; whether angles near right ones are rounded; a file of
+        loop closures; joint values that choose the assembly mode.
 
     Returns
     -------
@@ -1048,13 +1053,13 @@ def load(
     Raises
     ------
     ModelmillError
-        With every finding about the file, each with its place.
+        With all faults of the file, each with its place.
     """
     text = os.fspath(source)
     is_text = "\n" in text or text.lstrip().startswith("<")
     if not is_text and not os.path.isfile(text):
         raise ModelmillError(
-            f"there is no file {text}; the path of a model file (TOML) or of a robot description (URDF, MJCF, SDF) is expected, "
+            f"there is no file {text}; give the path of a model file (TOML) or of a robot description (URDF, MJCF, SDF), "
             "or the text of one"
         )
     is_robot = text.lstrip().startswith("<") if is_text else Path(text).suffix.lower() in (".urdf", ".xml", ".mjcf", ".sdf")
@@ -1075,11 +1080,11 @@ def load(
 
 
 def recordings(path: PathText) -> Result:
-    """What a log holds, table by table or topic by topic, before a model reads it."""
+    """Returns the content of a log, table by table or topic by topic."""
     return Result(_core.contents(path))
 
 
 def kinds(libraries: Sequence[PathText] = ()) -> list[dict[str, Any]]:
-    """The kinds of effects that a model may have, as ``modelmill effects --json`` prints them."""
+    """Returns the kinds of effects, as ``modelmill effects --json`` prints them."""
     told: list[dict[str, Any]] = json.loads(_core.kinds(libraries))["kinds"]
     return told

@@ -1,4 +1,4 @@
-"""What goes on while a verb works: one line on standard error, at a terminal or in a notebook."""
+"""Progress of a long call: one line on standard error, at a terminal or in a notebook."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from contextlib import contextmanager
 
 Told = Callable[[str, int, int], object]
 
-# A verb that is done sooner says nothing.
+# Seconds. A call that ends sooner prints nothing, so that short calls do not flicker.
 _PATIENCE = 1.0
 
 
 class _Line:
-    """Writes one line over and over."""
+    """Overwrites one line of standard error with the latest progress."""
 
     def __init__(self, at_once: bool) -> None:
         self._begun = time.monotonic() - (_PATIENCE if at_once else 0.0)
@@ -36,6 +36,7 @@ class _Line:
 
 
 def _somebody_reads() -> bool:
+    """Whether standard error is a terminal or belongs to a notebook."""
     if "IPython" in sys.modules:
         shell = sys.modules["IPython"].get_ipython()
         if shell is not None and type(shell).__name__ == "ZMQInteractiveShell":
@@ -48,13 +49,13 @@ def _somebody_reads() -> bool:
 
 @contextmanager
 def told(progress: Told | bool | None) -> Iterator[Told | None]:
-    """The callback that ``progress`` stands for.
+    """Returns the callback that belongs to the option ``progress``.
 
     Parameters
     ----------
     progress : callable, bool or None
-        Called as ``progress(what, done, total)``, with ``total`` 0 where nobody knows it; True prints, False is silent, None
-        prints where somebody reads it.
+        Called as ``progress(what, done, total)``: name of the job, steps done, steps in total (0 if unknown). True prints
+        progress, False prints nothing, None prints it at a terminal or in a notebook.
     """
     if callable(progress):
         yield progress

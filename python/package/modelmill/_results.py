@@ -1,4 +1,4 @@
-"""What verbs find: objects with attributes; ``to_dict()`` is the JSON of the program."""
+"""Results of the methods of a model: objects with attributes; ``to_dict()`` is the JSON of the program."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from . import _core
     from ._model import Model
 
-    #: What the compiled part answers: JSON, text and remarks.
+    #: Result of the compiled part: JSON, text and notes.
     Answer = Union[_core.Found, _core.Excited, _core.Simulated]
 
 Remarks = list[tuple[str, str]]
@@ -28,7 +28,7 @@ AnswerT = TypeVar("AnswerT", bound="Answer")
 
 
 def frame(rows: Iterable[dict[str, Any]]) -> pd.DataFrame:
-    """Rows as a table of pandas."""
+    """Returns rows as a pandas table."""
     try:
         import pandas as pd
     except ImportError:
@@ -37,12 +37,12 @@ def frame(rows: Iterable[dict[str, Any]]) -> pd.DataFrame:
 
 
 def number(value: float | None) -> str:
-    """A number for people."""
+    """Formats a number with six digits; empty for None."""
     return "" if value is None else f"{value:.6g}"
 
 
 def table_html(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """A table as HTML."""
+    """Returns a table as HTML."""
     head = "".join(f'<th style="text-align:left">{html.escape(text)}</th>' for text in heads)
     body = "".join(
         "<tr>" + "".join(f'<td style="text-align:left">{html.escape(text)}</td>' for text in row) + "</tr>" for row in rows
@@ -51,17 +51,17 @@ def table_html(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 
 def text_html(text: str) -> str:
-    """A text as HTML."""
+    """Returns a text as HTML."""
     return f'<pre style="line-height:1.35">{html.escape(text)}</pre>'
 
 
 class Result:
-    """What a verb found.
+    """A result of a method.
 
     Attributes
     ----------
     notes : list of (str, str)
-        Remarks: severity (``"info"`` or ``"warning"``) and text.
+        Severity (``"info"`` or ``"warning"``) and text.
     """
 
     def __init__(self, found: Answer) -> None:
@@ -70,7 +70,7 @@ class Result:
         self.notes = found.notes
 
     def to_dict(self) -> dict[str, Any]:
-        """The same as ``modelmill ... --json`` prints it."""
+        """Returns what ``modelmill ... --json`` prints."""
         copy: dict[str, Any] = json.loads(json.dumps(self._object))
         return copy
 
@@ -89,11 +89,11 @@ class Result:
 
 
 class Check(Result):
-    """What a model consists of, and its numeric rank beside the exact one."""
+    """The parts of a model, and its numeric rank next to the exact one."""
 
     @property
     def summary(self) -> dict[str, Any]:
-        """Bodies, joints, loops, drives, parameters, as :meth:`to_dict` has them."""
+        """Bodies, joints, loops, drives and parameters, as in :meth:`to_dict`."""
         return self.to_dict()
 
 
@@ -104,7 +104,7 @@ class Figures:
     Attributes
     ----------
     nrms : float or None
-        ``||measured - model|| / ||measured||`` over all drives; None where their units differ.
+        ``||measured - model|| / ||measured||`` over all drives; None if their units differ.
     channels : dict of str to dict
         ``nrms``, ``mean_relative``, ``max_abs`` and more of each drive.
     """
@@ -114,17 +114,17 @@ class Figures:
 
     @classmethod
     def of(cls, told: dict[str, Any] | None) -> Figures | None:
-        """Of an object of the program's JSON."""
+        """Reads the figures from an object of the program's JSON."""
         return None if told is None else cls(told.get("nrms"), told.get("channels", {}))
 
 
 class Page:
-    """A page that stands by itself; a notebook shows it inline.
+    """A self-contained HTML page; a notebook shows it inline.
 
     Attributes
     ----------
     html : str
-        The whole document.
+        The complete document.
     """
 
     def __init__(self, page: str) -> None:
@@ -145,23 +145,23 @@ class Page:
 
 
 class Comparison(Result):
-    """How far a model is off along recordings, and where."""
+    """The error of a model along recordings, and where it occurs."""
 
     @property
     def nrms(self) -> float | None:
-        """``||measured - model|| / ||measured||`` over all drives; None where their units differ."""
+        """``||measured - model|| / ||measured||`` over all drives; None if their units differ."""
         value: float | None = self._object["nrms"]
         return value
 
     @property
     def channels(self) -> dict[str, dict[str, Any]]:
-        """Figures of each drive."""
+        """Error figures of each drive."""
         channels: dict[str, dict[str, Any]] = self._object["channels"]
         return channels
 
     @property
     def where(self) -> list[dict[str, Any]]:
-        """Regions that hold more than their share of the squared error."""
+        """Regions that contain more of the squared error than their share of the samples."""
         regions: list[dict[str, Any]] = self._object["where"]
         return regions
 
@@ -172,7 +172,7 @@ class Comparison(Result):
 
 @dataclass(frozen=True)
 class Parameter:
-    """An identified base parameter; ``std`` is None where it was held."""
+    """An identified base parameter; ``std`` is None if the value was fixed."""
 
     name: str
     expression: str
@@ -183,7 +183,7 @@ class Parameter:
 
 
 class Identification(Result):
-    """Base parameters from recordings, with deviations and error figures.
+    """Base parameters from recordings, with standard deviations and error figures.
 
     Attributes
     ----------
@@ -198,7 +198,7 @@ class Identification(Result):
 
     @property
     def model(self) -> Model:
-        """The model with the identified values in the place of the file's."""
+        """The model with the identified values instead of those of its file."""
         return self._model.with_fit(self)
 
     @property
@@ -211,7 +211,7 @@ class Identification(Result):
 
     @property
     def samples(self) -> int:
-        """Samples that the fit was made of."""
+        """Number of samples that the fit used."""
         return int(self._object["samples"])
 
     @property
@@ -228,7 +228,7 @@ class Identification(Result):
 
     @property
     def check(self) -> Figures | None:
-        """Error figures on recordings that the fit did not see."""
+        """Error figures on the validation runs, which the fit did not use."""
         return Figures.of(self._object.get("check"))
 
     def to_pandas(self) -> pd.DataFrame:
@@ -251,15 +251,15 @@ class Effect:
     Attributes
     ----------
     kind : str
-        Such as ``"coulomb_friction"``.
+        For example ``"coulomb_friction"``.
     at : list of str
-        Where it acts.
+        Places where it acts.
     estimates : list of dict
         ``name``, ``value``, ``std``, ``unit``.
     probability : float or None
-        That it is there.
+        Probability that the effect exists.
     indistinguishable_from : list of dict
-        What could stand in its place: ``kind`` and ``at``.
+        Effects that explain the data equally well: ``kind`` and ``at``.
     """
 
     kind: str
@@ -270,7 +270,7 @@ class Effect:
 
 
 class Diagnosis(Result):
-    """Which physical effect a model lacks, and what speaks for it."""
+    """The physical effects that a model lacks, with the evidence."""
 
     def __init__(self, found: _core.Found, better: Model | None) -> None:
         super().__init__(found)
@@ -284,19 +284,19 @@ class Diagnosis(Result):
 
     @property
     def noise_floor(self) -> float | None:
-        """Noise relative to the measured forces."""
+        """Noise, as a fraction of the measured forces."""
         value: float | None = self._object["noise_floor"]
         return value
 
     @property
     def steps(self) -> list[dict[str, Any]]:
-        """The ladder: what was added, step by step, and what error it left."""
+        """The effects that were added, step by step, and the error after each step."""
         steps: list[dict[str, Any]] = self._object["steps"]
         return steps
 
     @property
     def effects(self) -> list[Effect]:
-        """What is missing."""
+        """The effects that the model lacks."""
         return [
             Effect(one["kind"], one["at"], one["estimates"], one.get("probability"), one.get("indistinguishable_from", []))
             for one in self._object["effects"]
@@ -304,29 +304,29 @@ class Diagnosis(Result):
 
     @property
     def candidates(self) -> list[dict[str, Any]]:
-        """What was tried, and why it was refused."""
+        """All effects that were tried, and why each was rejected."""
         candidates: list[dict[str, Any]] = self._object["candidates"]
         return candidates
 
     @property
     def disturbances(self) -> list[dict[str, Any]]:
-        """What recordings have by themselves, which is no effect of the model."""
+        """Disturbances in the recordings, such as outliers; they are not model errors."""
         disturbances: list[dict[str, Any]] = self._object["disturbances"]
         return disturbances
 
     @property
     def budget(self) -> dict[str, dict[str, Any]]:
-        """Of each drive's error, what is noise, what does not repeat and what the model does not say."""
+        """The error of each drive, divided into noise, a non-repeatable part, and a repeatable part that nothing explains."""
         budget: dict[str, dict[str, Any]] = self._object["budget"]
         return budget
 
     @property
     def model(self) -> Model | None:
-        """The model with the effects that were found; None if nothing is missing."""
+        """The model with the missing effects added; None if nothing is missing."""
         return self._better
 
     def report(self) -> Page:
-        """All of it as one page with pictures."""
+        """Returns the complete diagnosis as one page with figures."""
         return Page(self._page)
 
     def to_pandas(self) -> pd.DataFrame:
@@ -335,22 +335,22 @@ class Diagnosis(Result):
 
 
 class Interpretation(Result):
-    """Physical parameters that explain the base parameters of a fit, all real solutions."""
+    """All real solutions for physical parameters that explain the base parameters of a fit."""
 
     @property
     def solutions(self) -> list[dict[str, dict[str, Any]]]:
-        """By the name of each unknown: ``value``, ``std``, ``unit``, ``nominal``, and whether it is ``plausible``."""
+        """For each unknown: ``value``, ``std``, ``unit``, ``nominal``, and whether it is physically possible (``plausible``)."""
         solutions: list[dict[str, dict[str, Any]]] = self._object["solutions"]
         return solutions
 
     @property
     def identifiable(self) -> bool:
-        """Whether the fit determines all unknowns; :attr:`undetermined` says what it does not."""
+        """Whether the fit determines all unknowns; :attr:`undetermined` lists the others."""
         return bool(self._object["identifiable"])
 
     @property
     def undetermined(self) -> Any:
-        """What is not determined, in words."""
+        """The unknowns that are not determined, as text."""
         return self._object["undetermined"]
 
     def to_pandas(self) -> pd.DataFrame:
@@ -361,7 +361,7 @@ class Interpretation(Result):
 
 
 class Difference(Result):
-    """What a variant of a model changes, and along recordings what it costs."""
+    """What a variant of a model changes, and its cost in force and power along recordings."""
 
     @property
     def base(self) -> list[dict[str, Any]]:
@@ -371,7 +371,7 @@ class Difference(Result):
 
     @property
     def along(self) -> dict[str, Any] | None:
-        """What it costs along recordings: drives before and after, limits, errors; None without recordings."""
+        """Cost along recordings: drives before and after, limits, errors; None without recordings."""
         along: dict[str, Any] | None = self._object.get("along")
         return along
 
@@ -385,19 +385,19 @@ class Runs(Result):
 
     @property
     def changes(self) -> list[dict[str, Any]]:
-        """What is different in physics: ``kind``, ``at``, ``estimates``, ``between``, ``says``."""
+        """Physical changes: ``kind``, ``at``, ``estimates``, ``between``, ``says`` (the text)."""
         changes: list[dict[str, Any]] = self._object["changes"]
         return changes
 
     @property
     def moved(self) -> list[dict[str, Any]]:
-        """Base parameters that moved: ``parameter``, ``sigmas``."""
+        """Base parameters that changed: ``parameter``, and ``sigmas``, the change in standard deviations."""
         moved: list[dict[str, Any]] = self._object["moved"]
         return moved
 
     @property
     def change_points(self) -> list[dict[str, Any]]:
-        """When base parameters changed and stayed changed."""
+        """Runs at which base parameters changed permanently."""
         points: list[dict[str, Any]] = self._object["change_points"]
         return points
 
@@ -408,7 +408,7 @@ class Runs(Result):
         return unread
 
     def report(self) -> Page:
-        """Base parameters over the runs as one page."""
+        """Returns one page that shows the base parameters over the runs."""
         return Page(self._page)
 
     def to_pandas(self) -> pd.DataFrame:
@@ -417,7 +417,7 @@ class Runs(Result):
 
 
 class Excitation(Result):
-    """A periodic motion that tells base parameters, or effects, apart.
+    """A periodic motion planned to determine base parameters, or to distinguish effects.
 
     Attributes
     ----------
@@ -451,7 +451,7 @@ class Excitation(Result):
         return whole
 
     def to_csv(self, path: str | Path) -> None:
-        """Writes one period as the program does: ``t``, coordinates, rates, accelerations."""
+        """Writes one period as CSV, as the program does: ``t``, coordinates, rates, accelerations."""
         Path(path).write_text(self._csv, encoding="utf-8")
 
     def _repr_html_(self) -> str:

@@ -1,4 +1,4 @@
-"""Whole machines in numbers: recordings without hardware, and the models that they reduce to."""
+"""Rigs, numeric models of whole machines: recordings without hardware, and reduction to planar models."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 class Simulation(Result):
-    """What the sensors of a rig read along a trajectory; ``columns`` is a recording for the verbs of a model.
+    """Sensor readings of a rig along a trajectory; pass ``columns`` as a recording to the methods of a model.
 
     Attributes
     ----------
@@ -48,7 +48,7 @@ class Simulation(Result):
 
 
 class Reduction(Result):
-    """What a reduction assumed, with the size of every approximation.
+    """The model that a reduction made, and the size of every approximation.
 
     Attributes
     ----------
@@ -62,7 +62,7 @@ class Reduction(Result):
 
     @property
     def model(self) -> Model:
-        """The model, derived."""
+        """The reduced model, derived."""
         return load(self.text, name=f"{self._object['rig']}.toml")
 
 
@@ -74,19 +74,19 @@ def simulate(
     seed: int | None = None,
     progress: Progress = None,
 ) -> Simulation:
-    """Drives a rig along a trajectory and records what its sensors read.
+    """Moves a rig along a trajectory and records its sensors.
 
     Parameters
     ----------
     rig : path
         A rig file (TOML).
     trajectory
-        The motion: a path, what :meth:`Model.excite` found, or a table, with ``t`` (s) and the coordinates of the rig, and with
-        ``_d`` and ``_dd`` their rates and accelerations if these are known.
+        The motion: a path, the result of :meth:`Model.excite`, or a table. It has ``t`` (s) and the coordinates of the rig (rad
+        or m), and their rates (``_d``) and accelerations (``_dd``) if these are known.
     columns : dict of str to str, optional
-        Our names with what the trajectory calls them.
+        Names that the rig needs, each with the name of the column in the trajectory.
     seed : int, optional
-        Of the noise of the sensors; the rig file's own if not given.
+        Seed of the sensor noise; default: that of the rig file.
     progress : callable or bool, optional
         Called as ``progress(what, done, total)``; False is silent.
     """
@@ -107,26 +107,27 @@ def simulate(
 
 
 def _write(table: Any, path: str) -> None:
+    """Writes a trajectory as CSV, with all digits."""
     found, left_out = columns_of(table)
-    _warn([("warning", f"column `{name}` holds no numbers and is left out") for name in left_out])
+    _warn([("warning", f"column `{name}` contains no numbers and is left out") for name in left_out])
     for name, _ in found:
         if any(sign in name for sign in ',"\n'):
-            raise ModelmillError(f"the column name {name!r} holds a comma, a quote or a new line; rename it")
+            raise ModelmillError(f"the column name {name!r} contains a comma, a quote or a new line; rename it")
     if len({len(values) for _, values in found}) > 1:
-        raise ModelmillError("the columns of the trajectory have different lengths")
+        raise ModelmillError("the columns of the trajectory have different lengths; give one number per sample in each")
     head = ",".join(name for name, _ in found)
     np.savetxt(path, np.stack([values for _, values in found], axis=1), fmt="%.17g", delimiter=",", header=head, comments="")
 
 
 def reduce(rig: PathText, plan: PathText | None = None, *, progress: Progress = None) -> Reduction:
-    """Reduces a rig to a planar model, and says the size of every approximation.
+    """Reduces a rig to a planar model, and reports the size of every approximation.
 
     Parameters
     ----------
     rig : path
         A rig file (TOML).
     plan : path, optional
-        What becomes of which body; every body becomes a part of its own if not given.
+        A file that defines which bodies become which parts; default: every body becomes a separate part.
     progress : callable or bool, optional
         As for :func:`simulate`.
     """

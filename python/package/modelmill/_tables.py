@@ -1,4 +1,4 @@
-"""Tables of other packages as columns of numbers: dicts of arrays, pandas, polars, arrow, structured arrays of numpy."""
+"""Converts tables of other packages to columns of numbers: dicts, pandas, polars, arrow, structured arrays of numpy."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ Column = tuple[str, NDArray[np.float64]]
 
 
 def columns(table: Any) -> tuple[list[Column], list[str]]:
-    """Columns of numbers with their names, and names of those that hold no numbers.
+    """Returns the columns of numbers with their names, and the names of columns without numbers.
 
-    Times become seconds: spans by themselves, points in time from the first one on. What is missing becomes NaN.
+    Time differences become seconds; dates become seconds since the first one. Missing values become NaN.
     """
     found: list[Column] = []
     left_out: list[str] = []
@@ -25,15 +25,16 @@ def columns(table: Any) -> tuple[list[Column], list[str]]:
         if numbers is None:
             left_out.append(name)
         elif numbers.ndim != 1:
-            raise ModelmillError(f"column `{name}` has shape {numbers.shape}; a column holds one number for each sample: (n,)")
+            raise ModelmillError(f"column `{name}` has shape {numbers.shape}; a column needs one number for each sample: (n,)")
         else:
             found.append((name, np.ascontiguousarray(numbers)))
     if not found:
-        raise ModelmillError("the table has no column of numbers; a column `t` and one for each coordinate and drive are expected")
+        raise ModelmillError("the table has no column of numbers; give a column `t` and one for each coordinate and drive")
     return found, left_out
 
 
 def _named(table: Any) -> Iterable[tuple[str, Any]]:
+    """Returns the columns with their names, as the package of the table stores them."""
     if isinstance(table, Mapping):
         return [(str(name), values) for name, values in table.items()]
     if isinstance(table, np.ndarray):
@@ -51,11 +52,12 @@ def _named(table: Any) -> Iterable[tuple[str, Any]]:
     if hasattr(table, "__arrow_c_stream__") or hasattr(table, "__arrow_c_array__"):
         return _of_arrow(table)
     raise ModelmillError(
-        f"a {type(table).__name__} is no recording; expected are a path, a dict of arrays, or a table of pandas, polars or arrow"
+        f"a {type(table).__name__} is no recording; give a path, a dict of arrays, or a table of pandas, polars or arrow"
     )
 
 
 def _of_pandas(table: Any) -> list[tuple[str, Any]]:
+    """Returns the columns of a pandas table; an index with a name, such as `t`, counts as a column."""
     named = [(str(name), table.iloc[:, k]) for k, name in enumerate(table.columns)]
     index = table.index
     if isinstance(index.name, str) and index.name not in [name for name, _ in named]:
@@ -64,6 +66,7 @@ def _of_pandas(table: Any) -> list[tuple[str, Any]]:
 
 
 def _of_series(series: Any) -> Any:
+    """Returns a pandas series as an array; missing values of nullable types become NaN."""
     try:
         if series.dtype.kind in "fiub":
             return series.to_numpy(dtype=np.float64, na_value=np.nan)
@@ -73,7 +76,7 @@ def _of_series(series: Any) -> Any:
 
 
 def _of_arrow(table: Any) -> list[tuple[str, Any]]:
-    """By the Arrow C data interface, which pyarrow or polars reads."""
+    """Reads a table by the Arrow C data interface, with pyarrow or polars."""
     try:
         import pyarrow as pa  # type: ignore[import-untyped, unused-ignore]
     except ImportError:
@@ -92,6 +95,7 @@ def _of_arrow(table: Any) -> list[tuple[str, Any]]:
 
 
 def _numbers(values: Any) -> NDArray[np.float64] | None:
+    """Returns the values as floats, or None if they are no numbers."""
     if np.ma.isMaskedArray(values):
         filled: NDArray[np.float64] = np.where(np.ma.getmaskarray(values), np.nan, np.ma.getdata(values)).astype(np.float64)
         return filled
