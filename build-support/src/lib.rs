@@ -8,6 +8,9 @@
 //!
 //! and in the crate, `include!(concat!(env!("OUT_DIR"), "/models.rs"));`, which brings one module per model file.
 //! The crate needs `modelmill-runtime` as a dependency and `modelmill-build` as a build dependency.
+//!
+//! Decision: this is a crate of its own, because `modelmill-codegen` must not read files. Reading files, telling
+//! Cargo when to run again and printing diagnostics belong together, so they have one place.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;

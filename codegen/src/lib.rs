@@ -1,4 +1,7 @@
 //! From a mechanism to its base parameters and fast code: the mill itself.
+//!
+//! Decision: this crate reads the validated `Mechanism` of `modelmill-spec` and no TOML. A second tree of types
+//! with the same content would only be copied.
 
 mod derive;
 mod emit;

@@ -1,5 +1,8 @@
 //! What the host calls by name, and what it lends. Bytes go in through memory that [`reserve`] gives; what is answered stays
 //! where it is until the next question.
+//!
+//! Decision: four functions that pass bytes replace a generator of bindings with its own tool. Ending a worker is
+//! the only way to stop a computation; a second worker for diagnoses keeps the text alive.
 
 use std::cell::RefCell;
 

@@ -1,4 +1,7 @@
 //! Makes the page: compiles the workbench to WebAssembly and puts it into one file with the bundled models.
+//!
+//! Decision: a page from a disk has no server that could set a policy. So it states its own: no connections, and
+//! workers and WebAssembly only from itself.
 
 use std::fs;
 use std::path::{Path, PathBuf};

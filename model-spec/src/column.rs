@@ -3,6 +3,9 @@
 //! its columns in SI units comes out.
 //!
 //! A text that is the name of a column, letter by letter, is that column, whatever else it could mean.
+//!
+//! Decision: this crate reads the sum and resolves it against each file, so that `modelmill-identify` gets numbers
+//! only.
 
 use std::fmt;
 

@@ -2,6 +2,9 @@
 //!
 //! A text and a [`NewEffect`] go in, the new text comes out. The table goes behind the last effect, or to the end of a
 //! file without any; an inline list of effects gets one more entry.
+//!
+//! Decision: an edit inserts text at one place, which is found from the spans of the parsed file. A parser that
+//! prints the whole document would change line ends and layout. The diagnosis and `add` use the same edit.
 
 use std::collections::BTreeSet;
 use std::fmt;

@@ -1,5 +1,9 @@
 //! The compiled part of the Python package `modelmill`: models, recordings and verbs of the library, with JSON and text of
 //! what they find. The Python part (`package/`) makes objects with attributes of them.
+//!
+//! Decision: this is a workspace of its own on the same target folder. Nobody without Python builds it, and
+//! features of its crates do not mix with those of the rest. Results cross as the JSON that the program prints, so
+//! that both cannot differ; only arrays cross as arrays.
 
 mod arrays;
 mod errors;

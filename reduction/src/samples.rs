@@ -2,6 +2,11 @@
 //!
 //! Coordinates, rates and accelerations come from a low-discrepancy sequence (M. Roberts 2018, after H. Weyl), so
 //! that few samples fill the space evenly and every run has the same ones.
+//!
+//! Decision: claims of a plan ("these move alike", "this only translates", "this loop closes") are measured and
+//! never assumed. Shifts that are constant in the plane change no force and are found by least squares. A claim
+//! that contradicts the motion is a fault with its place in the plan; an inexact one is a size in the report. At
+//! the end the forces of the model are compared with the rig's.
 
 use modelmill_rig::{Anchor, BodyMotion, Motion, PoseError, Rig, State, Tracker};
 use nalgebra::{Vector2, Vector3};

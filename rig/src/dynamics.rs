@@ -5,6 +5,10 @@
 //! the rates per unit rate of a coordinate are orthogonal to every reaction, and what they leave of both sides
 //! is a small system for `tau` alone.
 //! Source: E. Haug, "Computer Aided Kinematics and Dynamics of Mechanical Systems" (1989), sections 11.2 and 11.5.
+//!
+//! Decision: the rig shares no mechanics with the derivation. It has maximal coordinates, least squares over all
+//! joints' equations and Newton-Euler per body. Where both agree, two independent programs agree. Orientation steps
+//! need square roots only and sines come from `libm`, so that a seed gives the same recording on every machine.
 
 use nalgebra::linalg::FullPivLU;
 use nalgebra::{DMatrix, DVector, Vector3};

@@ -3,6 +3,9 @@
 //! The motion of the bodies goes in; forces and moments that the bodies must supply besides come out, or gravity.
 //! Source: Newton and Euler's equations of a slender rod that a pivot holds at one point and a slide across itself
 //! at another.
+//!
+//! Decision: a rod, a tool or a tilted base acts on the bodies here and is no term at a drive, so that friction by
+//! load includes it.
 
 use nalgebra::{Matrix3, Vector3};
 

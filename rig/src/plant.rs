@@ -4,6 +4,9 @@
 //! the load; so accelerations for given forces are found by Newton's method with one column per coordinate. Time goes on
 //! by the classical rule of Runge and Kutta, with forces held during a step, in the coordinates alone: joints stay closed
 //! because every pose is solved.
+//!
+//! Decision: forward dynamics is Newton's method on the inverse dynamics, so that every effect has one definition
+//! for both directions.
 
 use std::fmt;
 

@@ -5,6 +5,11 @@
 //! `e_rem_pio2.c` of FDLIBM 5.3 (Sun Microsystems, 1993; freely distributable). The error stays below 1 ulp for angles up
 //! to [`LARGEST_ANGLE`]; arrays with a larger one, or with one that is no finite number, go through
 //! [`Real::sin_cos`](crate::Real::sin_cos) one by one.
+//!
+//! Decision: one sine and cosine serve single numbers and vectors, with and without the standard library.
+//! Polynomials are summed in pairs of terms (G. Estrin), which shortens the dependent chain. One state computes
+//! those of all its angles at once, which makes the Panda's inverse dynamics a fifth faster with the same bits;
+//! vectors compute each at its place, because the results of all would not fit into registers.
 
 use crate::Real;
 use crate::arithmetic::Value;

@@ -1,6 +1,9 @@
 //! What emitted models need at run time: a trait for `f32` and `f64`, the errors of a pose, and Newton's method on loops.
 //!
 //! There is no allocation and no unsafe code here, and without the feature `std` no standard library either.
+//!
+//! Decision: this is a crate of its own, because emitted modules of several crates share its number trait and its
+//! pose errors. It stays `no_std` and depends on one small crate (`libm`).
 #![cfg_attr(not(feature = "std"), no_std)]
 
 mod arithmetic;

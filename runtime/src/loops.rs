@@ -4,6 +4,9 @@
 //! into shorter strides, which keeps to the assembly mode (Deuflhard 2004, "Newton Methods for Nonlinear Problems",
 //! sections 2.1 and 5.1). Residuals and steps are held against scales that the loops give, so that a mechanism in
 //! millimetres is treated like one in kilometres. Emitted models and the block evaluator share this code.
+//!
+//! Decision: there is one Newton's method. The block evaluator of `modelmill-codegen` depends on this crate for it,
+//! so that evaluator and emitted code have one rule for when a loop is closed.
 
 use crate::{PoseError, Real, solve};
 

@@ -2,6 +2,10 @@
 //!
 //! At random states the rows of H and of H_min go into triangles, whose singular values say the ranks; the forces of all
 //! parameters are held against those of the base parameters. There is no allocation here.
+//!
+//! Decision: the test is emitted on request, because H for all products is as long as H_min again. Rotations give
+//! the R factor and one-sided rotations its singular values, so that it needs no allocation and no linear algebra
+//! crate, and uses the same random states on every machine.
 
 use core::fmt;
 

@@ -1,5 +1,5 @@
-//! References between the folders of a crate run one way: a folder uses only those that stand before it in the table
-//! "The order of folders" of ARCHITECTURE.md.
+//! References between the folders of a crate run one way: a folder uses only those that stand before it in the table of
+//! docs/dev/order-of-folders.md.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -11,9 +11,10 @@ type Source = (String, String);
 #[test]
 fn no_folder_uses_one_that_stands_after_it() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    let text = fs::read_to_string(root.join("ARCHITECTURE.md")).expect("the page is there");
+    let text =
+        fs::read_to_string(root.join("docs/dev/order-of-folders.md")).expect("the page is there");
     let orders = orders(&text);
-    assert!(orders.len() > 1, "the table of ARCHITECTURE.md is read");
+    assert!(orders.len() > 1, "the table of order-of-folders.md is read");
     let faults: Vec<String> = orders
         .iter()
         .flat_map(|(folder, order)| {
@@ -27,9 +28,9 @@ fn no_folder_uses_one_that_stands_after_it() {
 }
 
 /// The table: for every folder of sources, its parts in the order in which they may use each other.
-fn orders(architecture: &str) -> BTreeMap<String, Vec<String>> {
-    let section = architecture
-        .split("\n### The order of folders\n")
+fn orders(page: &str) -> BTreeMap<String, Vec<String>> {
+    let section = page
+        .split("# The order of folders\n")
         .nth(1)
         .unwrap_or_default();
     let section = section.split("\n#").next().unwrap_or_default();
@@ -294,7 +295,7 @@ fn a_made_reference_that_runs_back_is_found() {
 
 #[test]
 fn the_order_is_read_from_its_table() {
-    let page = "# A\n\n### The order of folders\n\nWords.\n\n| sources | order |\n|---|---|\n| `one/src` | `a`, `b` |\n\n## B\n| `two/src` | `c` |\n";
+    let page = "# The order of folders\n\nWords.\n\n| sources | order |\n|---|---|\n| `one/src` | `a`, `b` |\n\n## B\n| `two/src` | `c` |\n";
     let read = orders(page);
     assert_eq!(read.len(), 1);
     assert_eq!(read["one/src"], ["a", "b"]);

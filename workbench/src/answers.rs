@@ -1,4 +1,7 @@
 //! What a page may ask of a sitting, by name and with a body of JSON, wherever the sitting takes place.
+//!
+//! Decision: the page sends a name and a JSON body and does not know whether a server or a worker answers. So there
+//! is one page, and what is tested on a server holds for both.
 
 use std::sync::Arc;
 

@@ -1,5 +1,12 @@
 //! The text that is edited, beside what the disk holds. It knows when both went different ways, and never takes one for the
 //! other by itself.
+//!
+//! Decision: two texts are never merged. If another program and the page both changed the file, both texts stay
+//! until the user chooses. The file is read again right before it is replaced; the remaining gap of less than a
+//! millisecond cannot be closed portably.
+//!
+//! Decision: the file is read and compared four times a second. Notifications of the system are missing on some
+//! disks, differ when an editor replaces a file, and would have to be confirmed by reading anyway.
 
 use std::borrow::Cow;
 

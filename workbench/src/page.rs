@@ -1,4 +1,7 @@
 //! The page: one file that needs no other, in the style of all pages. It asks a server, or the mill that it carries.
+//!
+//! Decision: the editor is a plain text field. Undo, selection and input methods are the browser's own, and
+//! findings are inserted by an edit that it can undo. An editor in JavaScript would need a bundler.
 
 use std::fmt::Write as _;
 use std::io::Write as _;

@@ -3,6 +3,10 @@
 //!
 //! A page of any other site may send requests to the loopback address; the name in `Host` keeps out sites whose name was made to
 //! lead here (DNS rebinding), `Origin` those that ask openly, and the token all others.
+//!
+//! Decision: HTTP is axum on hyper and tokio without macros, forms or sockets, because a parser of browser requests
+//! should be maintained by a project of its own. It costs half a minute of one core to build. The page runs no
+//! script but its own (a nonce), and texts of models and recordings enter as text.
 
 use std::net::{Ipv4Addr, SocketAddr};
 use std::sync::Arc;

@@ -4,6 +4,9 @@
 //! Every element of the prime field has a root here. A loop that takes its roots of a pose drawn in the prime field
 //! therefore closes at every draw, however many roots there are: six legs with two each would otherwise need four
 //! thousand draws for one pose.
+//!
+//! Decision: each equation counts twice here. The factors lie in the prime field, so real and imaginary parts obey
+//! the same relations.
 
 use std::ops::{Add, Mul, Neg, Sub};
 

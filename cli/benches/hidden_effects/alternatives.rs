@@ -2,6 +2,10 @@
 //! out.
 //!
 //! Two explanations that leave the same cannot be told apart on these recordings, whoever tries.
+//!
+//! Decision: a claim in place of the truth counts only if it names the truth as its alternative, and if, fitted to
+//! the noise-free forces of both runs, it leaves less than three standard deviations of the noise with values of
+//! physically possible sign.
 
 use std::iter::repeat;
 

@@ -211,6 +211,7 @@ fn every_link_leads_somewhere() {
     let mut pages = pages();
     for name in [
         "ARCHITECTURE.md",
+        "CONTRIBUTING.md",
         "docs/guide/src/SUMMARY.md",
         "model-spec/README.md",
         "rig/README.md",

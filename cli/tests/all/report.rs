@@ -1,5 +1,9 @@
 //! The page that `report` writes: it holds what `diagnose` says, needs nothing else, and answers to wheel, pointer and keys
 //! in a browser.
+//!
+//! Decision: a page of `report` is tested without the protocol of the developer tools. The test writes a copy with
+//! two more scripts: one that collects errors first, and one that uses wheel, pointer and keys last. It reads what
+//! they wrote from the dumped document.
 
 use std::path::PathBuf;
 use std::process::Command;

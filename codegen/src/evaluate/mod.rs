@@ -1,5 +1,8 @@
 //! The block evaluator: runs a program over many states inside the process, so that a changed model file can be tried
 //! on a recording at once, without a compiler.
+//!
+//! Decision: the Python package uses this evaluator first and a C compiler on request, because any machine has the
+//! evaluator. Irregular states go back to it from compiled code, so that faults have one definition.
 
 pub(crate) mod lost_digits;
 mod machine;

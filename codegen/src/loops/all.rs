@@ -1,4 +1,9 @@
 //! All loops of a mechanism, and which coordinates they settle.
+//!
+//! Decision: a loop in space is cut where two points coincide. A spherical joint there needs no coordinates, a
+//! universal joint is two revolute ones, and a platform is a free body whose pose is independent or passive like
+//! any other coordinate. Drives on passive coordinates act through their Jacobian. So no joint of a loop is a
+//! special case.
 
 use modelmill_spec::Mechanism;
 

@@ -5,6 +5,13 @@
 //! square, the variety falls apart: a parallelogram and its crossed linkage, a four-bar and its mirror image on the same
 //! crank. Then the sign of the root follows from other coordinates and may even change along one branch.
 //! Which is the case shows in the field: a radicand that is no square function takes square and other values alike.
+//!
+//! Decision: branches are separated before anything is sampled. Equal radicands get the same root, that of the
+//! nominal pose, so that mirrored loops stay mirrored. A radicand that is a square at forty random points is a
+//! square everywhere. If it is the square of a polynomial, the polynomial replaces the root (`whole_root`); any
+//! other such loop is reduced in floating point and solved by Newton's method. Whether roots are independent
+//! follows from their quadratic characters: the sum of some of them is constant only if a product of their
+//! radicands is a square (Kummer).
 
 use modelmill_algebra::field::{Element, Extended, MODULUS, Number, Stream};
 use modelmill_spec::Mechanism;

@@ -1,4 +1,8 @@
 //! Which of the loops' equations are enough.
+//!
+//! Decision: two points on one axis close a revolute joint with one equation too many, and no linear relation shows
+//! it. If there are more equations than passive coordinates, those are kept that determine them best at the nominal
+//! pose, provided that the others hold too at poses around it.
 
 use modelmill_algebra::field::Stream;
 use modelmill_spec::Mechanism;

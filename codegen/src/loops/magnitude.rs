@@ -1,5 +1,11 @@
 //! Magnitudes of loop residuals, coordinates and determinants: what Newton's method holds residuals and steps against, and
 //! what singular poses are told by, so that neither depends on the unit of length.
+//!
+//! Decision: a determinant counts as zero below 1e-9 of the magnitude of its terms (in `f32`: ten roundings). That
+//! magnitude is an expression in the constants alone, computed once per geometry: sine and cosine count as 1,
+//! prismatic coordinates as at the nominal pose. If the expression has fractions of the state, its nominal value is
+//! scaled by the power with which it grows with the size of the loops. So a machine may be built a thousand times
+//! smaller than its file states.
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 

@@ -1,4 +1,8 @@
 //! Poses in floating point: loops closed by Newton's method from the nominal pose.
+//!
+//! Decision: what the prime field states about loops is checked in floating point on the branch of the nominal
+//! pose, because machines live on that branch only. `nalgebra` is a dependency of this crate for the linear solver
+//! with pivoting in these Newton steps.
 
 use modelmill_algebra::field::Stream;
 use modelmill_spec::Mechanism;

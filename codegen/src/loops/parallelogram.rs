@@ -3,6 +3,10 @@
 //! Such a loop's variety falls apart into branches (the parallelogram and the crossed linkage), so that its closed form
 //! by square roots would mix them. Which branch is meant is seen numerically around the nominal pose; that the relation
 //! then closes the loop identically is shown exactly.
+//!
+//! Decision: such loops are recognised one after the other, as they drive each other, and proved either for all
+//! angles of the other loops or at points of the field where these close (as in a kite whose halves share a
+//! prismatic joint).
 
 use std::collections::{BTreeMap, BTreeSet};
 

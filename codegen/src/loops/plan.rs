@@ -1,4 +1,7 @@
 //! The order in which loops are solved, each as a dyad, by relations or as a coupling, and the same made evaluable in the field.
+//!
+//! Decision: the order is found by peeling, without search: from the front for given drive coordinates, from the
+//! back for points drawn at random. Both find an order if there is one, because a solved loop never blocks another.
 
 use std::collections::BTreeSet;
 

@@ -4,6 +4,11 @@
 //! origin do not depend on its own angle. Written for every joint of a loop, such equations solve the chains of a
 //! universal joint and a slide, of three revolute axes two of which meet or are parallel, and others (Pieper 1968,
 //! Raghavan and Roth 1993, for the first axes of an arm). The same expressions serve the emitted code and exact sampling.
+//!
+//! Decision: an equation with a single unknown is solved next, whichever it is. Two equations that are linear in
+//! its cosine and sine need no root; prismatic coordinates that occur linearly are eliminated across loops; the
+//! prime field then proves that the result closes the loops. This covers UPS, RUS, RRS and PRS legs and planar ones
+//! without a table of leg types.
 
 use std::collections::{BTreeMap, BTreeSet};
 

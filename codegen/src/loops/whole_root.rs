@@ -4,6 +4,9 @@
 //! Along a line through a point, the root of a polynomial follows from its value at that point, as a power series. So
 //! the root divided by its value at one point can be evaluated anywhere, with one and the same sign; its coefficients
 //! follow from a linear system. That the square is the radicand is shown at the end.
+//!
+//! Decision: the polynomial is evaluated and never expanded or factored. With it, the yaw of a platform on three
+//! equal legs, crossed parallelograms and deltoids have rational closed forms.
 
 use modelmill_algebra::eliminate::null_space;
 use modelmill_algebra::field::{Element, MODULUS, Stream};

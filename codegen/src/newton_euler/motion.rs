@@ -1,4 +1,9 @@
 //! The forward recursion: motion of every link as expressions in coordinates, rates and accelerations.
+//!
+//! Decision: points on a joint's axis have the same acceleration on both sides of the joint. So one column of
+//! `[alpha]x + [omega]x [omega]x` is rotated from the parent instead of computed again. For the same reason a
+//! second moment of mass along the axis may belong to either side; inverse dynamics moves it to the parent, where
+//! it costs nothing.
 
 use super::{Side, Style, turn_in_all};
 use crate::expr::vector::{self, Vector};

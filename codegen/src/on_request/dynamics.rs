@@ -4,6 +4,10 @@
 //! `J' f = M(z) z'' + c(z, z') + g(z) + e(z, z')`, all linear in p_min. M is made of composite bodies of the open tree
 //! (Walker and Orin 1982), projected on z by virtual power; c and g are the inverse dynamics without accelerations, and
 //! without gravity or without rates. Effects give e, and what multiplies accelerations in them joins M.
+//!
+//! Decision: only two things are differentiated by the accelerations: effects, and lumped masses that forces and
+//! moments see at different places (there M is not symmetric). These programs are derived on request, because they
+//! would nearly double the time and the code of every build.
 
 use std::collections::BTreeMap;
 

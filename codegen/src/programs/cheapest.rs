@@ -2,6 +2,10 @@
 //!
 //! All forms of a model have the same values. What they cost says who calls: for open chains the expressions as they
 //! stand, since lowering finds little in them; for loops the finished programs.
+//!
+//! Decision: no form is cheapest for all mechanisms, so passes are tried in turn and one stays only where it lowers
+//! the count. All forms agree to 1e-12 on every bundled model (a test), and none subtracts nearly equal numbers
+//! beyond the scale of squared rates that the plain recursion has too.
 
 use modelmill_spec::Mechanism;
 

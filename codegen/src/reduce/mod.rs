@@ -3,6 +3,12 @@
 //! The columns of H are functions on the loops' variety. They are evaluated at random points of a prime field, their
 //! linear dependences found by elimination there, and the constant factors of eq. (6) reconstructed as rational functions
 //! of the model's constants. A wrong answer has a probability below 1e-15 (Schwartz 1980, Zippel 1979).
+//!
+//! Where exactness ends: sine, cosine and square roots are algebraic in the field. Signs, absolute values, `tanh`
+//! and `exp` are opaque: equal arguments get equal random values, odd functions stay odd, a sign squares to one. So
+//! the base is minimal for functions that the field knows. It may be too large by what only opaque functions or
+//! numbers share (`sin(q/2)*cos(q/2)` and `sin(q)`, springs on two passive angles that are always equal, constants
+//! that are equal in this file only). The numeric rank is printed too, and a difference is reported.
 
 pub(crate) mod base;
 mod conditioned;

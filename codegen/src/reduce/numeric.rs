@@ -4,6 +4,13 @@
 //! Columns of a mechanism with one freedom are functions of one coordinate, and smooth: on a short path they differ by less than
 //! machine numbers resolve. So states come from a walk along the whole motion, have some 130 digits, and are on all loops.
 //! The factors hold for the file's values alone; results say so, with what they leave at further states.
+//!
+//! Decision: with machine numbers the singular values of such columns fade into rounding without a gap; a Bricard
+//! linkage had 18, 22 or 26 base parameters, depending on the path. With 130 digits a dependent column leaves
+//! 1e-120 and an independent one about 1e-5. Products of the file's constants are recognised in the factors by all
+//! their digits (the shortest match is written). If loops have more equations than needed and the lengths of the
+//! file are rounded, that rounding sets the limit, and a factor is at most one constant times a number. The factors
+//! as written are checked at further states; if that fails there is no base.
 
 use modelmill_algebra::digits::Digits;
 use modelmill_algebra::field::Stream;

@@ -4,6 +4,9 @@
 //! origin are a case of their own. Their columns are sums of the link's own ones with powers of lengths; written the other way
 //! round, the link's own ones take quotients by differences, which vanish where masses coincide. So there is a second order,
 //! in which such a product waits until its links' own products have been tried; it is taken where it saves such quotients.
+//!
+//! Decision: both orders are tried along lines in the lengths. The order of the declaration stays unless the other
+//! one has fewer such quotients, because published bases are in the order of declaration.
 
 use std::collections::BTreeMap;
 

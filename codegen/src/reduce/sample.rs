@@ -4,6 +4,9 @@
 //! Which coordinates are drawn freely does not matter for linear dependence, so those are drawn that make every loop
 //! a dyad. It matters that the poses make up one irreducible variety, the one that the nominal pose lies on; see
 //! [`crate::loops::branches`].
+//!
+//! Decision: rows are drawn until two points in a row add nothing, and not in a fixed number. On one irreducible
+//! variety a random point either adds a new equation or there is none left, with an error probability of 2^-55.
 
 use modelmill_algebra::eliminate::Echelon;
 use modelmill_algebra::field::{Element, Extended, Number, Stream};

@@ -3,6 +3,11 @@
 //! With `y` the rates in which the loops are simplest (a passive joint's absolute turning rate where axes are
 //! parallel), the differentiated loops read `J_p y_p + J_a y_a = 0`; then `tau_z = tau_a + G' tau_p` with
 //! `G = -J_p^-1 J_a`, and the drives' forces follow from `(d l / d z)' f = tau_z`.
+//!
+//! Decision: virtual power is written as generalised forces of the open tree, projected with the passive rates, and
+//! not body by body. The recursion of an open chain is the cheapest one, and the same rows serve every projection.
+//! Terms that would cancel are never built, because the absolute turning rate is the unknown of a passive joint
+//! whose axis is parallel to its parent's.
 
 use modelmill_spec::{DriveKind, Mechanism};
 

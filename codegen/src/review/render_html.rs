@@ -1,4 +1,8 @@
 //! A page as one self-contained HTML file in the style of all pages: MathML for the formulas, parted so that lines can end.
+//!
+//! Decision: a browser breaks no line inside a formula. So each segment up to the next sign of a sum is a formula
+//! of its own, also inside parentheses, and fractions and roots that are too wide are written on the line. No math
+//! font is required; the style states how deep indices hang.
 
 use std::fmt::Write;
 

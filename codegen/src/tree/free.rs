@@ -2,6 +2,16 @@
 //!
 //! A rotation by a quaternion (w, v) of any length is `1 + 2 (w [v]x + [v]x [v]x) / (w^2 + v'v)`; so it stays one in a prime
 //! field, where no unit quaternions are drawn, and rounding of a recorded one does no harm.
+//!
+//! Decision: a free body is a link without a joint. Its pose has seven coordinates and its motion six rates; only
+//! the first link of a tree can be free. The forward recursion starts there with the given angular velocity,
+//! angular acceleration and acceleration of the origin, and the backward recursion leaves all six components of the
+//! wrench. The rate of the quaternion's scalar part never occurs. Its place among the rates and in the mass matrix
+//! stays (a row with a one), so that every coordinate has one index. The squared length of the quaternion joins the
+//! determinants that must not vanish. Loops and drives that reach across a free body would need derivatives of
+//! poses by rates; the model file is refused. A tree of n revolute joints on a free body has 10 + 7 n base
+//! parameters: 220 for the 30 joints of the bundled humanoid, which the singular values of stacked regressors
+//! confirm.
 
 use modelmill_spec::{CoordinateIdx, FreeBody, TwistAxes};
 

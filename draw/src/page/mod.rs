@@ -1,5 +1,9 @@
 //! What all pages of HTML share: their head, their one style, and their one way of zooming pictures, copying numbers and printing
 //! what is folded. A page stands without its scripts too.
+//!
+//! Decision: style and scripts of all pages lie here, because equations, reports and the workbench all depend on
+//! this crate. A test opens every kind of page in a browser and measures it: nothing is wider than a phone, cut,
+//! folded on paper, without a name, or of less contrast than WCAG requires.
 
 use std::fmt::Write as _;
 

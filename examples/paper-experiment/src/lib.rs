@@ -1,5 +1,9 @@
 //! `experiment`: the paper's experiment, its Section 5, on the bundled rig: excitation, runs, both treatments of m4,
 //! Tables 1 and 2 beside the paper's, and where the errors come from, as one page.
+//!
+//! Decision: every number and figure of `docs/experiment.html` comes from a run of the command. Coefficients of
+//! trajectories are rounded to four decimals before the simulation, so that the page can print what was used.
+//! Errors that are rounding are shown as zero, because their digits differ between machines.
 
 mod figures;
 mod lengths;

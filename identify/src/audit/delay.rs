@@ -6,6 +6,10 @@
 //! differentiated or put between samples, where noise would draw the answer to one side, and the parameters are those that the
 //! delayed forces ask for. Fits are robust; intervals come from fits without one block of time each, as what a fit
 //! leaves resembles its neighbours and is different elsewhere.
+//!
+//! Decision: friction columns that the model may lack are fitted too. The interval is a jackknife over blocks of
+//! time, because a single fast move can look like a delay. The delay of a single drive must be three times as clear
+//! as a common one, because laws that a model lacks often sit at one drive.
 
 use nalgebra::{DMatrix, DVector};
 

@@ -1,4 +1,7 @@
 //! A run as sums over its rows, which add from block to block and from run to run.
+//!
+//! Decision: fits of any columns, omitted blocks, single runs, all runs and segments all come from the same inner
+//! products. A run of any length is a matrix of some 200 columns.
 
 use nalgebra::{DMatrix, DVector};
 

@@ -1,5 +1,11 @@
 //! A further body: forces are linear in its mass, first moments and inertia, of which the inertia follows from where its mass
 //! is. So it is posed as a mass at a place, with what it spreads about that, and is possible whenever these are positive.
+//!
+//! Decision: ten free parameters span what a spring, a weight or a gear does, and most of their values are no
+//! possible body. Mass and first moments with the inertia that follows from them are four, possible by one sign;
+//! how the mass spreads is three more, tried afterwards. Forces are of first degree in all of them, so columns that
+//! are derivatives add up to the whole force (Euler), and a few iterations find the place. With free base
+//! parameters a payload adds nothing, exactly, and is not tried.
 
 use super::column::Column;
 

@@ -1,4 +1,8 @@
 //! Values of a set of effects with their deviations, and how likely each of them is.
+//!
+//! Decision: odds from the likelihood are astronomic for the best candidate. So a fiftieth is reserved for causes
+//! outside of all candidates, and a quarter where something of the effect's channels stays unexplained. The rest is
+//! shared with the alternatives, by how much worse they are.
 
 use nalgebra::DMatrix;
 

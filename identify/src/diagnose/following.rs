@@ -1,5 +1,9 @@
 //! Effects whose columns follow from the fit: a tilted base, late forces, a further body, a wrong number of the model, and
 //! what depends on the load.
+//!
+//! Decision: the load of a drive comes from bodies and weight in the present fit, together with friction of every
+//! drive, and is computed again as the fit changes. The measured force would not do: it holds the friction itself
+//! and its noise, so that a column made of it would explain part of any error.
 
 use std::collections::{HashMap, HashSet};
 

@@ -12,6 +12,13 @@
 //!
 //! What recordings have and the model does not lack is told by name too: `cleaning` takes outliers and `hum` off beforehand,
 //! `drifts` and `readings` are candidates among the others, and `disturbance` says what is left, and of which sort.
+//!
+//! Decision: disturbances of recordings compete with effects. An encoder error, a drift or a wrong scale resembles
+//! some effect at any size, so they are candidates like all others, and only effects make the verdict. What least
+//! squares cannot bear (outliers, hum) or what one recording alone has (a push, another day) is removed beforehand.
+//!
+//! Decision: samples at reversals decide nothing. Dry friction jumps there, and no derivative of positions shows on
+//! which side of the jump a sample lies. They count in the figures.
 
 mod aliases;
 mod bench;

@@ -1,5 +1,9 @@
 //! Inner products of columns, channel by channel and apart for fit and check, so that any set of columns is fitted in
 //! microseconds.
+//!
+//! Decision: a search fits many thousands of sets, so samples are read once. Weights, which change with each
+//! accepted step, multiply finished sums. Inner products square the condition number; scaled columns and lower
+//! bounds for a new column guard the digits.
 
 use std::array;
 use std::borrow::Cow;

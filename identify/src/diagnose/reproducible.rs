@@ -3,6 +3,11 @@
 //!
 //! The functions are all products of up to three variables (two if there are many) and smooth signs of the rates, with a
 //! ridge whose strength is chosen by the same folds.
+//!
+//! Decision: a residual above the noise may be a law or coloured noise, and its autocorrelation does not
+//! distinguish them. A flexible function of the state does: what it explains in folds that it has not seen is
+//! repeatable. A residual that is not repeatable is reported as noise, however much its neighbours resemble each
+//! other.
 
 use std::ops::Range;
 

@@ -1,4 +1,8 @@
 //! From the set that the search ends with to the answer: members exchanged, taken out, made simpler, joined.
+//!
+//! Decision: one cause is preferred to two, a simple one to a general one. A kind that `refines` another waits for
+//! it; an effect that is a special case of an accepted one takes its place; among sets that the blocks cannot
+//! separate, the one with the fewest parameters is taken.
 
 use super::bench::{Bench, Pick, n_columns};
 use super::pool::On;

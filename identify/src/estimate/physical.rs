@@ -18,6 +18,10 @@
 //! between bodies, and planar and lumped ones are treated alike. With a small `g` it decides only
 //! what the recording does not. The minimum is found by Gauss's and Newton's steps, damped after
 //! Levenberg and Marquardt and shortened to stay inside, with `g` falling from where both terms weigh alike.
+//!
+//! Decision: a physical parameter is determined by itself if its unit vector lies in the span of the rows. A
+//! variance that falls is no proof of that, because the limits of possible bodies and the nominal values of other
+//! parameters lower it too.
 
 use nalgebra::{DMatrix, DVector};
 

@@ -1,4 +1,8 @@
 //! Rows times their weights, and the scales of residuals that weights are made from.
+//!
+//! Decision: weights are factors of rows. Variances, standstill, scales of channels and Huber's function multiply
+//! rows of regressor and force alike. A force that was not measured makes its row zero before any filter, so
+//! nothing has to be invented. Rows of zeros are no residuals, while error figures count every sample.
 
 use crate::estimate::error::LeastSquaresError;
 use crate::estimate::least_squares::LeastSquares;

@@ -1,4 +1,9 @@
 //! Limits kept at all times: a trajectory goes in; the same, shrunk as little as need be, comes out.
+//!
+//! Decision: angles, rates and accelerations are trigonometric polynomials. Their extremes are bounded by interval
+//! halving with a bound of the second derivative, so that these limits hold at all times. Forces, points and
+//! singular values have no such bound; they are checked on a grid sixteen times finer than the search's, with a
+//! margin from parabolas through neighbours added twice.
 
 use super::measure::{Measure, excess};
 use super::{CoordinateLimits, Margin, Motion, Series};

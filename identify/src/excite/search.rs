@@ -3,6 +3,10 @@
 //!
 //! The largest excess over a limit is taken as `log(sum of exp(r * excess)) / r`, which is smooth and never below it
 //! (G. Kreisselmeier and R. Steinhauser, 1979); r grows from one round to the next.
+//!
+//! Decision: gradients are central differences over the some thirty coefficients, because evaluation in blocks
+//! makes each of them cheap. They need smooth functions: the logarithm of the condition number and smooth largest
+//! excesses.
 
 use std::cell::{Cell, RefCell};
 

@@ -6,6 +6,13 @@
 //! A. C. Atkinson and V. V. Fedorov, "The design of experiments for discriminating between two rival models",
 //! Biometrika 62, 1975). Angles between spans follow A. Bjoerck and G. H. Golub, "Numerical methods for computing angles
 //! between linear subspaces", Mathematics of Computation 27 (1973).
+//!
+//! Decision: effects are separated by a force and not by an angle. The force is what is compared with the noise; an
+//! angle can be large where both forces are small. The rival gets the constants with which it mimics best. In the
+//! other direction its size is not known; it gets the effect's size and the values in which it is most alike, so
+//! that the smallest angle between both spans decides. A rival that the effect contains as a special case is left
+//! out there and reported. Signs of rates jump; differences over wide steps of the coefficients are slopes of their
+//! mean.
 
 use nalgebra::DMatrix;
 

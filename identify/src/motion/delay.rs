@@ -3,6 +3,9 @@
 //! The forces keep their samples, noise and jumps included; states are smooth, so that they can be read off between samples
 //! by the cubic through the four nearest (Lagrange). A sample whose states would lie before the first or behind the last
 //! one has no partner and is dropped.
+//!
+//! Decision: the states are shifted and not the forces, because states are smooth while forces jump at reversals
+//! and are noisy.
 
 use crate::motion::run::Run;
 

@@ -3,6 +3,9 @@
 //!
 //! The slowest part gives the times, so that no samples are invented; the others are interpolated linearly between the two
 //! samples around. Rows for which a part has no samples nearby are left out.
+//!
+//! Decision: interpolation to the fastest rate would count samples that nobody took, and standard deviations would
+//! be too small.
 
 use crate::recording::error::Fault;
 use crate::recording::gaps::GAP;

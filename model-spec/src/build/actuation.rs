@@ -1,4 +1,8 @@
 //! Loops, drives and the columns of recordings.
+//!
+//! Decision: a freedom that nothing drives becomes a drive that is not driven. It is a row of the equation of
+//! motion, named after its coordinate, whose force is zero unless it was recorded. So there are as many drives as
+//! freedoms, the drives' Jacobian has a row of the unit matrix there, and no stage needs a second kind of rows.
 
 use std::collections::BTreeMap;
 

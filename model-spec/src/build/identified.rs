@@ -1,4 +1,9 @@
 //! What was identified: values that take the place of nominal ones.
+//!
+//! Decision: a fit stands beside the nominal values that it replaces. The table `[identified]` holds base
+//! parameters by their expressions, or parameters by their names. Nothing else of the file is rewritten, and
+//! deleting the table removes the fit. Code that needs nominal base values gets them from one place, the
+//! derivation.
 
 use crate::build::symbols::Symbols;
 use crate::diagnostic::{Diagnostic, Log};

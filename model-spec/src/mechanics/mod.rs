@@ -2,6 +2,11 @@
 //!
 //! Whatever model files, pages and the diagnosis ask of one is answered by its [`Entry`]. The generalised forces of those
 //! that have some are in `regressor/mechanics` of `modelmill-codegen`.
+//!
+//! Decision: an effect is an expression at a place wherever an expression can state it. Only effects that act on
+//! bodies, on gravity or on the force signal have `mechanics`. Bodies of effects join the others as polynomials of
+//! their parameters; a tilt rotates gravity by named constants, so that sines stay exact; a delay is applied where
+//! recordings are prepared.
 
 mod delay;
 mod part;

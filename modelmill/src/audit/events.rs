@@ -4,6 +4,9 @@
 //! The regressor with friction and an offset of every drive is fitted to the forces by Huber's function, so that an event does
 //! not pull the fit to itself. A law that the model lacks leaves errors that come again with the motion; an event is rare, lasts,
 //! and stands far above all that the rest of the run leaves.
+//!
+//! Decision: an event must not repeat where position, rate, acceleration and force of its drive are alike. If it
+//! repeats, it is a law that the model lacks.
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{OptionName, Remedy};

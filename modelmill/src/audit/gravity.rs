@@ -1,4 +1,7 @@
 //! Gravity that pulls the other way: a machine that hangs where its model stands, or the sign of `gravity` in the model file.
+//!
+//! Decision: no second derivation is needed. The columns at standstill are those of gravity, and they change their
+//! sign.
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::Remedy;

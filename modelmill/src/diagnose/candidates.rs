@@ -1,5 +1,9 @@
 //! Every effect that may be missing, as the entry that `add` would write, in variants of the model: their derivation gives
 //! the columns of all.
+//!
+//! Decision: a candidate is the entry that `add` would write, and its columns come from the derivation of that
+//! entry. So there is no second definition of an effect, and effect kinds of a user's own library are tried like
+//! all others.
 
 use modelmill_codegen::{Derivation, Guard, Monomial};
 use modelmill_spec::{

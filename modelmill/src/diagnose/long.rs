@@ -3,6 +3,10 @@
 //!
 //! States that were smoothed change little between samples; after a first step as many are left for every one that is kept in
 //! the end as the parallel filter needs to filter regressor and forces alike.
+//!
+//! Decision: a diagnosis holds some thousand columns. Beyond 150 000 samples the parallel filter keeps one of four,
+//! and 20 000 at most, unless that would remove more than three quarters of the band in which forces follow the
+//! motion.
 
 use modelmill_identify::{LowPass, Note, PASSED_BY_DECIMATION, decimate_time};
 

@@ -1,6 +1,9 @@
 //! Eq. (9) on the model file's own values: random states around the nominal pose go in, the
 //! numeric rank of the stacked regressor comes out. A statement about these values and samples,
 //! beside the exact one about all values.
+//!
+//! Decision: random states have no order, while Newton's method starts from the state before. So they are evaluated
+//! one by one as soon as one of them has no solution.
 
 use std::cmp::Ordering;
 

@@ -3,6 +3,10 @@
 //!
 //! Long recordings keep the least and the largest value of each of many stretches, so that no peak is lost and the page
 //! stays small; values are packed as 16-bit steps between the least and the largest of a curve.
+//!
+//! Decision: every picture is an SVG that is complete without its script, so that the page reads on paper and under
+//! a policy that forbids scripts. The script only redraws curves from the same numbers. There is no framework and
+//! no crate for it.
 
 use std::fmt::Write as _;
 

@@ -1,4 +1,7 @@
 //! What a change is in physics.
+//!
+//! Decision: where a drive carries nothing but its friction, more friction and a larger force scale are the same.
+//! Friction changes every day and sensors hardly ever, so friction is named first and the scale as its alternative.
 
 use modelmill_identify::changes::{Candidate, Change, Values};
 use modelmill_spec::{DriveKind, Place};

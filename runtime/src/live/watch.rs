@@ -1,4 +1,7 @@
 //! The watch: samples in, a verdict out.
+//!
+//! Decision: names come from samples after the alarm only, because a change that covers part of a window looks like
+//! a change of other parameters.
 
 use super::averages::{Averages, Row};
 use super::comparison::{Comparison, Single};

@@ -1,4 +1,7 @@
 //! A browser of the machine, and how a test asks it for things: by the protocol of its developer tools, over a pair of pipes.
+//!
+//! Decision: latencies, two windows and files that change need real time, which a dumped document does not have.
+//! The protocol takes some hundred lines and needs no driver program; any Chromium will do.
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, Write};

@@ -1,6 +1,10 @@
 //! Crates that bring a model to other languages: the emitted module, a face for the language, and a manifest.
 //!
 //! The face is the only code with `unsafe`; the module beside it is the one that [`super::emit`] makes.
+//!
+//! Decision: such a crate carries the source of the runtime, so that its folder can be moved anywhere. C passes
+//! constants and parameters as arrays with named places, because names of a model file may be keywords there. The
+//! header is written here and not by `cbindgen`, which would not see places, units and expressions.
 
 mod c_abi;
 mod c_header;

@@ -2,6 +2,10 @@
 //!
 //! Forces at the cuts that no virtual motion feels, the null space of the transposed Jacobian of all closing equations,
 //! may have any size. A component is determined if none of them reaches it.
+//!
+//! Decision: all unknowns of a cut are carried as symbols first. The pin of a planar loop may carry moments that
+//! the point in the model cannot; they count as unknown too. The null space is that of the file's geometry, but
+//! lengths across the plane of a loop are drawn at random, so that a length of zero hides nothing.
 
 use modelmill_algebra::field::Stream;
 use modelmill_spec::Mechanism;

@@ -7,6 +7,9 @@
 //!
 //! Reactions depend on all inertial parameters: many that no drive feels, and that base parameters therefore do not hold,
 //! load a bearing all the same.
+//!
+//! Decision: a pair of forces stops at the link that carries both, so that nothing cancels in rounding. Reactions
+//! are derived on request, like the equation of motion.
 
 mod determined;
 mod loads;

@@ -2,6 +2,10 @@
 //!
 //! The module depends on `modelmill-runtime` alone. It is `no_std`, allocates nothing, contains no unsafe code, and works
 //! for `f32` and `f64`.
+//!
+//! Decision: emitted functions suit real time. They have no loops but Newton's, no branch on the state except for
+//! what is refused, and no code that can panic: a test builds libraries without the standard library and looks for
+//! traces of a panic.
 
 mod dynamics;
 mod functions;

@@ -1,4 +1,8 @@
 //! A program as a struct that holds what is computed once, and computes the rest at a state.
+//!
+//! Decision: programs of more than 2000 statements are written as blocks of 250. Every `let` opens a scope inside
+//! the one before, and rustc writes debug information scope by scope with recursion: a 6-UPS platform in one
+//! function overflows its stack.
 
 use std::collections::BTreeSet;
 
