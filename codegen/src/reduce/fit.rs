@@ -8,7 +8,7 @@ use modelmill_algebra::lift::lift;
 
 use super::oracle::{Occurrence, Oracle};
 use super::rational_function::{Polynomial, Powers, RationalFunction, Variable, monomial_value};
-use super::support::support;
+use super::support::{PartialSamples, support};
 use crate::DeriveError;
 use crate::expr::{FieldPoint, Rational};
 
@@ -148,6 +148,7 @@ impl Shape {
     pub(super) fn fit<O: Oracle>(
         &self,
         fields: &mut Fields<O>,
+        partial: &mut PartialSamples,
         oracle: &mut O,
         origin: &FieldPoint,
         function: usize,
@@ -204,6 +205,7 @@ impl Shape {
                 let variables: Vec<Occurrence> = self.degrees.keys().copied().collect();
                 let all = [numerator.as_slice(), denominator.as_slice()];
                 let found = support(
+                    partial,
                     oracle,
                     origin,
                     function,

@@ -11,6 +11,7 @@ use modelmill_algebra::univariate;
 use super::fit::{Fields, Shape};
 use super::oracle::{Occurrence, Oracle};
 use super::rational_function::RationalFunction;
+use super::support::PartialSamples;
 use crate::DeriveError;
 use crate::expr::{Atom, FieldPoint};
 
@@ -41,6 +42,7 @@ pub(super) struct Survey<O> {
     moved: Vec<Moved>,
     shapes: Vec<Shape>,
     fields: Fields<O>,
+    partial: PartialSamples,
 }
 
 impl<O: Oracle> Survey<O> {
@@ -71,6 +73,7 @@ impl<O: Oracle> Survey<O> {
             moved,
             shapes,
             fields: Fields::new(),
+            partial: PartialSamples::new(constants),
         })
     }
 
@@ -98,8 +101,15 @@ impl<O: Oracle> Survey<O> {
         total_degrees(oracle, origin, &self.constants, &indices, shapes, stream)?;
         let mut found = Vec::with_capacity(wanted.len());
         for (k, is_needed) in wanted {
-            let function =
-                shapes[*k].fit(&mut self.fields, oracle, origin, *k, &self.roots, stream)?;
+            let function = shapes[*k].fit(
+                &mut self.fields,
+                &mut self.partial,
+                oracle,
+                origin,
+                *k,
+                &self.roots,
+                stream,
+            )?;
             let resists = function.is_none();
             found.push(function);
             if resists && *is_needed {

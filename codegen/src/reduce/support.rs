@@ -3,7 +3,7 @@
 //! Variables are let loose one after the other while the rest stay at a point (Zippel 1979, 1990): a monomial can only
 //! have a coefficient if it had one before with its last variable left away.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use modelmill_algebra::eliminate;
 use modelmill_algebra::field::{Element, Stream};
@@ -13,9 +13,52 @@ use super::rational_function::{Powers, Variable, monomial_value};
 use crate::DeriveError;
 use crate::expr::{Atom, FieldPoint};
 
+/// Points at which the constants up to one of them are drawn anew and the others stay at the origin, with the values of
+/// all functions there; by the last constant that is drawn.
+///
+/// A function does not change with constants on which it does not depend. So the same points serve all functions,
+/// whichever of these constants each depends on.
+pub(super) struct PartialSamples {
+    constants: Vec<Occurrence>,
+    by_last_constant: BTreeMap<Occurrence, Vec<(FieldPoint, Vec<Element>)>>,
+}
+
+impl PartialSamples {
+    /// No points yet; `constants` are all on which any function may depend.
+    pub(super) fn new(constants: &[Occurrence]) -> Self {
+        Self {
+            constants: constants.to_vec(),
+            by_last_constant: BTreeMap::new(),
+        }
+    }
+
+    /// At least `n` points at which the constants up to `last` are drawn anew.
+    fn at_least<O: Oracle>(
+        &mut self,
+        n: usize,
+        last: Occurrence,
+        oracle: &mut O,
+        origin: &FieldPoint,
+        stream: &mut Stream,
+    ) -> Result<&[(FieldPoint, Vec<Element>)], DeriveError> {
+        let samples = self.by_last_constant.entry(last).or_default();
+        if samples.len() < n {
+            let up_to_last = self.constants.iter().copied().filter(|c| *c <= last);
+            let loose: Vec<Occurrence> = up_to_last.collect();
+            while samples.len() < n {
+                let point = loosened(oracle, origin, &loose, stream)?;
+                let values = oracle.values(&point)?;
+                samples.push((point, values));
+            }
+        }
+        Ok(samples)
+    }
+}
+
 /// The monomials of numerator and denominator among those given that have a coefficient at a random place; `None` where
-/// a stage has more unknowns than `most`, or more than one solution.
+/// a stage has more unknowns than `most`, or more than one solution. `variables` are in ascending order.
 pub(super) fn support<O: Oracle>(
+    samples: &mut PartialSamples,
     oracle: &mut O,
     origin: &FieldPoint,
     function: usize,
@@ -42,12 +85,13 @@ pub(super) fn support<O: Oracle>(
         if unknowns > most {
             return Ok(None);
         }
-        let mut rows = Vec::with_capacity(unknowns + MORE);
-        while rows.len() < unknowns + MORE {
-            let point = loosened(oracle, origin, loose, stream)?;
-            let value = oracle.values(&point)?[function];
-            let row: Option<Vec<Element>> = (top.iter().map(|m| monomial_value(m, &point)))
-                .chain((bottom.iter()).map(|m| monomial_value(m, &point).map(|x| -(x * value))))
+        let n_rows = unknowns + MORE;
+        let points = samples.at_least(n_rows, loose[n - 1], oracle, origin, stream)?;
+        let mut rows = Vec::with_capacity(n_rows);
+        for (point, values) in &points[..n_rows] {
+            let value = values[function];
+            let row: Option<Vec<Element>> = (top.iter().map(|m| monomial_value(m, point)))
+                .chain((bottom.iter()).map(|m| monomial_value(m, point).map(|x| -(x * value))))
                 .collect();
             let Some(row) = row else { return Ok(None) };
             rows.push(row);
