@@ -95,15 +95,20 @@ impl<O: Oracle, const P: u64> Solve<O> for Samples<P> {
 }
 
 /// All fields, with what was sampled in each.
-pub(super) struct Fields<O>(Vec<Box<dyn Solve<O>>>);
+pub(super) struct Fields<O> {
+    solvers: Vec<Box<dyn Solve<O>>>,
+    /// Points of the first field at which only some constants are drawn anew.
+    partial: PartialSamples,
+}
 
 impl<O: Oracle> Fields<O> {
-    pub(super) fn new() -> Self {
+    /// `origin` and `constants` are those of [`PartialSamples`].
+    pub(super) fn new(origin: &FieldPoint, constants: &[Occurrence]) -> Self {
         fn field<O: Oracle, const P: u64>() -> Box<dyn Solve<O>> {
             Box::new(Samples::<P> { points: Vec::new() })
         }
         const { assert!(PRIMES[0] == MODULUS) };
-        Self(vec![
+        let solvers = vec![
             field::<O, { PRIMES[0] }>(),
             field::<O, { PRIMES[1] }>(),
             field::<O, { PRIMES[2] }>(),
@@ -111,7 +116,11 @@ impl<O: Oracle> Fields<O> {
             field::<O, { PRIMES[4] }>(),
             field::<O, { PRIMES[5] }>(),
             field::<O, { PRIMES[6] }>(),
-        ])
+        ];
+        Self {
+            solvers,
+            partial: PartialSamples::new(origin, constants),
+        }
     }
 
     /// Coefficients that solve an ansatz, over the rationals.
@@ -122,7 +131,7 @@ impl<O: Oracle> Fields<O> {
         stream: &mut Stream,
     ) -> Result<Option<Vec<Rational>>, DeriveError> {
         let mut residues: Vec<Vec<(u64, u64)>> = Vec::new();
-        for field in &mut self.0 {
+        for field in &mut self.solvers {
             let modulus = field.modulus();
             let Some(solutions) = field.solutions(ansatz, oracle, stream)? else {
                 return Ok(None);
@@ -148,9 +157,7 @@ impl Shape {
     pub(super) fn fit<O: Oracle>(
         &self,
         fields: &mut Fields<O>,
-        partial: &mut PartialSamples,
         oracle: &mut O,
-        origin: &FieldPoint,
         function: usize,
         roots: &[i64],
         stream: &mut Stream,
@@ -205,9 +212,8 @@ impl Shape {
                 let variables: Vec<Occurrence> = self.degrees.keys().copied().collect();
                 let all = [numerator.as_slice(), denominator.as_slice()];
                 let found = support(
-                    partial,
+                    &mut fields.partial,
                     oracle,
-                    origin,
                     function,
                     &variables,
                     all,

@@ -11,7 +11,6 @@ use modelmill_algebra::univariate;
 use super::fit::{Fields, Shape};
 use super::oracle::{Occurrence, Oracle};
 use super::rational_function::RationalFunction;
-use super::support::PartialSamples;
 use crate::DeriveError;
 use crate::expr::{Atom, FieldPoint};
 
@@ -42,7 +41,6 @@ pub(super) struct Survey<O> {
     moved: Vec<Moved>,
     shapes: Vec<Shape>,
     fields: Fields<O>,
-    partial: PartialSamples,
 }
 
 impl<O: Oracle> Survey<O> {
@@ -65,6 +63,7 @@ impl<O: Oracle> Survey<O> {
         } else {
             moved(oracle, &origin, &at_origin, constants, &mut shapes, stream)?
         };
+        let fields = Fields::new(&origin, constants);
         Ok(Self {
             roots: roots.to_vec(),
             constants: constants.to_vec(),
@@ -72,8 +71,7 @@ impl<O: Oracle> Survey<O> {
             at_origin,
             moved,
             shapes,
-            fields: Fields::new(),
-            partial: PartialSamples::new(constants),
+            fields,
         })
     }
 
@@ -101,15 +99,7 @@ impl<O: Oracle> Survey<O> {
         total_degrees(oracle, origin, &self.constants, &indices, shapes, stream)?;
         let mut found = Vec::with_capacity(wanted.len());
         for (k, is_needed) in wanted {
-            let function = shapes[*k].fit(
-                &mut self.fields,
-                &mut self.partial,
-                oracle,
-                origin,
-                *k,
-                &self.roots,
-                stream,
-            )?;
+            let function = shapes[*k].fit(&mut self.fields, oracle, *k, &self.roots, stream)?;
             let resists = function.is_none();
             found.push(function);
             if resists && *is_needed {

@@ -19,14 +19,16 @@ use crate::expr::{Atom, FieldPoint};
 /// A function does not change with constants on which it does not depend. So the same points serve all functions,
 /// whichever of these constants each depends on.
 pub(super) struct PartialSamples {
+    origin: FieldPoint,
     constants: Vec<Occurrence>,
     by_last_constant: BTreeMap<Occurrence, Vec<(FieldPoint, Vec<Element>)>>,
 }
 
 impl PartialSamples {
     /// No points yet; `constants` are all on which any function may depend.
-    pub(super) fn new(constants: &[Occurrence]) -> Self {
+    pub(super) fn new(origin: &FieldPoint, constants: &[Occurrence]) -> Self {
         Self {
+            origin: origin.clone(),
             constants: constants.to_vec(),
             by_last_constant: BTreeMap::new(),
         }
@@ -38,7 +40,6 @@ impl PartialSamples {
         n: usize,
         last: Occurrence,
         oracle: &mut O,
-        origin: &FieldPoint,
         stream: &mut Stream,
     ) -> Result<&[(FieldPoint, Vec<Element>)], DeriveError> {
         let samples = self.by_last_constant.entry(last).or_default();
@@ -46,7 +47,7 @@ impl PartialSamples {
             let up_to_last = self.constants.iter().copied().filter(|c| *c <= last);
             let loose: Vec<Occurrence> = up_to_last.collect();
             while samples.len() < n {
-                let point = loosened(oracle, origin, &loose, stream)?;
+                let point = loosened(oracle, &self.origin, &loose, stream)?;
                 let values = oracle.values(&point)?;
                 samples.push((point, values));
             }
@@ -60,7 +61,6 @@ impl PartialSamples {
 pub(super) fn support<O: Oracle>(
     samples: &mut PartialSamples,
     oracle: &mut O,
-    origin: &FieldPoint,
     function: usize,
     variables: &[Occurrence],
     [numerator, denominator]: [&[Powers]; 2],
@@ -86,7 +86,7 @@ pub(super) fn support<O: Oracle>(
             return Ok(None);
         }
         let n_rows = unknowns + MORE;
-        let points = samples.at_least(n_rows, loose[n - 1], oracle, origin, stream)?;
+        let points = samples.at_least(n_rows, loose[n - 1], oracle, stream)?;
         let mut rows = Vec::with_capacity(n_rows);
         for (point, values) in &points[..n_rows] {
             let value = values[function];
