@@ -72,7 +72,7 @@ pub(crate) fn serve(
         };
         let listener = TcpListener::bind(address).await.map_err(taken)?;
         let port = listener.local_addr().map_err(taken)?.port();
-        let token = random_token().map_err(|error| Error::input(error.to_string()))?;
+        let token = random_token().map_err(Error::input)?;
         let link = format!("http://127.0.0.1:{port}/?token={token}");
         tokio::spawn(poll_files(Arc::clone(&sitting)));
         let app = Arc::new(ServerState {

@@ -97,6 +97,27 @@ fn texts(value: &Value, all: &mut String) {
     }
 }
 
+/// Options and commands of the program that the advice of the commands below names.
+const ADVISED: [&str; 17] = [
+    "--between",
+    "--check",
+    "--cutoff",
+    "--data",
+    "--derivatives positions",
+    "--leave-out-events",
+    "--limits",
+    "--map",
+    "--physical",
+    "--skip-bad-samples",
+    "--smoothing",
+    "--unknown",
+    "--weights",
+    "`modelmill adopt`",
+    "`modelmill diagnose`",
+    "`modelmill evaluate`",
+    "`modelmill identify`",
+];
+
 #[test]
 fn advice_is_in_the_words_of_the_program() {
     let arm = &model("two_link.toml");
@@ -189,25 +210,7 @@ fn advice_is_in_the_words_of_the_program() {
     }
     let html = std::fs::read_to_string(format!("{page}/report.html")).unwrap();
     program_words(&html, &[page]);
-    for expected in [
-        "--between",
-        "--check",
-        "--cutoff",
-        "--data",
-        "--derivatives positions",
-        "--leave-out-events",
-        "--limits",
-        "--map",
-        "--physical",
-        "--skip-bad-samples",
-        "--smoothing",
-        "--unknown",
-        "--weights",
-        "`modelmill adopt`",
-        "`modelmill diagnose`",
-        "`modelmill evaluate`",
-        "`modelmill identify`",
-    ] {
+    for expected in ADVISED {
         assert!(all.contains(expected), "{expected}");
     }
 }

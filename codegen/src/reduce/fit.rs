@@ -7,10 +7,8 @@ use modelmill_algebra::field::{FieldElement, MODULUS, PRIMES, RandomStream};
 use modelmill_algebra::lift::reconstruct_rational;
 
 use super::oracle::{ConstantOccurrence, PrimeFieldOracle};
-use super::rational_function::{
-    FactorVariable, PowerProduct, RationalFunction, TrigonometricPolynomial, monomial_value,
-};
-use super::support::{PartialSamples, nonzero_monomials};
+use super::rational_function::{FactorVariable, PowerProduct, RationalFunction, TrigonometricPolynomial, monomial_value};
+use super::support::{PartialSamples, support};
 use crate::DeriveError;
 use crate::expr::{FieldPoint, Rational};
 
@@ -100,15 +98,20 @@ impl<O: PrimeFieldOracle, const P: u64> AnsatzSolver<O> for FieldSamples<P> {
 }
 
 /// All fields, with what was sampled in each.
-pub(super) struct PrimeFields<O>(Vec<Box<dyn AnsatzSolver<O>>>);
+pub(super) struct PrimeFields<O> {
+    solvers: Vec<Box<dyn AnsatzSolver<O>>>,
+    /// Points of the first field at which only some constants are drawn anew.
+    partial: PartialSamples,
+}
 
 impl<O: PrimeFieldOracle> PrimeFields<O> {
-    pub(super) fn new() -> Self {
+    /// `origin` and `constants` are those of [`PartialSamples`].
+    pub(super) fn new(origin: &FieldPoint, constants: &[ConstantOccurrence]) -> Self {
         fn boxed_field<O: PrimeFieldOracle, const P: u64>() -> Box<dyn AnsatzSolver<O>> {
             Box::new(FieldSamples::<P> { points: Vec::new() })
         }
         const { assert!(PRIMES[0] == MODULUS) };
-        Self(vec![
+        let solvers = vec![
             boxed_field::<O, { PRIMES[0] }>(),
             boxed_field::<O, { PRIMES[1] }>(),
             boxed_field::<O, { PRIMES[2] }>(),
@@ -116,7 +119,11 @@ impl<O: PrimeFieldOracle> PrimeFields<O> {
             boxed_field::<O, { PRIMES[4] }>(),
             boxed_field::<O, { PRIMES[5] }>(),
             boxed_field::<O, { PRIMES[6] }>(),
-        ])
+        ];
+        Self {
+            solvers,
+            partial: PartialSamples::new(origin, constants),
+        }
     }
 
     /// Coefficients that solve an ansatz, over the rationals.
@@ -127,7 +134,7 @@ impl<O: PrimeFieldOracle> PrimeFields<O> {
         stream: &mut RandomStream,
     ) -> Result<Option<Vec<Rational>>, DeriveError> {
         let mut residues: Vec<Vec<(u64, u64)>> = Vec::new();
-        for field in &mut self.0 {
+        for field in &mut self.solvers {
             let modulus = field.modulus();
             let Some(solutions) = field.solutions(ansatz, oracle, stream)? else {
                 return Ok(None);
@@ -156,7 +163,6 @@ impl FunctionShape {
         fields: &mut PrimeFields<O>,
         partial: &mut PartialSamples,
         oracle: &mut O,
-        origin: &FieldPoint,
         function: usize,
         roots: &[i64],
         stream: &mut RandomStream,
@@ -211,9 +217,8 @@ impl FunctionShape {
                 let variables: Vec<ConstantOccurrence> = self.degrees.keys().copied().collect();
                 let all = [numerator.as_slice(), denominator.as_slice()];
                 let found = nonzero_monomials(
-                    partial,
+                    &mut fields.partial,
                     oracle,
-                    origin,
                     function,
                     &variables,
                     all,

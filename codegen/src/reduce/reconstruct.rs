@@ -65,6 +65,7 @@ impl<O: PrimeFieldOracle> DependenceSurvey<O> {
         } else {
             vary_constants(oracle, &origin, &at_origin, constants, &mut shapes, stream)?
         };
+        let fields = Fields::new(&origin, constants);
         Ok(Self {
             roots: roots.to_vec(),
             constants: constants.to_vec(),
@@ -72,8 +73,7 @@ impl<O: PrimeFieldOracle> DependenceSurvey<O> {
             at_origin,
             moved,
             shapes,
-            fields: PrimeFields::new(),
-            partial: PartialSamples::new(constants),
+            fields,
         })
     }
 
@@ -104,9 +104,7 @@ impl<O: PrimeFieldOracle> DependenceSurvey<O> {
             let function = shapes[*k].fit_function(
                 &mut self.fields,
                 &mut self.partial,
-                oracle,
-                origin,
-                *k,
+                oracle, *k,
                 &self.roots,
                 stream,
             )?;

@@ -19,14 +19,16 @@ use crate::expr::{Atom, FieldPoint};
 /// A function does not change with constants on which it does not depend. So the same points serve all functions,
 /// whichever of these constants each depends on.
 pub(super) struct PartialSamples {
+    origin: FieldPoint,
     constants: Vec<ConstantOccurrence>,
     by_last_constant: BTreeMap<ConstantOccurrence, Vec<(FieldPoint, Vec<FieldElement>)>>,
 }
 
 impl PartialSamples {
     /// No points yet; `constants` are all on which any function may depend.
-    pub(super) fn new(constants: &[ConstantOccurrence]) -> Self {
+    pub(super) fn new(origin: &FieldPoint, constants: &[ConstantOccurrence]) -> Self {
         Self {
+            origin: origin.clone(),
             constants: constants.to_vec(),
             by_last_constant: BTreeMap::new(),
         }
@@ -38,7 +40,6 @@ impl PartialSamples {
         n: usize,
         last: ConstantOccurrence,
         oracle: &mut O,
-        origin: &FieldPoint,
         stream: &mut RandomStream,
     ) -> Result<&[(FieldPoint, Vec<FieldElement>)], DeriveError> {
         let samples = self.by_last_constant.entry(last).or_default();
@@ -46,7 +47,7 @@ impl PartialSamples {
             let up_to_last = self.constants.iter().copied().filter(|c| *c <= last);
             let loose: Vec<ConstantOccurrence> = up_to_last.collect();
             while samples.len() < n {
-                let point = redraw_constants(oracle, origin, &loose, stream)?;
+                let point = redraw_constants(oracle, &self.origin, &loose, stream)?;
                 let values = oracle.values(&point)?;
                 samples.push((point, values));
             }
@@ -60,7 +61,6 @@ impl PartialSamples {
 pub(super) fn nonzero_monomials<O: PrimeFieldOracle>(
     samples: &mut PartialSamples,
     oracle: &mut O,
-    origin: &FieldPoint,
     function: usize,
     variables: &[ConstantOccurrence],
     [numerator, denominator]: [&[PowerProduct]; 2],
@@ -87,7 +87,7 @@ pub(super) fn nonzero_monomials<O: PrimeFieldOracle>(
             return Ok(None);
         }
         let n_rows = unknowns + MORE;
-        let points = samples.at_least(n_rows, loose[n - 1], oracle, origin, stream)?;
+        let points = samples.at_least(n_rows, loose[n - 1], oracle, stream)?;
         let mut rows = Vec::with_capacity(n_rows);
         for (point, values) in &points[..n_rows] {
             let value = values[function];

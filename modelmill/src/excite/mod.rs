@@ -157,14 +157,7 @@ impl Model {
         let apart = match &separating {
             Some(separating) => {
                 let apart = separating.distance_along(&motion, &separating.which);
-                Some(apart.ok_or_else(|| {
-                    Error::input(message!(
-                        "{}: nothing is left of the difference at {} samples per second; give a higher rate ({})",
-                        self.path,
-                        request.rate,
-                        Remedy::option(OptionName::Rate)
-                    ))
-                })?)
+                Some(apart.ok_or_else(|| too_slow(self, request.rate))?)
             }
             None => None,
         };
@@ -207,6 +200,15 @@ impl Model {
             notes,
         })
     }
+}
+
+/// Why a rate of so many samples per second does not do.
+fn too_slow(model: &Model, rate: f64) -> Error {
+    Error::input(message!(
+        "{}: nothing is left of the difference at {rate} samples per second; give a higher rate ({})",
+        model.path,
+        Remedy::option(OptionName::Rate)
+    ))
 }
 
 /// Samples over one period.
