@@ -35,6 +35,7 @@ impl<const P: u64> Extended<P> {
 
 impl<const P: u64> Add for Extended<P> {
     type Output = Self;
+    #[inline]
     fn add(self, other: Self) -> Self {
         Self {
             re: self.re + other.re,
@@ -45,6 +46,7 @@ impl<const P: u64> Add for Extended<P> {
 
 impl<const P: u64> Sub for Extended<P> {
     type Output = Self;
+    #[inline]
     fn sub(self, other: Self) -> Self {
         self + -other
     }
@@ -52,6 +54,7 @@ impl<const P: u64> Sub for Extended<P> {
 
 impl<const P: u64> Neg for Extended<P> {
     type Output = Self;
+    #[inline]
     fn neg(self) -> Self {
         Self {
             re: -self.re,
@@ -62,22 +65,11 @@ impl<const P: u64> Neg for Extended<P> {
 
 impl<const P: u64> Mul for Extended<P> {
     type Output = Self;
+    #[inline]
     fn mul(self, other: Self) -> Self {
-        // Most values stay in the prime field.
-        match (self.im == Element::ZERO, other.im == Element::ZERO) {
-            (true, true) => (self.re * other.re).into(),
-            (true, false) => Self {
-                re: self.re * other.re,
-                im: self.re * other.im,
-            },
-            (false, true) => Self {
-                re: self.re * other.re,
-                im: self.im * other.re,
-            },
-            (false, false) => Self {
-                re: self.re * other.re - self.im * other.im,
-                im: self.re * other.im + self.im * other.re,
-            },
+        Self {
+            re: Element::sum_of_products([self.re, other.re], [-self.im, other.im]),
+            im: Element::sum_of_products([self.re, other.im], [self.im, other.re]),
         }
     }
 }

@@ -6,7 +6,7 @@ use modelmill_algebra::field::{Element, Stream};
 use super::dependences::Dependences;
 use super::oracle::{Budget, Occurrence, Oracle};
 use super::reconstruct::{self, Survey};
-use super::relations::{self, ColumnRelation, Related, Written};
+use super::relations::{self, ColumnRelation, Related, RelationRows, Written};
 use super::sample::SampledRegressor;
 use crate::DeriveError;
 use crate::expr::FieldPoint;
@@ -168,11 +168,18 @@ impl Oracle for FromMotion<'_> {
         let one_by_one: usize = self.relations.iter().map(|r| (r.len() + 1).pow(3)).sum();
         self.spend(at_once.min(one_by_one))?;
         if one_by_one < at_once {
-            let mut rows = Vec::new();
+            // Few points are enough for relations between few columns.
+            let mut open: Vec<RelationRows<P>> =
+                self.relations.iter().map(RelationRows::new).collect();
             for _ in 0..self.dependences.n_points {
-                rows.extend(self.regressor.point(constants, &mut self.sampling)?);
+                if open.iter().all(RelationRows::is_confirmed) {
+                    break;
+                }
+                let rows = self.regressor.point(constants, &mut self.sampling)?;
+                open.iter_mut().for_each(|relation| relation.take(&rows));
             }
-            return relations::values_from_rows(self.relations, &rows);
+            let values = open.iter().map(RelationRows::values);
+            return Ok(values.collect::<Result<Vec<_>, _>>()?.concat());
         }
         let (echelon, _) = self.regressor.echelon(
             constants,
