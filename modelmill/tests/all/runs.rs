@@ -1,17 +1,13 @@
 //! `runs` on forces of models with a further body, other friction, another scale and another clock, along motions of their own,
 //! with noise that has a memory: what changed is told as such, and nothing else.
 
-mod draws;
-#[allow(dead_code, reason = "other tests do more to runs")]
-mod made;
-
 use std::path::PathBuf;
 
 use modelmill::Model;
 use modelmill::recording::{Reading, Recording};
 use modelmill::runs::{Asked, Changed, Compared, Estimate, KnownLoad, PerRun, Unread, What};
 
-use made::{Made, bundled, run};
+use crate::made::{Made, bundled, run};
 
 /// What is told of a run against one to which nothing was done.
 fn told(name: &str, seed: u64, made: Made) -> Vec<Changed> {
