@@ -21,6 +21,7 @@ pub(crate) mod tests;
 
 pub use formula::{Formula, Function};
 pub use from_exact::{angle, exact, exact_at, length};
+#[cfg(any(test, feature = "review"))]
 pub(crate) use from_graph::angle_sum;
 pub use from_graph::{atom, formula, tree_size};
 pub use symbol::Symbol;
