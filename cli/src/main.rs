@@ -74,6 +74,7 @@ fn run(host: &Host, command: &Command) -> Outcome {
         Command::Excite(args) => commands::excite::run(host, args),
         Command::Experiment(args) => commands::experiment::run(host, args),
         Command::Completions(args) => commands::completions::run(args),
+        #[cfg(feature = "workbench")]
         Command::Work(args) => commands::work::run(host, args),
         Command::Tour(args) => commands::tour::run(host, args),
     }

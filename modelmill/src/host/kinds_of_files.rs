@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use modelmill_boundary::files::Kind;
+use modelmill_boundary::files::{Files, Kind};
 
 use crate::host::Host;
 
@@ -20,16 +20,26 @@ pub(crate) fn kind(host: &Host, path: &Path) -> Option<&'static str> {
     if path.extension().is_some_and(|e| e == "toml") {
         if modelmill_spec::load_file_with(path, host.libraries(), files).is_ok() {
             Some("a model file")
-        } else if modelmill_rig::load_file_with(path, files).is_ok() {
-            Some("a rig file, which describes the whole machine")
-        } else if modelmill_reduction::plan_file_with(path, files).is_ok() {
-            Some("a plan of a reduction")
         } else {
-            None
+            kind_for_models(path, files)
         }
     } else if starts_as_json() == Some(true) && host.fit(path).is_ok() {
         Some("a fit, as `identify` writes it")
     } else {
         None
     }
+}
+
+/// What kind of file a model can be made of this is.
+#[cfg_attr(not(feature = "rig"), allow(unused_variables))]
+fn kind_for_models(path: &Path, files: &dyn Files) -> Option<&'static str> {
+    #[cfg(feature = "rig")]
+    if modelmill_rig::load_file_with(path, files).is_ok() {
+        return Some("a rig file, which describes the whole machine");
+    }
+    #[cfg(feature = "import")]
+    if modelmill_reduction::plan_file_with(path, files).is_ok() {
+        return Some("a plan of a reduction");
+    }
+    None
 }

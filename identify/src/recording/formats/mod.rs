@@ -2,16 +2,25 @@
 //!
 //! To add one, write its [`Format`] in a file of its own and put it into [`FORMATS`].
 
+#[cfg(feature = "logs")]
 mod bag;
 mod csv;
+#[cfg(feature = "hdf5")]
 mod hdf5;
+#[cfg(not(all(feature = "parquet", feature = "hdf5", feature = "logs")))]
+mod left_out;
 mod matlab;
 mod matlab_arrays;
+#[cfg(feature = "logs")]
 mod mcap;
 mod packing;
+#[cfg(feature = "parquet")]
 mod parquet;
+#[cfg(feature = "parquet")]
 mod parquet_pages;
+#[cfg(feature = "logs")]
 mod rosbag;
+#[cfg(feature = "logs")]
 mod sqlite;
 
 use std::fs::File;
@@ -23,11 +32,23 @@ use crate::recording::{ReadOptions, Recording};
 
 /// All formats, in the order in which they are asked whether a file is theirs; text comes last and takes what is left.
 pub(crate) const FORMATS: [&dyn Format; 8] = [
+    #[cfg(feature = "parquet")]
     &parquet::Parquet,
+    #[cfg(not(feature = "parquet"))]
+    &left_out::PARQUET,
     &matlab::Matlab5,
+    #[cfg(feature = "hdf5")]
     &hdf5::Hdf5,
+    #[cfg(not(feature = "hdf5"))]
+    &left_out::HDF5,
+    #[cfg(feature = "logs")]
     &mcap::Mcap,
+    #[cfg(not(feature = "logs"))]
+    &left_out::MCAP,
+    #[cfg(feature = "logs")]
     &rosbag::Rosbag2,
+    #[cfg(not(feature = "logs"))]
+    &left_out::ROSBAG2,
     &packing::Packed(packing::Packing::Gzip),
     &packing::Packed(packing::Packing::Zstd),
     &csv::Csv,

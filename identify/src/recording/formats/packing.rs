@@ -35,7 +35,9 @@ pub(super) fn check_growth(packed: u64, unpacked: u64) -> io::Result<()> {
 pub(super) enum Packing {
     Gzip,
     Zstd,
+    #[cfg(feature = "parquet")]
     Brotli,
+    #[cfg(any(feature = "parquet", feature = "logs"))]
     Lz4,
 }
 
@@ -45,12 +47,15 @@ impl Packing {
         match self {
             Self::Gzip => Box::new(MultiGzDecoder::new(packed)),
             Self::Zstd => Box::new(Zstd::new(packed)),
+            #[cfg(feature = "parquet")]
             Self::Brotli => Box::new(brotli_decompressor::Decompressor::new(packed, 1 << 16)),
+            #[cfg(any(feature = "parquet", feature = "logs"))]
             Self::Lz4 => Box::new(lz4_flex::frame::FrameDecoder::new(packed)),
         }
     }
 
     /// Bytes unpacked; fails when they are more than `most`.
+    #[cfg(any(feature = "parquet", feature = "logs"))]
     pub(super) fn unpacked(self, packed: &[u8], most: u64) -> io::Result<Vec<u8>> {
         let mut bytes = Vec::new();
         self.reader(packed)
@@ -66,7 +71,9 @@ impl Packing {
         match self {
             Self::Gzip => "a file packed by gzip",
             Self::Zstd => "a file packed by zstd",
+            #[cfg(feature = "parquet")]
             Self::Brotli => "a file packed by brotli",
+            #[cfg(any(feature = "parquet", feature = "logs"))]
             Self::Lz4 => "a file packed by lz4",
         }
     }
@@ -247,7 +254,11 @@ impl Format for Packed {
                 first.starts_with(&[0x28, 0xB5, 0x2F, 0xFD])
                     || (first.len() > 3 && first[0] >> 4 == 5 && first[1..4] == [0x2A, 0x4D, 0x18])
             }
-            Packing::Brotli | Packing::Lz4 => false,
+            // Pages of Parquet and chunks of MCAP alone are packed so.
+            #[cfg(feature = "parquet")]
+            Packing::Brotli => false,
+            #[cfg(any(feature = "parquet", feature = "logs"))]
+            Packing::Lz4 => false,
         }
     }
 
