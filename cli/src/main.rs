@@ -72,6 +72,7 @@ fn run(host: &Host, command: &Command) -> Outcome {
         Command::Runs(args) => commands::runs::run(host, args),
         Command::Interpret(args) => commands::interpret::run(host, args),
         Command::Excite(args) => commands::excite::run(host, args),
+        #[cfg(feature = "experiment")]
         Command::Experiment(args) => commands::experiment::run(host, args),
         Command::Completions(args) => commands::completions::run(args),
         Command::Work(args) => commands::work::run(host, args),
