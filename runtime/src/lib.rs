@@ -13,6 +13,7 @@ mod model;
 mod numbers;
 #[cfg(feature = "rayon")]
 mod parallel;
+mod random;
 mod reactions;
 mod real;
 mod self_test;
@@ -34,6 +35,7 @@ pub use model::{
     accelerations, at, check_base, plainly, ready,
 };
 pub use numbers::{Angles, Numbers, One, Outputs, Results};
+pub use random::{RandomBits, scramble_bits};
 pub use reactions::{ClosedLoop, Joint, Wrench};
 pub use real::Real;
 pub use self_test::{Random, SelfTestError, ShowRows, self_test};

@@ -19,6 +19,7 @@ pub mod separate;
 
 use std::fmt;
 
+use modelmill_runtime::RandomBits;
 use nalgebra::DMatrix;
 
 pub use fourier::Series;
@@ -285,7 +286,7 @@ pub fn random_motions(
     }
     let measure = measure::Measure::new(plant, limits, options);
     let mut motions = Vec::new();
-    let mut draws = random::Draws(options.seed);
+    let mut draws = RandomBits::new(options.seed);
     random::feasible_ones(&measure, &mut draws, wanted, |series| {
         motions.push(measure.motion(&series));
         Flow::Continue(())
