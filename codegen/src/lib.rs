@@ -1,12 +1,13 @@
-//! From a mechanism to its base parameters and fast code: the mill itself.
+//! From a mechanism to its base parameters, equations and straight-line programs: the mill itself. `modelmill-emit` writes code
+//! of them.
 
 mod derive;
-mod emit;
 mod error;
 mod evaluate;
 pub mod expr;
 mod loops;
 mod lower;
+pub mod names;
 mod newton_euler;
 mod on_request;
 mod programs;
@@ -16,19 +17,16 @@ pub mod review;
 mod tree;
 
 pub use derive::base::BaseParameter;
-pub use derive::{Derivation, derive_columns};
-pub use emit::{
-    Emitted, EmittedFile, Form, LANGUAGES, Language, Source, emit, emit_with_dynamics, module_name,
-    vectors_c,
-};
+pub use derive::{BaseFormulas, Derivation, derive_columns};
 pub use error::DeriveError;
 pub use evaluate::{Evaluator, PoseFault, PoseReason, States};
-pub use lower::{Guard, Op, OperationCount, Program, Stage, ValueId};
+pub use lower::{Guard, Op, OperationCount, Program, SINGULAR, Stage, ValueId};
 pub use modelmill_algebra::field;
 pub use on_request::dynamics::Dynamics;
 pub use on_request::passes::PassCount;
 pub use on_request::reactions::{JointReaction, LoopReaction, Reactions};
 pub use programs::{LoopPrograms, PassivePosition, Programs};
+pub use reduce::base::BaseDenominator;
 pub use reduce::{Dependency, Method, Polynomial, Powers, RationalFunction, Reduction, Variable};
 pub use tree::expressions::Monomial;
 

@@ -2,16 +2,16 @@
 
 use std::fmt;
 
-use modelmill_codegen::{Form, LANGUAGES, Source};
+use modelmill_emit::{Form, LANGUAGES, Source};
 
 use crate::error::{Error, Outcome};
 use crate::model::Model;
 
-pub use modelmill_codegen::{EmittedFile, Form as LanguageForm};
+pub use modelmill_emit::{EmittedFile, Form as LanguageForm};
 
 /// A language that models are emitted for: an entry of [`Self::all`], the first of which is the default.
 #[derive(Clone, Copy)]
-pub struct Language(&'static dyn modelmill_codegen::Language);
+pub struct Language(&'static dyn modelmill_emit::Language);
 
 impl Language {
     /// All languages.

@@ -4,7 +4,8 @@
 use std::ops::Range;
 use std::sync::OnceLock;
 
-use modelmill_codegen::{Dynamics, Evaluator, PoseFault, PoseReason, Reactions, States, vectors_c};
+use modelmill_codegen::{Dynamics, Evaluator, PoseFault, PoseReason, Reactions, States};
+use modelmill_emit::vectors_c;
 use rayon::prelude::*;
 
 use crate::error::{Error, Outcome};

@@ -11,8 +11,7 @@ mod share;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use program::SINGULAR;
-pub use program::{Guard, Op, OperationCount, Program, Stage, ValueId};
+pub use program::{Guard, Op, OperationCount, Program, SINGULAR, Stage, ValueId};
 pub(crate) use schedule::{By, Definition};
 
 use crate::expr::{ExprId, Graph};

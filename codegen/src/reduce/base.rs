@@ -78,16 +78,18 @@ pub(crate) fn lumped(mechanism: &Mechanism, reduction: &Reduction, line: usize) 
 }
 
 /// What base parameters divide by: a function of the constants that may vanish.
-pub(crate) struct Denominator {
-    pub(crate) value: Formula,
+#[derive(Clone, Debug)]
+pub struct BaseDenominator {
+    /// The function.
+    pub value: Formula,
     /// The sum of the magnitudes of its terms, sines and cosines taken as 1.
-    pub(crate) size: Formula,
+    pub size: Formula,
     /// As people read it.
-    pub(crate) text: String,
+    pub text: String,
 }
 
 /// Every denominator of eq. (16), powers of a constant by the constant itself.
-pub(crate) fn denominators(mechanism: &Mechanism, reduction: &Reduction) -> Vec<Denominator> {
+pub(crate) fn denominators(mechanism: &Mechanism, reduction: &Reduction) -> Vec<BaseDenominator> {
     let mut found: BTreeSet<Polynomial> = BTreeSet::new();
     let lines = reduction.dependencies.iter();
     for (_, factor) in lines.flat_map(|line| line.equals.iter().chain(&line.via)) {
@@ -100,7 +102,7 @@ pub(crate) fn denominators(mechanism: &Mechanism, reduction: &Reduction) -> Vec<
         found.extend(variables.map(|v| Polynomial::from([(vec![(v, 1)], Rational::ONE)])));
     }
     let one = || Polynomial::from([(Vec::new(), Rational::ONE)]);
-    let denominator = |p: Polynomial| Denominator {
+    let denominator = |p: Polynomial| BaseDenominator {
         size: Formula::sum(p.iter().map(|(powers, k)| {
             let magnitude = |v: Variable| match v {
                 Variable::Cos(_) | Variable::Sin(_) => None,

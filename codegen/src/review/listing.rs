@@ -5,10 +5,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use modelmill_spec::Mechanism;
 
 use super::document::Equation;
-use crate::emit::tree::names::Meaning;
 use crate::expr::Rational;
 use crate::expr::print::{Formula, Function, Symbol, atom};
 use crate::lower::{Op, Program, Stage};
+use crate::names::Meaning;
 
 /// Equations of a program.
 pub(super) struct Listing {

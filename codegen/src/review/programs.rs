@@ -6,9 +6,9 @@ use modelmill_spec::{Drive, DriveKind};
 
 use super::document::{Block, Document, Equation, Line, Table, cell, name, text};
 use super::listing::{self, Listing};
-use crate::emit::tree::names::{Meaning, Meanings, reserved};
 use crate::expr::print::{Formula, Symbol};
 use crate::lower::{OperationCount, Program, Stage};
+use crate::names::{Meaning, Meanings, reserved};
 use crate::reduce::base::name as base_name;
 use crate::{Derivation, PassivePosition};
 

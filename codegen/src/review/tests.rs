@@ -7,11 +7,11 @@ use std::path::PathBuf;
 use modelmill_spec::Mechanism;
 
 use super::{Equations, Format, NumericRank, base_expression, base_grouped, page, programs};
-use crate::emit::tree::names::{Meanings, run};
 use crate::expr::Atom;
 use crate::expr::print::parse::parse;
 use crate::expr::print::tests::{latex_is_balanced, markup_is_balanced};
 use crate::expr::print::{Formula, atom};
+use crate::names::Meanings;
 use crate::{Derivation, derive};
 
 const MODELS: [&str; 8] = [
@@ -150,7 +150,7 @@ fn listed_programs_compute_what_the_programs_compute() {
                 let before = known.insert(left.text(), value);
                 assert_eq!(before, None, "{name}, {title}: {} twice", left.text());
             }
-            let expected = run(program, &meanings.atoms);
+            let expected = meanings.values(program);
             for (symbol, value) in outputs.iter().zip(&program.outputs) {
                 let found = known[&symbol.text()];
                 assert_close(found, expected[value.index()], &symbol.text());
@@ -177,7 +177,7 @@ fn named_values_are_what_they_are_called() {
     ] {
         assert!(lines.contains(wanted), "{wanted} in {lines:?}");
     }
-    let values = run(program, &meanings.atoms);
+    let values = meanings.values(program);
     let rate = |i: usize| meanings.atoms[&Atom::Rate(i)];
     let names = meanings.of(program);
     let (at, meaning) = names

@@ -2,7 +2,8 @@
 
 use modelmill_boundary::text::plain;
 use modelmill_codegen::review::NumericMethod;
-use modelmill_codegen::{Derivation, Method, Reduction, module_name};
+use modelmill_codegen::{Derivation, Method, Reduction};
+use modelmill_emit::module_name;
 use modelmill_spec::{
     Diagnostic, DriveKind, Failure, Loaded, Mechanism, Motion, Severity, Sources,
 };

@@ -4,7 +4,8 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use modelmill_codegen::{Derivation, LANGUAGES, Source};
+use modelmill_codegen::Derivation;
+use modelmill_emit::{LANGUAGES, Source};
 
 use crate::models::{Motion, STATES};
 
