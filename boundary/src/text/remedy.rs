@@ -26,13 +26,13 @@ macro_rules! names {
 names! {
     /// Options that messages advise. A front end that has no such option does not compile or fails a test of its own.
     OptionName {
-        /// Effects beside which others are told apart.
+        /// Effects that are present in either case, while others are distinguished.
         Beside => "beside",
         /// Which part of a recording is read, by its times.
         Between => "between",
-        /// Recordings that a fit does not see.
+        /// Validation runs, which a fit does not use.
         Check => "check",
-        /// Which column of a recording is which of ours.
+        /// Maps columns of a recording to names of the model.
         Columns => "columns",
         /// Cut-off of the low-pass on positions.
         CutoffHz => "cutoff_hz",
@@ -40,11 +40,11 @@ names! {
         Data => "data",
         /// Keeps every n-th sample.
         Decimate => "decimate",
-        /// Drops parameters that a recording does not need.
+        /// Removes parameters that a recording does not determine.
         Essential => "essential",
-        /// Effects from which one is told apart.
+        /// Effects that one effect may be confused with.
         From => "from",
-        /// Holds parameters at their nominal values.
+        /// Fixes parameters at their nominal values.
         Held => "held",
         /// Recordings that serve as instruments.
         Instruments => "instruments",
@@ -58,39 +58,39 @@ names! {
         Noise => "noise",
         /// Order of the low-pass.
         Order => "order",
-        /// Where a result goes.
+        /// The file that a result is written to.
         Out => "out",
         /// Values of the base parameters.
         Parameters => "parameters",
         /// Period of a motion.
         Period => "period",
-        /// Parameters that bodies can have.
+        /// Restricts parameters to bodies that are physically possible.
         Physical => "physical",
         /// A picture of the mechanism.
         Picture => "picture",
         /// The plan of a reduction.
         Plan => "plan",
-        /// Nominal values that count as measurements.
+        /// Uses nominal values as measurements with a standard deviation.
         Prior => "prior",
         /// Samples per second.
         Rate => "rate",
-        /// Weights that bound outliers.
+        /// Reduces the weight of outliers (Huber).
         Robust => "robust",
-        /// Takes angles next to whole parts of a turn for these.
+        /// Rounds angles that nearly are whole fractions of a revolution.
         RoundAngles => "round_angles",
-        /// An effect that a motion tells apart from others.
+        /// An effect that a planned motion distinguishes from others.
         Separate => "separate",
-        /// Leaves out samples that hold no number.
+        /// Skips samples with missing or non-finite values.
         SkipBadSamples => "skip_bad_samples",
         /// How positions are smoothed.
         Smoothing => "smoothing",
-        /// Where rates and accelerations come from.
+        /// The source of rates and accelerations: columns or differentiated positions.
         Source => "source",
-        /// Leaves out equations of drives that stand still.
+        /// Excludes equations of drives at standstill.
         Standstill => "standstill",
-        /// Samples dropped at both ends.
+        /// Numbers of samples removed at the start and at the end.
         Trim => "trim",
-        /// Parameters that are solved for.
+        /// Physical parameters that are computed from base parameters.
         Unknown => "unknown",
         /// Weights of equations.
         Weights => "weights",
@@ -102,11 +102,11 @@ names! {
     CommandName {
         /// Writes a fit into a model file.
         Adopt => "adopt",
-        /// Says whether a model is sound.
+        /// Validates a model file.
         Check => "check",
-        /// Says what a model lacks.
+        /// Reports which effects a model lacks.
         Diagnose => "diagnose",
-        /// Forces of a model along a motion.
+        /// Computes the forces of a model along a motion.
         Evaluate => "evaluate",
         /// Plans a motion.
         Excite => "excite",
@@ -134,7 +134,7 @@ impl OptionSetting {
     }
 }
 
-/// What a reader is advised to do.
+/// One piece of advice to a reader.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Remedy {
     /// Options to be given together, or left out.
