@@ -7,7 +7,9 @@ use modelmill_algebra::field::{FieldElement, MODULUS, PRIMES, RandomStream};
 use modelmill_algebra::lift::reconstruct_rational;
 
 use super::oracle::{ConstantOccurrence, PrimeFieldOracle};
-use super::rational_function::{FactorVariable, PowerProduct, RationalFunction, TrigonometricPolynomial, monomial_value};
+use super::rational_function::{
+    FactorVariable, PowerProduct, RationalFunction, TrigonometricPolynomial, monomial_value,
+};
 use super::support::{PartialSamples, support};
 use crate::DeriveError;
 use crate::expr::{FieldPoint, Rational};

@@ -104,7 +104,8 @@ impl<O: PrimeFieldOracle> DependenceSurvey<O> {
             let function = shapes[*k].fit_function(
                 &mut self.fields,
                 &mut self.partial,
-                oracle, *k,
+                oracle,
+                *k,
                 &self.roots,
                 stream,
             )?;
