@@ -2,10 +2,6 @@
 //! a gear yields or an encoder has another zero. Forces are those of a model file that has the body or the length; errors of
 //! encoders are put into the recorded positions.
 
-mod draws;
-#[allow(dead_code, reason = "other tests do more to runs")]
-mod made;
-
 use std::path::Path;
 
 use modelmill::Model;
@@ -15,7 +11,7 @@ use modelmill::diagnose::{
 use modelmill::identify::EstimatorOptions;
 use modelmill::recording::RecordingOptions;
 
-use made::{Made, bundled, run, run_of};
+use crate::made::{Made, bundled, run, run_of};
 
 const ARM: &str = "puma560";
 

@@ -2,8 +2,6 @@
 //! simulated under forces of the drives alone, recorded as poses and forces without columns for what nothing drives, and
 //! identified again.
 
-mod draws;
-
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -15,7 +13,7 @@ use modelmill::variants::VariantComparison;
 use modelmill_codegen::{DynamicsPrograms, ModelEvaluator, MotionStates};
 use modelmill_spec::{FrameStep, FreeBody, TwistAxes};
 
-use draws::Draws;
+use crate::draws::Draws;
 
 const PENDUBOT: &str = r#"
 schema = 1

@@ -1,11 +1,7 @@
 //! Machines that hang upside down beside their model: the forces of bundled models, recorded with friction, are held against the
 //! same models with gravity turned round, and against themselves.
 
-mod draws;
-#[allow(dead_code, reason = "other tests do more to runs")]
-mod made;
-
-use made::{Made, bundled, run_of};
+use crate::made::{Made, bundled, run_of};
 use modelmill::Model;
 use modelmill::recording::RecordingOptions;
 

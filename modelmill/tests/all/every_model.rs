@@ -1,8 +1,6 @@
 //! Every bundled model on its own forces with noise: `compare`, `identify` and `diagnose` go through, and say what is
 //! true of such a recording. Only the noise is missing from the model, so that nothing else may be found.
 
-mod draws;
-
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -15,7 +13,7 @@ use modelmill_codegen::{Derivation, ModelEvaluator, MotionStates};
 use modelmill_identify::ErrorFigures;
 use modelmill_spec::Mechanism;
 
-use draws::Draws;
+use crate::draws::Draws;
 
 /// Noise of each force beside its root mean square.
 const NOISE: f64 = 0.01;

@@ -3,6 +3,7 @@
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
 use std::ops::Range;
+use std::panic::Location;
 use std::path::{Path, PathBuf};
 
 use modelmill::Model;
@@ -49,6 +50,7 @@ pub(crate) enum Made<'a> {
 }
 
 /// A recording of a bundled model's positions and forces, along a motion of its own.
+#[track_caller]
 pub(crate) fn run(name: &str, seed: u64, made: Made) -> PathBuf {
     let model = match made {
         Made::Body(part) | Made::BodyAndFriction(part, ..) | Made::BodyAndScales(part, _) => {
@@ -120,6 +122,7 @@ fn read_more(made: Made, joint: usize, carried: &[Vec<f64>], sample: usize) -> f
 }
 
 /// A recording of a model that is derived already.
+#[track_caller]
 pub(crate) fn run_of(model: &Model, name: &str, seed: u64, made: Made) -> PathBuf {
     let mut draws = Draws(seed);
     let active = model.active_coordinates();
@@ -214,7 +217,11 @@ pub(crate) fn run_of(model: &Model, name: &str, seed: u64, made: Made) -> PathBu
             let _ = write!(text, ",{}", if is_lost { f64::NAN } else { force[k] });
         }
     }
-    let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("runs-{name}-{seed}.csv"));
+    // Modules use the same seeds, and their tests run at the same time.
+    let module = Path::new(Location::caller().file()).file_stem();
+    let module = module.expect("a file").to_string_lossy();
+    let file = format!("{module}-{name}-{seed}.csv");
+    let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join(file);
     std::fs::write(&file, text + "\n").expect("a recording");
     file
 }

@@ -1,11 +1,7 @@
 //! Pushes on bundled arms, as the weight of a body that is there for a while: told as events with their times and drives, and left
 //! out on request; nothing is told where nothing happened.
 
-mod draws;
-#[allow(dead_code, reason = "other tests do more to runs")]
-mod made;
-
-use made::{Made, STEP, bundled, run_of, with_part};
+use crate::made::{Made, STEP, bundled, run_of, with_part};
 use modelmill::Model;
 use modelmill::identify::EstimatorOptions;
 use modelmill::recording::RecordingOptions;

@@ -1,10 +1,6 @@
 //! `runs` on forces of models with a further body, other friction, another scale and another clock, along motions of their own,
 //! with noise that has a memory: what changed is told as such, and nothing else.
 
-mod draws;
-#[allow(dead_code, reason = "other tests do more to runs")]
-mod made;
-
 use std::path::PathBuf;
 
 use modelmill::Model;
@@ -15,7 +11,7 @@ use modelmill::runs::{
     RunsOptions, UnreadRun,
 };
 
-use made::{Made, bundled, run};
+use crate::made::{Made, bundled, run};
 
 /// What is told of a run against one to which nothing was done.
 fn told(name: &str, seed: u64, made: Made) -> Vec<RunChange> {
