@@ -16,6 +16,7 @@ mod fixture_models {
 mod awkward_mechanisms;
 mod benchmark_page;
 mod blocks;
+mod build_graph;
 mod couplings;
 mod dynamics;
 mod effects;
