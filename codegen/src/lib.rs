@@ -15,6 +15,7 @@ mod on_request;
 mod programs;
 mod reduce;
 mod regressor;
+#[cfg(any(test, feature = "review"))]
 pub mod review;
 mod tree;
 

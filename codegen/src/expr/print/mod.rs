@@ -21,6 +21,7 @@ pub(crate) mod tests;
 
 pub use formula::{FormulaFunction, PrintedFormula};
 pub use from_exact::{angle_formula, exact_formula, exact_formula_at, length_formula};
+#[cfg(any(test, feature = "review"))]
 pub(crate) use from_graph::angle_sum_formula;
 pub use from_graph::{atom, formula, tree_size};
 pub use symbol::FormulaSymbol;
