@@ -3,14 +3,14 @@
 //!
 //! The crate takes numbers and knows nothing of how a regressor is made. The pipeline:
 //!
-//! 1. [`Recording::read`] - CSV, Parquet, MATLAB, HDF5, MCAP or rosbag2 into named columns; every fault has its line and its remedy.
-//! 2. [`Recording::runs_with`] - coordinates with derivatives and forces, as a [`Run`] for each stretch between gaps in time;
+//! 1. [`SignalRecording::read`] - CSV, Parquet, MATLAB, HDF5, MCAP or rosbag2 into named columns; every fault has its line and its remedy.
+//! 2. [`SignalRecording::runs_with`] - coordinates with derivatives and forces, as a [`PreparedRun`] for each stretch between gaps in time;
 //!    the caller evaluates its regressor along it, rows interleaved per sample (`row = sample * n_channels + channel`), and
 //!    applies [`decimate_table`] to regressor and force where the run asks for it.
-//! 3. [`Recording::suspicions`] and [`ForceAudit`] - what looks wrong with them.
+//! 3. [`SignalRecording::suspicious_columns`] and [`ForceAudit`] - what looks wrong with them.
 //! 4. [`estimate`] - eq. (12) from a stream of rows ([`LeastSquares`]), weighted, robust, with instruments or nominal values,
 //!    and what the result is worth.
-//! 5. [`Comparison`] and [`locate`] - how far the model is off, and where; [`FitFile`] - the result on disk and back.
+//! 5. [`ErrorAccumulator`] and [`locate_errors`] - how far the model is off, and where; [`FitFile`] - the result on disk and back.
 //!
 //! Beside it, [`diagnose`]: which effects the recording needs; [`excite`]: the motion that tells base parameters apart best,
 //! within limits; and [`interpret`]: physical parameters from identified base parameters, all real solutions.

@@ -18,7 +18,7 @@ const LONGEST_PRINTED_LINE: usize = 400;
 /// A stretch of bytes in one of the files read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct SourceSpan {
-    /// Index into [`Sources::files`].
+    /// Index into [`SourceFiles::files`].
     pub file: usize,
     /// First byte.
     pub start: usize,

@@ -31,7 +31,7 @@ pub(crate) struct FormulaAst {
     pub(crate) kind: FormulaAstKind,
 }
 
-/// Shape of a node; see [`crate::Exact`].
+/// Shape of a node; see [`crate::ExactExpression`].
 #[derive(Clone, Debug)]
 pub(crate) enum FormulaAstKind {
     Rational(BigRational),

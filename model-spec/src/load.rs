@@ -48,7 +48,7 @@ impl LoadedModel {
         self.render_spelled(color, &LibrarySpelling)
     }
 
-    /// [`Loaded::render`] with advice in the words of whoever reads it.
+    /// [`LoadedModel::render`] with advice in the words of whoever reads it.
     pub fn render_spelled(&self, color: bool, spelling: &dyn RemedySpelling) -> String {
         if self.warnings.is_empty() {
             return String::new();
@@ -72,7 +72,7 @@ impl LoadFailure {
         self.render_spelled(color, &LibrarySpelling)
     }
 
-    /// [`Failure::render`] with advice in the words of whoever reads it.
+    /// [`LoadFailure::render`] with advice in the words of whoever reads it.
     pub fn render_spelled(&self, color: bool, spelling: &dyn RemedySpelling) -> String {
         diagnostic::render(&self.diagnostics, &self.sources, color, spelling)
     }

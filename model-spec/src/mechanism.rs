@@ -69,7 +69,7 @@ pub struct Mechanism {
     pub identified_base: Vec<(String, f64)>,
     /// How recordings name their columns: ours to theirs.
     pub recording: RecordingColumns,
-    /// Whether constants of the file were replaced by their values, see [`Mechanism::at_values`].
+    /// Whether constants of the file were replaced by their values, see [`Mechanism::with_numeric_constants`].
     pub is_at_values: bool,
 }
 

@@ -1,6 +1,6 @@
 //! The names that an expression may use, with their meanings and dimensions.
 //!
-//! A parsed expression and a scope go in, an [`Exact`] comes out; every unknown name and every clash
+//! A parsed expression and a scope go in, an [`ExactExpression`] comes out; every unknown name and every clash
 //! of units in it is reported.
 
 use std::cell::Cell;

@@ -3,7 +3,7 @@
 //! - An ordinary file is read up to the cap.
 //! - Standard input and pipes that were handed over by a shell (`/dev/stdin`, `<(zcat run.csv.gz)`) are read up to the
 //!   cap; whoever writes is waited for, since the shell started it together with us.
-//! - A named pipe is waited for as long as [`Disk::patience`] says, at its opening and between its bytes: there may be
+//! - A named pipe is waited for as long as [`DiskFiles::patience`] says, at its opening and between its bytes: there may be
 //!   nobody at its other end.
 //! - Devices and sockets are refused, unless one is standard input.
 

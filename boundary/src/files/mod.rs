@@ -30,12 +30,12 @@ pub trait FileSource: Send + Sync {
     }
 
     /// A file that may be longer than memory, to be read from any place; what can be read only once, such as a pipe, is
-    /// read up to `most` bytes. Fails as [`Files::read`] does.
+    /// read up to `most` bytes. Fails as [`FileSource::read`] does.
     fn open(&self, path: &Path, most: u64) -> Result<OpenFile, FileError> {
         Ok(OpenFile::Memory(self.read(path, most)?.into()))
     }
 
-    /// All text of a file; fails as [`Files::read`] does, and when its bytes are no UTF-8.
+    /// All text of a file; fails as [`FileSource::read`] does, and when its bytes are no UTF-8.
     fn read_text(&self, path: &Path, most: u64) -> Result<String, FileError> {
         String::from_utf8(self.read(path, most)?).map_err(|error| {
             let at = error.utf8_error().valid_up_to();

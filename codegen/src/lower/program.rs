@@ -12,7 +12,7 @@ use crate::expr::{Atom, Rational, Unary};
 pub struct ValueId(pub(crate) u32);
 
 impl ValueId {
-    /// Position of its operation in [`Program::ops`].
+    /// Position of its operation in [`StraightLineProgram::ops`].
     pub fn index(self) -> usize {
         self.0 as usize
     }

@@ -4,7 +4,7 @@
 //!
 //! Source: the field's standard procedure, e.g. M. Gautier, "Numerical calculation of the base
 //! inertial parameters of robots", and A. Janot, M. Gautier and M. Brunot, "Data set and
-//! reference models of EMPS" (2019), whose recipe is [`Preparation::emps`].
+//! reference models of EMPS" (2019), whose recipe is [`StatePreparation::emps`].
 //! Which cut-off: [`crate::motion::cutoff`]. Periodic motions have a better way: [`crate::motion::series`].
 
 use crate::signal::{FilterError, LowPass};

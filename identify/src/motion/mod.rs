@@ -1,4 +1,4 @@
-//! From recorded columns to states: positions go in; smooth positions, rates and accelerations come out, as a [`Run`] with
+//! From recorded columns to states: positions go in; smooth positions, rates and accelerations come out, as a [`PreparedRun`] with
 //! its forces.
 
 mod band;

@@ -32,7 +32,7 @@ pub enum SmoothingMethod {
     },
 }
 
-/// How states are prepared from a recording. [`Preparation::default`] suits a file of positions.
+/// How states are prepared from a recording. [`StatePreparation::default`] suits a file of positions.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct StatePreparation {

@@ -227,7 +227,7 @@ pub struct PreparationChoices {
 impl SignalRecording {
     /// What there is to choose where the preparation leaves cut-off, smoothing and decimation open; `None` where it does not,
     /// where all derivatives are recorded, where a Fourier series leaves nothing but noise, and where nothing moves.
-    /// Fails as [`Recording::runs_with`] does.
+    /// Fails as [`SignalRecording::runs_with`] does.
     pub fn find_open_choices(
         &self,
         coordinates: &[String],

@@ -43,7 +43,7 @@ pub struct PreparedRun {
     /// `qdd[coordinate][sample]`, rad/s^2 or m/s^2.
     pub qdd: Vec<Vec<f64>>,
     /// `force[drive][sample]`, N or N m, in the order of the drives that were asked for; `None`
-    /// when the file lacks the force of any drive. See [`Run::measured`].
+    /// when the file lacks the force of any drive. See [`PreparedRun::measured`].
     pub force: Option<Vec<Vec<f64>>>,
     /// Drives whose force the file lacks.
     pub missing_force: Vec<String>,
@@ -62,7 +62,7 @@ pub struct PreparedRun {
 
 impl SignalRecording {
     /// States of the given coordinates and forces of the given drives, with the default
-    /// [`Preparation`]: columns `t`, `NAME`, `NAME_d`, `NAME_dd` and the drive's name.
+    /// [`StatePreparation`]: columns `t`, `NAME`, `NAME_d`, `NAME_dd` and the drive's name.
     pub fn states(
         &self,
         coordinates: &[String],
@@ -71,7 +71,7 @@ impl SignalRecording {
         self.states_with(coordinates, drives, &StatePreparation::default())
     }
 
-    /// [`Recording::states_with`] for each stretch between gaps in time, so that no filter and no difference reaches
+    /// [`SignalRecording::states_with`] for each stretch between gaps in time, so that no filter and no difference reaches
     /// across a gap. Stretches that are too short to be prepared are left out, which the notes say; where nothing is
     /// to be filtered the recording stays whole.
     pub fn runs_with(
@@ -187,7 +187,7 @@ impl SignalRecording {
         Ok(runs)
     }
 
-    /// [`Recording::states`] with another preparation.
+    /// [`SignalRecording::states`] with another preparation.
     ///
     /// Fails when a column is missing or unusable, when time does not increase, or when the
     /// recording is too short for the filter.

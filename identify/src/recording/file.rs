@@ -91,7 +91,7 @@ impl RecordingFile {
         )
     }
 
-    /// Reads it; fails as [`Recording::read`] does.
+    /// Reads it; fails as [`SignalRecording::read`] does.
     pub fn read(&self, options: &ReadOptions) -> Result<SignalRecording, RecordingError> {
         self.dispatch_to_source(
             |format, input| format.read(input, &self.name, options),

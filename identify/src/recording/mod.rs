@@ -1,8 +1,8 @@
 //! Recordings: a file of any format of the list in `formats` goes in, named columns of numbers come out.
 //!
 //! A column that holds something else than numbers harms only those who ask for it: it is named in
-//! the notes, and [`Recording::column`] refuses it with the line at fault.
-//! [`Recording::states`](crate::recording::Recording::states) makes a [`Run`](crate::Run) of it.
+//! the notes, and [`SignalRecording::column`] refuses it with the line at fault.
+//! [`SignalRecording::states`](crate::recording::Recording::states) makes a [`PreparedRun`](crate::Run) of it.
 
 mod column;
 mod error;
@@ -107,7 +107,7 @@ impl SignalRecording {
         Ok(&column.values)
     }
 
-    /// The numbers of a column, as [`Recording::column`]; columns of the names `wanted` are not proposed for it.
+    /// The numbers of a column, as [`SignalRecording::column`]; columns of the names `wanted` are not proposed for it.
     pub(crate) fn column_without_suggesting(
         &self,
         name: &str,

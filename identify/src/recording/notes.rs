@@ -4,7 +4,7 @@
 use modelmill_boundary::text::{Message, RemedySpelling};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// How much a [`Note`] matters.
+/// How much a [`RecordingNote`] matters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum NoteSeverity {

@@ -1,4 +1,4 @@
-//! From a file, bytes or a stream to a [`Recording`], whatever the format.
+//! From a file, bytes or a stream to a [`SignalRecording`], whatever the format.
 
 use std::io::Read;
 use std::path::Path;
@@ -16,7 +16,7 @@ impl SignalRecording {
     /// Every other format is told from CSV text by its first bytes.
     ///
     /// Fails when the file cannot be read, is empty, has no header, duplicate or missing names,
-    /// lines of unequal length, or more numbers than [`ReadOptions::most_numbers`].
+    /// lines of unequal length, or more numbers than [`ReadOptions::max_numbers`].
     pub fn read(path: impl AsRef<Path>, renames: &[(&str, &str)]) -> Result<Self, RecordingError> {
         let renames = renames
             .iter()
@@ -31,7 +31,7 @@ impl SignalRecording {
         )
     }
 
-    /// [`Recording::read`] with all options.
+    /// [`SignalRecording::read`] with all options.
     pub fn read_with(
         path: impl AsRef<Path>,
         options: &ReadOptions,
@@ -44,7 +44,7 @@ impl SignalRecording {
         RecordingFile::open(&DiskFiles::default(), path.as_ref())?.names()
     }
 
-    /// [`Recording::read_with`] of a file that is in memory; `file` is what messages call it.
+    /// [`SignalRecording::read_with`] of a file that is in memory; `file` is what messages call it.
     pub fn from_bytes(
         bytes: &[u8],
         file: &str,
@@ -57,7 +57,7 @@ impl SignalRecording {
         })
     }
 
-    /// [`Recording::names_in`] of a file that is in memory.
+    /// [`SignalRecording::names_in`] of a file that is in memory.
     pub fn names_in_bytes(bytes: &[u8], file: &str) -> Result<Vec<String>, RecordingError> {
         let names = format_of(bytes).names(RecordingInput::Bytes(bytes));
         names.map_err(|fault| RecordingError {
@@ -102,7 +102,7 @@ pub fn has_recording_extension(path: &Path) -> bool {
         .is_some_and(|extension| endings.any(|ending| extension.eq_ignore_ascii_case(ending)))
 }
 
-/// What a sample of a file, or of bytes that [`name_of_bytes`] names, stands in: text has lines, tables have rows.
+/// What a sample of a file, or of bytes that [`display_name_of_bytes`] names, stands in: text has lines, tables have rows.
 pub fn sample_place_word(file: &str) -> &'static str {
     let extension = Path::new(file).extension();
     let is_of = |format: &dyn RecordingFormat| {

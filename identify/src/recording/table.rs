@@ -34,7 +34,7 @@ impl MemoryTable {
         self.0.iter().map(|(name, _)| name.clone()).collect()
     }
 
-    /// Reads it; fails as [`Recording::read`] does.
+    /// Reads it; fails as [`SignalRecording::read`] does.
     pub(crate) fn read(
         &self,
         file: &str,

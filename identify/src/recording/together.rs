@@ -71,7 +71,7 @@ impl RecordingFiles {
 
     /// Reads them; the column `t` of each file, or the one that stands for it, joins them.
     ///
-    /// Fails as [`Recording::read`] does, when two files have a column that is needed, when a sum of columns takes them
+    /// Fails as [`SignalRecording::read`] does, when two files have a column that is needed, when a sum of columns takes them
     /// from several files, and when the files have no time in common.
     pub fn read(&self, options: &ReadOptions) -> Result<SignalRecording, RecordingError> {
         if let [file] = self.files.as_slice() {

@@ -1,6 +1,6 @@
 //! What effects do that no expression at their place can say: one enum, and one file for each of its variants.
 //!
-//! Whatever model files, pages and the diagnosis ask of one is answered by its [`Entry`]. The generalised forces of those
+//! Whatever model files, pages and the diagnosis ask of one is answered by its [`MechanicsEntry`]. The generalised forces of those
 //! that have some are in `regressor/mechanics` of `modelmill-codegen`.
 //!
 //! Decision: an effect is an expression at a place wherever an expression can state it. Only effects that act on

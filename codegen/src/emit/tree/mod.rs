@@ -1,6 +1,6 @@
 //! The statement tree: a lowered program with names and sections, as every language prints it.
 //!
-//! A [`Program`] goes in, a [`Routine`] comes out: what is computed once, and what is computed at every state. Values that are
+//! A [`StraightLineProgram`] goes in, a [`StatementRoutine`] comes out: what is computed once, and what is computed at every state. Values that are
 //! used once stand inside the formula that uses them, values with a meaning carry its name, the others are numbered: `k1`
 //! is computed once, `x1` at every state.
 

@@ -2,7 +2,7 @@
 //!
 //! Compilers keep close to the order of what they are given. The order in which expressions were made computes all
 //! velocities before the first force, so that more values wait than a machine has registers, and each that waits is stored
-//! and loaded again. Here, while less than [`REGISTERS`] wait, the operation comes first that the longest chain of others
+//! and loaded again. Here, while less than [`MOST_WAITING_VALUES`] wait, the operation comes first that the longest chain of others
 //! waits for, so that independent ones stand side by side; else the one that leaves the fewest.
 //!
 //! Decision: this is a list schedule. Without it, blocks of the Panda's regressor spend more time on storing values

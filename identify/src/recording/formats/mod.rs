@@ -58,7 +58,7 @@ pub(crate) trait RecordingFormat: Sync {
         false
     }
 
-    /// Whether a file that begins with these bytes, [`TELLING_BYTES`] of them if it has as many, is of this kind.
+    /// Whether a file that begins with these bytes, [`SIGNATURE_BYTES`] of them if it has as many, is of this kind.
     fn has_signature(&self, first: &[u8]) -> bool;
 
     /// Reads a recording; `file` is what messages call it.

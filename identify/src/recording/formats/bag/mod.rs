@@ -117,7 +117,7 @@ impl<'a> BagCollector<'a> {
         }
     }
 
-    /// A topic, to which [`Bag::message`] refers by the number that comes back.
+    /// A topic, to which [`BagCollector::message`] refers by the number that comes back.
     pub(super) fn register_topic(
         &mut self,
         name: &str,
@@ -334,7 +334,7 @@ impl BagTopic {
     }
 }
 
-/// Shows all messages of a log to a [`Bag`].
+/// Shows all messages of a log to a [`BagCollector`].
 pub(super) type BagReplay<'a> =
     &'a mut dyn FnMut(&mut BagCollector<'_>) -> Result<(), RecordingFault>;
 
