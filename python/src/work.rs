@@ -9,7 +9,7 @@ use std::thread;
 use std::time::Duration;
 
 use modelmill::Outcome;
-use modelmill::progress::{Job, Progress};
+use modelmill::progress::{JobHandle, ProgressListener};
 use pyo3::prelude::*;
 
 use crate::errors::{library_error, input_error};
@@ -23,12 +23,12 @@ pub(crate) struct JobListener(Mutex<ListenerState>);
 
 #[derive(Default)]
 struct ListenerState {
-    jobs: Vec<(String, usize, Arc<Job>)>,
+    jobs: Vec<(String, usize, Arc<JobHandle>)>,
     stops: bool,
 }
 
-impl Progress for JobListener {
-    fn begins(&self, what: &str, total: usize, job: &Arc<Job>) {
+impl ProgressListener for JobListener {
+    fn begins(&self, what: &str, total: usize, job: &Arc<JobHandle>) {
         let mut heard = self.lock_state();
         if heard.stops {
             job.cancel();
