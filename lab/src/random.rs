@@ -1,30 +1,24 @@
-//! Random numbers that are the same on every machine: integers, roots and the pure-Rust `libm` only.
+//! Random numbers of cases, the same on every machine.
 
-/// A stream of random numbers: `SplitMix64` (G. Steele, D. Lea, C. Flood 2014).
-pub struct CaseRandom(u64);
+use modelmill_runtime::RandomBits;
+
+/// A stream of random numbers.
+pub struct CaseRandom(RandomBits);
 
 impl CaseRandom {
     /// A stream by seed, number of the case and purpose; different ones are independent of each other.
     pub fn new(seed: u64, case: u64, purpose: u64) -> Self {
         let mut state = 0x6869_6464_656E_u64;
         for word in [seed, case, purpose] {
-            let mut mixer = Self(state ^ word.wrapping_mul(0xD134_2543_DE82_EF95));
+            let mut mixer = RandomBits::new(state ^ word.wrapping_mul(0xD134_2543_DE82_EF95));
             state = mixer.bits() ^ word;
         }
-        Self(state)
-    }
-
-    fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^ (z >> 31)
+        Self(RandomBits::new(state))
     }
 
     /// Uniform in `(0, 1]`.
     fn uniform(&mut self) -> f64 {
-        ((self.bits() >> 11) as f64 + 1.0) / (1_u64 << 53) as f64
+        self.0.above_zero()
     }
 
     /// Uniform between two numbers.
@@ -39,8 +33,7 @@ impl CaseRandom {
 
     /// Normal with mean zero and deviation one (G. Box, M. Muller 1958).
     pub fn normal(&mut self) -> f64 {
-        let radius = (-2.0 * libm::log(self.uniform())).sqrt();
-        radius * libm::cos(2.0 * std::f64::consts::PI * self.uniform())
+        self.0.normal()
     }
 
     /// True with a probability.
@@ -55,7 +48,7 @@ impl CaseRandom {
 
     /// An index below `n`.
     pub fn below(&mut self, n: usize) -> usize {
-        usize::try_from(self.bits() % n as u64).unwrap_or(0)
+        usize::try_from(self.0.bits() % n as u64).unwrap_or(0)
     }
 
     /// The numbers below `n` in random order (R. Fisher, F. Yates 1938).

@@ -9,6 +9,7 @@ mod number;
 
 use std::ops::{Add, Mul, Neg, Sub};
 
+use modelmill_runtime::{RandomBits, scramble_bits};
 use num_bigint::BigInt;
 use num_traits::{Signed, ToPrimitive};
 
@@ -159,20 +160,19 @@ impl<const P: u64> Mul for FieldElement<P> {
     }
 }
 
-/// A reproducible stream of elements (SplitMix64, Steele 2014): the same seed gives the same model text on any machine.
+/// A reproducible stream of elements: the same seed gives the same model text on any machine.
 #[derive(Clone, Debug)]
-pub struct RandomStream(u64);
+pub struct RandomStream(RandomBits);
 
 impl RandomStream {
     /// A stream that starts from a seed.
     pub fn new(seed: u64) -> Self {
-        Self(seed)
+        Self(RandomBits::new(seed))
     }
 
     /// The next 64 bits.
     pub fn next_bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        mix_bits(self.0)
+        self.0.bits()
     }
 
     /// The next element, uniformly distributed to within 2^-52.
@@ -193,14 +193,8 @@ impl RandomStream {
 
 /// A value that depends on `key` and `seed` alone and otherwise looks random.
 pub fn hash_element<const P: u64>(seed: u64, key: FieldElement<P>) -> FieldElement<P> {
-    let mut stream = RandomStream::new(mix_bits(seed ^ mix_bits(key.0)));
+    let mut stream = RandomStream::new(scramble_bits(seed ^ scramble_bits(key.0)));
     stream.next_element()
-}
-
-fn mix_bits(mut z: u64) -> u64 {
-    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-    z ^ (z >> 31)
 }
 
 #[cfg(test)]
