@@ -83,7 +83,11 @@ impl std::fmt::Display for HiddenEffect {
 }
 
 /// An effect of the rig by names.
-pub fn effect(rig: &Rig, placed: &PlacedEffect, values: &[(&str, f64)]) -> Result<RigEffect, String> {
+pub fn effect(
+    rig: &Rig,
+    placed: &PlacedEffect,
+    values: &[(&str, f64)],
+) -> Result<RigEffect, String> {
     let at: Vec<&str> = placed.at.iter().map(String::as_str).collect();
     rig.effect(&placed.kind, &at, values).map_err(|faults| {
         let says: Vec<String> = faults.iter().map(ToString::to_string).collect();

@@ -145,7 +145,11 @@ impl PlantMotion {
     }
 
     /// What an effect adds to the forces that others need already, N.
-    pub fn added_beside(&self, others: &[RigEffect], effect: RigEffect) -> Result<Vec<f64>, String> {
+    pub fn added_beside(
+        &self,
+        others: &[RigEffect],
+        effect: RigEffect,
+    ) -> Result<Vec<f64>, String> {
         let without = self.forces(others)?;
         let with = self.forces(&[others, &[effect]].concat())?;
         Ok(with.iter().zip(&without).map(|(a, b)| a - b).collect())

@@ -37,7 +37,7 @@ pub use model::{
     Assembly, ContinuationProgram, Drives, Linearisation, LoadedState, Passive, ProgramRun, Run,
     State, accelerations, check_base, check_block_input, run_checked, run_unchecked,
 };
-pub use numbers::{AngleBatch, Numbers, ScalarNumbers, OutputSink, ZeroedOutputs};
+pub use numbers::{AngleBatch, Numbers, OutputSink, ScalarNumbers, ZeroedOutputs};
 pub use random::{RandomBits, scramble_bits};
 pub use reactions::{ClosedLoop, Joint, Wrench};
 pub use real::Real;

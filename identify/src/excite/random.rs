@@ -109,7 +109,11 @@ pub(super) fn draw_feasible(
 }
 
 /// A series of one coordinate that fills the tightest of its limits, around a mean value that leaves it room.
-fn draw_series(measure: &TrajectoryEvaluator<'_>, i: usize, draws: &mut RandomBits) -> FourierSeries {
+fn draw_series(
+    measure: &TrajectoryEvaluator<'_>,
+    i: usize,
+    draws: &mut RandomBits,
+) -> FourierSeries {
     let n = measure.options.harmonics;
     let omega = measure.omega();
     let [low, high] = measure.limits[i].position;

@@ -3,7 +3,9 @@
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
 
-use modelmill_identify::{StatePreparation, ReadOptions, SignalRecording, PreparedRun, SmoothingMethod};
+use modelmill_identify::{
+    PreparedRun, ReadOptions, SignalRecording, SmoothingMethod, StatePreparation,
+};
 use modelmill_runtime::RandomBits;
 
 const RATE: f64 = 250.0;

@@ -12,7 +12,7 @@ use modelmill_lab::harness::in_project;
 use modelmill_lab::hidden;
 use modelmill_lab::placed::PlacedEffect;
 use modelmill_lab::plant::{DRIVES, PlantMotion, SpidermillPlant};
-use modelmill_spec::{CoordinateIdx, CoordinateBounds, MotionLimits};
+use modelmill_spec::{CoordinateBounds, CoordinateIdx, MotionLimits};
 
 /// Joints that are prescribed in the SpiderMill and those that follow.
 const JOINTS: [&str; 4] = ["theta1", "theta2", "gamma1", "gamma2"];
