@@ -19,6 +19,7 @@ pub mod separate;
 
 use std::fmt;
 
+use modelmill_runtime::RandomBits;
 use nalgebra::DMatrix;
 
 pub use fourier::FourierSeries;
@@ -285,7 +286,7 @@ pub fn random_motions(
     }
     let measure = measure::TrajectoryEvaluator::new(plant, limits, options);
     let mut motions = Vec::new();
-    let mut draws = random::TrajectoryRandom(options.seed);
+    let mut draws = RandomBits::new(options.seed);
     random::draw_feasible(&measure, &mut draws, wanted, |series| {
         motions.push(measure.sample_motion(&series));
         SearchFlow::Continue(())

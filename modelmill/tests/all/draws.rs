@@ -1,19 +1,20 @@
 //! Random numbers of tests.
 
+use modelmill_runtime::RandomBits;
+
 /// Uniform and normal numbers, the same on every machine.
-pub(crate) struct Draws(pub(crate) u64);
+pub(crate) struct Draws(RandomBits);
 
 impl Draws {
+    pub(crate) fn new(seed: u64) -> Self {
+        Self(RandomBits::new(seed))
+    }
+
     pub(crate) fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^= z >> 31;
-        (z >> 11) as f64 / (1_u64 << 53) as f64
+        self.0.below_one()
     }
 
     pub(crate) fn normal(&mut self) -> f64 {
-        (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
+        self.0.nearly_normal()
     }
 }

@@ -28,7 +28,7 @@ type Moving = [Vec<Vec<f64>>; 3];
 
 /// Sums of waves around the nominal pose.
 fn motion(mechanism: &Mechanism, reach: f64) -> Moving {
-    let mut draws = Draws(7);
+    let mut draws = Draws::new(7);
     let mut moving: Moving = Default::default();
     for coordinate in mechanism.coordinates.iter().filter(|c| !c.passive) {
         let size = if coordinate.motion.is_angle() {
@@ -80,7 +80,7 @@ fn motion(mechanism: &Mechanism, reach: f64) -> Moving {
 
 /// A value for every parameter: those of the file, and others where it gives none.
 fn with_values(mut mechanism: Mechanism) -> Mechanism {
-    let mut draws = Draws(3);
+    let mut draws = Draws::new(3);
     for parameter in &mut mechanism.parameters {
         if parameter.nominal == 0.0 {
             parameter.nominal = 0.5 + draws.uniform();
@@ -135,7 +135,7 @@ fn recording(name: &str, derivation: &Derivation) -> PathBuf {
         (squares / SAMPLES as f64).sqrt()
     });
     let sizes: Vec<f64> = sizes.collect();
-    let mut draws = Draws(11);
+    let mut draws = Draws::new(11);
     for k in 0..SAMPLES {
         let _ = write!(text, "\n{}", STEP * k as f64);
         for column in moving.iter().flatten() {

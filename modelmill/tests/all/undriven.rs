@@ -238,7 +238,7 @@ fn recording(model: &Model, name: &str, made: &Made) -> PathBuf {
         dynamics: model.derivation.dynamics().expect("an equation of motion"),
         body,
     };
-    let mut draws = Draws(made.seed);
+    let mut draws = Draws::new(made.seed);
     let waves: Vec<Vec<[f64; 3]>> = mechanism
         .drives
         .iter()
