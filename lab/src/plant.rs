@@ -156,13 +156,13 @@ impl PlantMotion {
     }
 
     /// Length, rate and acceleration of a drive at each time.
-    pub fn of_drive(&self, drive: usize) -> Vec<Measured> {
+    pub fn of_drive(&self, drive: usize) -> Vec<ScalarMotion> {
         self.of_place(RigPlace::Drive(drive)).unwrap_or_default()
     }
 
     /// The same of any place that moves.
-    pub fn of_place(&self, place: RigPlace) -> Option<Vec<Measured>> {
-        let at = |motion| modelmill_rig::measured(&self.rig, place, motion);
+    pub fn of_place(&self, place: RigPlace) -> Option<Vec<ScalarMotion>> {
+        let at = |motion| modelmill_rig::place_motion(&self.rig, place, motion);
         self.motions.iter().map(at).collect()
     }
 

@@ -37,7 +37,7 @@
 //! | [`model::ModelChanges::between`] | what a variant changes |
 //! | [`variants::VariantComparison::along`] | what it costs along recordings: forces, power, work, limits, error |
 //! | [`Host::kinds`] | the kinds of effects that a model may have |
-//! | [`Model::with`] | the model with effects added to its file |
+//! | [`Model::with_added_effects`] | the model with effects added to its file |
 //! | [`Model::picture`] | the mechanism at a pose, as SVG |
 //! | [`Model::equations`] | p_g, dependences, p_min and programs as a page |
 //! | [`Model::generate`] | code |

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use modelmill::recording::{StatePreparation, RecordingOptions};
+use modelmill::recording::{RecordingOptions, StatePreparation};
 use modelmill_fleet::{FleetFault, FleetModel, FleetPlan, FleetSummary};
 use numpy::PyReadonlyArray1;
 use pyo3::prelude::*;
@@ -45,7 +45,7 @@ pub(crate) fn fleet_plan(
     };
     let made = py.detach(|| {
         let reference: Vec<&Path> = reference.iter().map(PathBuf::as_path).collect();
-        FleetPlan::make(&model, &reading, &reference).map(|plan| plan.json())
+        FleetPlan::from_recordings(&model, &reading, &reference).map(|plan| plan.json())
     });
     made.map_err(|fault| fleet_error(py, &fault))
 }
@@ -59,7 +59,7 @@ pub(crate) fn fleet_merge(
     let merged = py.detach(|| {
         let mut sum: Option<FleetSummary> = None;
         for bytes in &summaries {
-            let one = FleetSummary::of_bytes(bytes)?;
+            let one = FleetSummary::from_bytes(bytes)?;
             match &mut sum {
                 None => sum = Some(one),
                 Some(sum) => sum.merge(&one)?,
@@ -75,7 +75,8 @@ pub(crate) fn fleet_merge(
 impl FleetGround {
     #[new]
     fn new(py: Python<'_>, plan: &str) -> PyResult<Self> {
-        let made = py.detach(|| FleetPlan::parse("the plan", plan).and_then(|plan| plan.ground()));
+        let made =
+            py.detach(|| FleetPlan::parse("the plan", plan).and_then(|plan| plan.derive_model()));
         let ground = made.map_err(|fault| fleet_error(py, &fault))?;
         Ok(Self { ground })
     }
@@ -114,7 +115,7 @@ impl FleetGround {
     /// Parameters with deviations, as JSON, with what was wrong.
     fn solve(&self, py: Python<'_>, summary: &[u8]) -> PyResult<String> {
         let solved = py.detach(|| {
-            let summary = FleetSummary::of_bytes(summary)?;
+            let summary = FleetSummary::from_bytes(summary)?;
             let fit = self.ground.solve(&summary)?;
             Ok(self.ground.json(&fit).to_string())
         });
@@ -126,7 +127,7 @@ impl FleetGround {
         let found = py.detach(|| {
             let days = days
                 .iter()
-                .map(|(day, bytes)| Ok((day.clone(), FleetSummary::of_bytes(bytes)?)));
+                .map(|(day, bytes)| Ok((day.clone(), FleetSummary::from_bytes(bytes)?)));
             let days = days.collect::<Result<Vec<_>, FleetFault>>()?;
             let robot = modelmill_fleet::robot::robot_history(&self.ground, name, &days)?;
             Ok(robot.json(&self.ground).to_string())

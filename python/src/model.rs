@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use modelmill::add::{SettingValue, EffectSetting, new_effect};
-use modelmill::diagnose::{FixedParameters, DiagnosisOptions};
-use modelmill::generate::{CodeOptions, CodeLanguage};
+use modelmill::add::{EffectSetting, SettingValue, new_effect};
+use modelmill::diagnose::{DiagnosisOptions, FixedParameters};
+use modelmill::generate::{CodeLanguage, CodeOptions};
 use modelmill::identify::Instruments;
 use modelmill::model::{ModelChanges, PageFormat};
 use modelmill::picture::PictureOptions;
@@ -21,8 +21,10 @@ use pyo3::prelude::*;
 
 use crate::arrays::state_matrix;
 use crate::errors::input_error;
-use crate::options::{self, EstimationOptions, ExcitationOptions, ReadingOptions, OptionResult};
-use crate::results::{PythonExcitation, PythonResult, PythonRecording, RemarkList, PythonSource, remarks};
+use crate::options::{self, EstimationOptions, ExcitationOptions, OptionResult, ReadingOptions};
+use crate::results::{
+    PythonExcitation, PythonRecording, PythonResult, PythonSource, RemarkList, remarks,
+};
 use crate::spelling::PythonSpelling;
 use crate::work::{JobListener, run_blocking, run_interruptible};
 
@@ -209,12 +211,12 @@ impl CoreModel {
 
     #[getter]
     fn coordinates(&self) -> Vec<String> {
-        self.model.active()
+        self.model.active_coordinates()
     }
 
     #[getter]
     fn passive(&self) -> Vec<String> {
-        self.model.passive()
+        self.model.passive_coordinates()
     }
 
     #[getter]
@@ -230,7 +232,7 @@ impl CoreModel {
     /// Name, retained product, expression, unit, nominal value, whether that is given.
     #[getter]
     fn base(&self) -> Vec<(String, String, String, String, f64, bool)> {
-        let infos = self.model.infos();
+        let infos = self.model.parameter_infos();
         let all = self.model.base.iter().zip(infos).enumerate();
         all.map(|(k, (base, info))| {
             (
@@ -324,15 +326,24 @@ impl CoreModel {
         let function = function_by_name(py, function)?;
         let given = StateSamples {
             q: state_matrix(py, &q)?,
-            qd: qd.as_ref().map(|array| state_matrix(py, array)).transpose()?,
-            qdd: qdd.as_ref().map(|array| state_matrix(py, array)).transpose()?,
-            forces: forces.as_ref().map(|array| state_matrix(py, array)).transpose()?,
+            qd: qd
+                .as_ref()
+                .map(|array| state_matrix(py, array))
+                .transpose()?,
+            qdd: qdd
+                .as_ref()
+                .map(|array| state_matrix(py, array))
+                .transpose()?,
+            forces: forces
+                .as_ref()
+                .map(|array| state_matrix(py, array))
+                .transpose()?,
         };
         let few = given.q.numbers.len() <= FEW * given.q.width;
         let functions = &self.functions;
         let job = || {
             let shape = functions.shape(function)?;
-            Ok((functions.at(function, &given, &values)?, shape))
+            Ok((functions.evaluate_at(function, &given, &values)?, shape))
         };
         let (found, shape) = if few {
             run_blocking(py, job)?
@@ -444,18 +455,24 @@ impl CoreModel {
     ) -> PyResult<PythonResult> {
         let (data, check) = (recordings(&data), recordings(&check));
         let question = DiagnosisOptions {
-            held: if held { FixedParameters::All } else { FixedParameters::Known },
+            fixed: if held {
+                FixedParameters::All
+            } else {
+                FixedParameters::Known
+            },
             ..DiagnosisOptions::default()
         };
         self.run_interruptible(py, progress.as_ref(), || {
-            let found = self
-                .model
-                .diagnose(&borrow_recordings(&data), &borrow_recordings(&check), &question)?;
+            let found = self.model.diagnose(
+                &borrow_recordings(&data),
+                &borrow_recordings(&check),
+                &question,
+            )?;
             let spelling = PythonSpelling;
             let text = found.text(TerminalStyle::PLAIN, &spelling).join("\n");
             let better = match found.entries.as_slice() {
                 [] => None,
-                entries => Some(self.with_same_host(self.model.with(entries)?)),
+                entries => Some(self.with_same_host(self.model.with_added_effects(entries)?)),
             };
             Ok(
                 PythonResult::new(&found.json(&spelling), &text, remarks(&found.notes))
@@ -523,11 +540,11 @@ impl CoreModel {
             .map(|(symbol, name)| (symbol, SettingValue::Name(name)));
         let settings = values.chain(names);
         let settings: Vec<EffectSetting> = settings
-            .map(|(symbol, said)| EffectSetting { symbol, said })
+            .map(|(symbol, value)| EffectSetting { symbol, value })
             .collect();
         let model = self.run_interruptible(py, None, || {
             let effect = new_effect(&self.model.loaded.kinds, kind, &at, &settings)?;
-            self.model.with(&[effect])
+            self.model.with_added_effects(&[effect])
         })?;
         Ok(self.with_same_host(model))
     }
@@ -566,7 +583,11 @@ impl CoreModel {
                 .model
                 .interpret(&self.fit(fit, name)?, name, &unknown)?;
             let text = found.text(TerminalStyle::PLAIN, &PythonSpelling);
-            Ok(PythonResult::new(&found.json(), &text, remarks(&found.notes)))
+            Ok(PythonResult::new(
+                &found.json(),
+                &text,
+                remarks(&found.notes),
+            ))
         })
     }
 
@@ -589,9 +610,11 @@ impl CoreModel {
         fit: Option<&str>,
         name: Option<&str>,
     ) -> PyResult<(String, RemarkList)> {
-        let mut formats = export::PageFormat::ALL.into_iter();
+        let mut formats = export::DescriptionFormat::ALL.into_iter();
         let Some(format) = formats.find(|one| one.name() == format) else {
-            let known = export::PageFormat::ALL.map(export::PageFormat::name).join(", ");
+            let known = export::DescriptionFormat::ALL
+                .map(export::DescriptionFormat::name)
+                .join(", ");
             let says = format!("format={format:?}: expected one of {known}");
             return Err(input_error(py, &says));
         };
@@ -615,13 +638,13 @@ impl CoreModel {
         let runs = [recordings(&data), recordings(&other_data)];
         self.run_interruptible(py, progress.as_ref(), || {
             let [before, after] = models;
-            let changes = ModelChanges::between(before, after);
+            let changes = ModelChanges::from_models(before, after);
             let mut object = changes.json(before, after);
             let mut text = changes.text(before, after, TerminalStyle::PLAIN);
             let mut notes = RemarkList::new();
             if !runs[0].is_empty() {
                 let [first, second] = [&runs[0], &runs[1]].map(|runs| borrow_recordings(runs));
-                let variants = VariantComparison::along(models, [&first, &second])?;
+                let variants = VariantComparison::along_recordings(models, [&first, &second])?;
                 object["along"] = variants.json(&PythonSpelling);
                 text = format!("{text}\n\n{}", variants.text(TerminalStyle::PLAIN));
                 notes = remarks(&variants.notes);
@@ -639,7 +662,7 @@ impl CoreModel {
         reactions: bool,
         self_test: bool,
     ) -> PyResult<Vec<(String, String)>> {
-        let Some(language) = CodeLanguage::named(language) else {
+        let Some(language) = CodeLanguage::from_name(language) else {
             let known: Vec<&str> = CodeLanguage::all().map(CodeLanguage::name).collect();
             let says = format!(
                 "language={language:?}: expected one of {}",

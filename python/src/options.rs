@@ -1,10 +1,14 @@
 //! Keywords of Python as options of the library, refused where they make no sense.
 
 use modelmill::diagnose::NamedEffect;
-use modelmill::excite::{ExcitationCriterion, TrajectoryLimit, Options, ExcitationRequest, SeparationRequest};
-use modelmill::identify::{EstimatorOptions, EstimateRefinement, EquationWeights};
-use modelmill::recording::{DerivativeSource, MAX_FILTER_ORDER, StatePreparation, RecordingOptions, SmoothingMethod};
-use modelmill::runs::{RunsOptions, KnownLoad, PerRunSelection};
+use modelmill::excite::{
+    ExcitationCriterion, ExcitationRequest, Options, SeparationRequest, TrajectoryLimit,
+};
+use modelmill::identify::{EquationWeights, EstimateRefinement, EstimatorOptions};
+use modelmill::recording::{
+    DerivativeSource, MAX_FILTER_ORDER, RecordingOptions, SmoothingMethod, StatePreparation,
+};
+use modelmill::runs::{KnownLoad, PerRunSelection, RunsOptions};
 use pyo3::prelude::*;
 
 /// What is wrong with an option.
@@ -52,7 +56,11 @@ impl ReadingOptions {
         Ok(RecordingOptions {
             columns: self.columns.clone(),
             preparation: StatePreparation {
-                cutoff_hz: check_positive("cutoff_hz", self.cutoff_hz, "a frequency in Hz such as 25")?,
+                cutoff_hz: check_positive(
+                    "cutoff_hz",
+                    self.cutoff_hz,
+                    "a frequency in Hz such as 25",
+                )?,
                 order,
                 trim: self.trim,
                 decimate: self.decimate,
@@ -60,7 +68,9 @@ impl ReadingOptions {
                 source: match self.source.as_str() {
                     "recorded" => DerivativeSource::RecordedFirst,
                     "positions" => DerivativeSource::Positions,
-                    other => return Err(expected_one_of("source", other, &["recorded", "positions"])),
+                    other => {
+                        return Err(expected_one_of("source", other, &["recorded", "positions"]));
+                    }
                 },
                 smoothing: self.smoothing()?,
                 ..usual
@@ -191,7 +201,7 @@ impl ExcitationOptions {
             Some(effect) => Some(SeparationRequest {
                 effect: NamedEffect::parse(effect)?,
                 from: named(&self.apart_from)?,
-                beside: named(&self.beside)?,
+                common_effects: named(&self.beside)?,
                 noise: check_positive("noise", self.noise, "a standard deviation in N or N m")?,
             }),
         };
@@ -202,7 +212,13 @@ impl ExcitationOptions {
                 criterion: match self.criterion.as_str() {
                     "condition" => ExcitationCriterion::Condition,
                     "log_det" => ExcitationCriterion::LogDet,
-                    other => return Err(expected_one_of("criterion", other, &["condition", "log_det"])),
+                    other => {
+                        return Err(expected_one_of(
+                            "criterion",
+                            other,
+                            &["condition", "log_det"],
+                        ));
+                    }
                 },
                 random: self.random,
                 starts: self.starts,

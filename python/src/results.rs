@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use modelmill::recording::PreparedRecording;
-use modelmill::{RecordingNote, NoteSeverity};
+use modelmill::{NoteSeverity, RecordingNote};
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use serde_json::Value;
@@ -54,7 +54,7 @@ impl PythonRecording {
     /// Times of the prepared samples, then one list per coordinate of positions, rates, accelerations, then forces.
     #[pyo3(name = "prepared")]
     fn prepared_arrays<'py>(&self, py: Python<'py>) -> PreparedArrays<'py> {
-        let runs = || self.recording.stretches.iter().map(|stretch| &stretch.run);
+        let runs = || self.recording.segments.iter().map(|segment| &segment.run);
         let joined = |of: &dyn Fn(&modelmill::recording::PreparedRun) -> &[Vec<f64>]| {
             let width = runs().next().map_or(0, |run| of(run).len());
             let column = |k: usize| {

@@ -39,7 +39,10 @@ impl StepSpelling for PythonSpelling {
     }
 
     fn spell_separation(&self, _: &Model, separation: &SeparationProposal) -> Option<String> {
-        let mut call = format!("m.excite(separate={:?}", effect_argument(&separation.effect));
+        let mut call = format!(
+            "m.excite(separate={:?}",
+            effect_argument(&separation.effect)
+        );
         let rivals = separation.rivals.iter().map(|effect| {
             let effect = effect.clone();
             effect_argument(&NamedEffect {
@@ -49,8 +52,12 @@ impl StepSpelling for PythonSpelling {
         });
         let list = |all: Vec<String>| format!("{all:?}");
         let _ = write!(call, ", apart_from={}", list(rivals.collect()));
-        if !separation.beside.is_empty() {
-            let beside = separation.beside.iter().map(effect_argument).collect();
+        if !separation.common_effects.is_empty() {
+            let beside = separation
+                .common_effects
+                .iter()
+                .map(effect_argument)
+                .collect();
             let _ = write!(call, ", beside={}", list(beside));
         }
         if let Some(noise) = separation.noise {

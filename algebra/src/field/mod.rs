@@ -267,7 +267,8 @@ mod tests {
         let largest = FieldElement::<P>(P - 1);
         assert_eq!(largest * largest, FieldElement::ONE);
         let mut row = [largest; 3];
-        let others = [(largest, [largest; 3].as_slice()); 150];
+        let largest_row = [largest; 3];
+        let others = [(largest, largest_row.as_slice()); 150];
         FieldElement::add_multiples(&mut row, &others);
         assert_eq!(row, [FieldElement::from_i64(149); 3]);
         let two = FieldElement::sum_of_products([largest, largest], [largest, largest]);

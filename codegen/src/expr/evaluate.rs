@@ -48,7 +48,7 @@ pub struct EvaluationTape {
     operands: Vec<TapeOperand>,
     /// Numbers, each once: converting them can take as long as a division.
     rationals: Vec<Rational>,
-    angles: Vec<AngleSum>,
+    angles: Vec<AtomAngleSum>,
     /// How many steps are divided by.
     n_divisors: usize,
     /// The step of each root.
@@ -155,7 +155,7 @@ impl EvaluationTape {
         tape
     }
 
-    fn push_angle(&mut self, angle: &AngleSum) -> u32 {
+    fn push_angle(&mut self, angle: &AtomAngleSum) -> u32 {
         self.angles.push(angle.clone());
         index(self.angles.len() - 1)
     }

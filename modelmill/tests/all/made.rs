@@ -125,7 +125,7 @@ fn read_more(made: Made, joint: usize, carried: &[Vec<f64>], sample: usize) -> f
 #[track_caller]
 pub(crate) fn run_of(model: &Model, name: &str, seed: u64, made: Made) -> PathBuf {
     let mut draws = Draws::new(seed);
-    let active_coordinates = model.active_coordinates();
+    let active = model.active_coordinates();
     let mut columns = [(); 3].map(|()| vec![vec![0.0; SAMPLES]; active.len()]);
     let coordinates = &model.derivation.mechanism.coordinates;
     for (i, coordinate) in coordinates.iter().filter(|c| !c.passive).enumerate() {
