@@ -610,11 +610,9 @@ impl CoreModel {
         fit: Option<&str>,
         name: Option<&str>,
     ) -> PyResult<(String, RemarkList)> {
-        let mut formats = export::DescriptionFormat::ALL.into_iter();
+        let mut formats = export::Format::ALL.into_iter();
         let Some(format) = formats.find(|one| one.name() == format) else {
-            let known = export::DescriptionFormat::ALL
-                .map(export::DescriptionFormat::name)
-                .join(", ");
+            let known = export::Format::ALL.map(export::Format::name).join(", ");
             let says = format!("format={format:?}: expected one of {known}");
             return Err(input_error(py, &says));
         };
