@@ -10,7 +10,7 @@ pub struct ProgramAnswer {
     /// `adequate`, `missing_effect` or `unexplained`.
     pub verdict: String,
     /// The ladder: what was added, error on the fit and on the check run.
-    pub steps: Vec<LadderStep>,
+    pub steps: Vec<ProgramStep>,
     /// What the program would add.
     pub effects: Vec<EffectClaim>,
     /// Kinds of what it says that recordings have besides.
@@ -21,7 +21,7 @@ pub struct ProgramAnswer {
 
 /// A step of the ladder.
 #[derive(Clone, Debug, PartialEq)]
-pub struct LadderStep {
+pub struct ProgramStep {
     /// Nothing on the first.
     pub added: Option<PlacedEffect>,
     /// Error on the fit.
@@ -50,7 +50,7 @@ impl ProgramAnswer {
         }
         let steps = list(value, "steps")?.iter().map(|step| {
             let added = &step["added"];
-            Ok(LadderStep {
+            Ok(ProgramStep {
                 added: if added.is_null() {
                     None
                 } else {

@@ -52,10 +52,10 @@ impl DrawnMasses {
     /// Masses of another machine.
     pub fn draw(random: &mut CaseRandom) -> Self {
         Self {
-            crank: three_digits(random.between(0.8, 1.3)),
-            coupling: three_digits(random.between(0.7, 1.6)),
-            coupler: three_digits(random.between(0.8, 1.4)),
-            platform: three_digits(random.between(0.8, 2.5)),
+            crank: three_digits(random.uniform_between(0.8, 1.3)),
+            coupling: three_digits(random.uniform_between(0.7, 1.6)),
+            coupler: three_digits(random.uniform_between(0.8, 1.4)),
+            platform: three_digits(random.uniform_between(0.8, 2.5)),
         }
     }
 }
@@ -250,7 +250,7 @@ impl HiddenCase {
                     let choice = &all[pick(2, turn, all.len())];
                     let other = &all[random.below(all.len())];
                     self.label = format!("{} + {}", choice.kind, other.kind);
-                    !alike(choice, other)
+                    !would_merge(choice, other)
                         && self.hide_effects(&[choice, other], &mut random, &spans)?
                 }
                 _ => {
@@ -498,7 +498,7 @@ impl HiddenCase {
 }
 
 /// Whether two choices would make one effect, or one that takes the other up.
-fn alike(one: &HiddenChoice, other: &HiddenChoice) -> bool {
+fn would_merge(one: &HiddenChoice, other: &HiddenChoice) -> bool {
     let shared = one.at.iter().any(|place| other.at.contains(place));
     let family = |kind: &str| match kind {
         "viscous_friction" | "directional_viscous_friction" => 1,

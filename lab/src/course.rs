@@ -82,7 +82,7 @@ impl DrawnCourse {
             CourseRepeats::Thrice => 3.0 * PERIOD,
             CourseRepeats::Twice => 2.0 * PERIOD,
             CourseRepeats::Once => PERIOD,
-            CourseRepeats::Never => random.between(7.0, 12.0),
+            CourseRepeats::Never => random.uniform_between(7.0, 12.0),
         };
         let mut frequencies = Vec::new();
         for k in 1..=HARMONICS {
@@ -93,7 +93,7 @@ impl DrawnCourse {
             frequencies.push(f64::from(k) * stretch * 2.0 * PI / PERIOD);
         }
         let sums = limits.coordinates.iter().map(|(_, of_one)| {
-            let fill = random.between(0.75, 0.97);
+            let fill = random.uniform_between(0.75, 0.97);
             let [low, high] = of_one.position.unwrap_or([-1.0, 1.0]);
             let mut sum = HarmonicSum {
                 offset: 0.0,
@@ -127,7 +127,7 @@ impl DrawnCourse {
             }
             let [least, greatest] = ends(&sum, 0);
             let room = (high - low) - (greatest - least);
-            let place = low + random.between(0.05, 0.95) * room - least;
+            let place = low + random.uniform_between(0.05, 0.95) * room - least;
             sum.offset = (1e5 * place).round() / 1e5;
             sum
         });

@@ -66,7 +66,7 @@ impl DrawnDisturbance {
     /// Draws one; those that change friction need some.
     pub fn draw(case: &HiddenCase, random: &mut CaseRandom) -> Self {
         let drive = random.below(DRIVES.len());
-        let part = three_digits(random.between(0.1, 0.3));
+        let part = three_digits(random.uniform_between(0.1, 0.3));
         let has_friction = case.hidden.iter().any(is_friction);
         match random.below(16) {
             0 | 1 => Self::None,
@@ -79,45 +79,45 @@ impl DrawnDisturbance {
                 },
             },
             4 => Self::Hum {
-                size: three_digits(random.between(2.0, 8.0)),
+                size: three_digits(random.uniform_between(2.0, 8.0)),
             },
             5 => Self::Outliers {
-                size: three_digits(random.between(80.0, 300.0)),
+                size: three_digits(random.uniform_between(80.0, 300.0)),
             },
             6 => Self::Steps {
-                size: three_digits(random.between(5.0, 25.0)),
+                size: three_digits(random.uniform_between(5.0, 25.0)),
             },
             7 => Self::Drift {
                 drive,
-                size: three_digits(random.sign() * random.between(2.0, 8.0)),
+                size: three_digits(random.sign() * random.uniform_between(2.0, 8.0)),
             },
             8 if has_friction => Self::Fades { part },
             9 if has_friction => Self::OtherDay { part },
             8 | 10 => Self::Late {
                 drive: random.chance(0.5).then_some(drive),
-                by: three_digits(random.between(1e-3, 4e-3)),
+                by: three_digits(random.uniform_between(1e-3, 4e-3)),
             },
             9 | 11 => Self::Lag {
                 corner: three_digits(random.log_between(10.0, 40.0)),
             },
             12 => Self::Scale {
                 drive,
-                part: three_digits(random.sign() * random.between(0.03, 0.08)),
+                part: three_digits(random.sign() * random.uniform_between(0.03, 0.08)),
             },
             13 => Self::Eccentric {
                 coordinate: drive,
-                size: three_digits(random.between(0.5e-3, 2e-3)),
+                size: three_digits(random.uniform_between(0.5e-3, 2e-3)),
                 times: [1, 2, 4, 8][random.below(4)],
             },
             14 => Self::Jitter {
-                part: three_digits(random.between(0.02, 0.08)),
+                part: three_digits(random.uniform_between(0.02, 0.08)),
             },
             _ if random.chance(0.5) => Self::Payload {
-                mass: three_digits(random.between(1.0, 4.0)),
+                mass: three_digits(random.uniform_between(1.0, 4.0)),
             },
             _ => Self::Push {
-                size: three_digits(random.sign() * random.between(20.0, 60.0)),
-                at: random.between(0.1, 0.8),
+                size: three_digits(random.sign() * random.uniform_between(20.0, 60.0)),
+                at: random.uniform_between(0.1, 0.8),
             },
         }
     }

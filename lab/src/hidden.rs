@@ -177,7 +177,7 @@ impl HiddenChoice {
         }
         let mut all = Vec::new();
         for place in self.at {
-            let size = random.between(0.6, 1.6);
+            let size = random.uniform_between(0.6, 1.6);
             let drawn = self.at_places(&[*place], random);
             all.extend(drawn.iter().map(|one| one.times(size)));
         }
@@ -201,13 +201,13 @@ impl HiddenChoice {
                     HiddenEffect::new(
                         "stribeck_friction",
                         at,
-                        &[("Fs", random.between(0.8, 2.5))],
+                        &[("Fs", random.uniform_between(0.8, 2.5))],
                         &[("vs", vs)],
                     ),
                 ]
             }
             "directional_viscous_friction" | "directional_coulomb_friction" => {
-                let more = random.sign() * random.between(0.25, 0.7);
+                let more = random.sign() * random.uniform_between(0.25, 0.7);
                 let symbols = if self.kind == "directional_viscous_friction" {
                     ["Fvp", "Fvn"]
                 } else {
@@ -218,29 +218,33 @@ impl HiddenChoice {
             // Lengths of the spindles lie between 0.62 and 0.88 m.
             "spring" => one(
                 &[("k", 1.0)],
-                &[("rest", three_digits(random.between(0.5, 0.95)))],
+                &[("rest", three_digits(random.uniform_between(0.5, 0.95)))],
             ),
             "force_ripple" => {
-                let (sin, cos) = libm::sincos(random.between(0.0, 2.0 * std::f64::consts::PI));
+                let (sin, cos) =
+                    libm::sincos(random.uniform_between(0.0, 2.0 * std::f64::consts::PI));
                 let pitch = three_digits(random.log_between(0.008, 0.1));
                 one(&[("As", sin), ("Ac", cos)], &[("pitch", pitch)])
             }
             // A uniform rod, of unit mass at first.
             "rod_inertia" => {
-                let length = random.between(0.7, 1.1);
+                let length = random.uniform_between(0.7, 1.1);
                 one(
                     &[("m", 1.0), ("I", length * length / 12.0)],
                     &[("c", three_digits(0.5 * length))],
                 )
             }
             "gravity_tilt" => one(&[("tz", 0.01 * random.sign())], &[]),
-            "time_delay" => one(&[], &[("T", three_digits(random.between(0.002, 0.012)))]),
+            "time_delay" => one(
+                &[],
+                &[("T", three_digits(random.uniform_between(0.002, 0.012)))],
+            ),
             "coupled_drive" => {
                 let parts = [("Ia", 30.0), ("Fv", 150.0), ("Fs", 20.0)];
                 let always = random.below(parts.len());
                 let mut values = Vec::new();
                 for (k, (symbol, size)) in parts.into_iter().enumerate() {
-                    let share = random.between(0.5, 1.5);
+                    let share = random.uniform_between(0.5, 1.5);
                     if random.chance(0.6) || k == always {
                         values.push((symbol, size * share));
                     }

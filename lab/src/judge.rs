@@ -134,7 +134,7 @@ pub fn judge(
             _ => AnswerMark::Guess,
         },
         CaseClass::One | CaseClass::Two => {
-            let mark = found(hidden, answer, excess);
+            let mark = mark_answer(hidden, answer, excess);
             if mark.is_right() && answer.verdict != "missing_effect" {
                 return AnswerMark::WrongVerdict;
             }
@@ -143,7 +143,7 @@ pub fn judge(
     }
 }
 
-fn found(
+fn mark_answer(
     hidden: &[PlacedEffect],
     answer: &ProgramAnswer,
     excess: &mut dyn FnMut(&[PlacedEffect]) -> f64,

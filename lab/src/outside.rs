@@ -99,9 +99,9 @@ impl OutsideForce {
     /// Draws a drive and a shape; the size is one.
     pub fn draw(law: OutsideLaw, random: &mut CaseRandom) -> Self {
         let shape = match law {
-            OutsideLaw::Hysteresis => random.between(0.02, 0.06),
-            OutsideLaw::FrictionByPlace => random.between(4.0, 20.0),
-            OutsideLaw::Stop => random.between(0.76, 0.82),
+            OutsideLaw::Hysteresis => random.uniform_between(0.02, 0.06),
+            OutsideLaw::FrictionByPlace => random.uniform_between(4.0, 20.0),
+            OutsideLaw::Stop => random.uniform_between(0.76, 0.82),
             OutsideLaw::Hum => random.log_between(2.0, 20.0),
             _ => 0.0,
         };

@@ -22,13 +22,13 @@ impl CaseRandom {
     }
 
     /// Uniform between two numbers.
-    pub fn between(&mut self, low: f64, high: f64) -> f64 {
+    pub fn uniform_between(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.uniform()
     }
 
     /// Uniform on a logarithmic scale.
     pub fn log_between(&mut self, low: f64, high: f64) -> f64 {
-        libm::exp(self.between(libm::log(low), libm::log(high)))
+        libm::exp(self.uniform_between(libm::log(low), libm::log(high)))
     }
 
     /// Normal with mean zero and deviation one (G. Box, M. Muller 1958).

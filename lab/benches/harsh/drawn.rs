@@ -174,7 +174,7 @@ impl Drawn {
         let v = |at, x| Hidden::new("viscous_friction", at, &[("Fv", x)]);
         let c = |at, x| Hidden::new("coulomb_friction", at, &[("Fc", x)]);
         let spring = |at, random: &mut CaseRandom| {
-            let rest = random.between(0.5, 0.95);
+            let rest = random.uniform_between(0.5, 0.95);
             let k = random.log_between(150.0, 500.0);
             Hidden::new("spring", at, &[("k", k), ("rest", rest)])
         };
@@ -187,13 +187,13 @@ impl Drawn {
             }
             "point-mass" => {
                 let point = ["R2m", "R4m"][random.below(2)];
-                let mass = random.between(1.5, 5.0);
+                let mass = random.uniform_between(1.5, 5.0);
                 vec![Hidden::new("point_mass", point, &[("m", mass)])]
             }
             "rods" => DRIVES
                 .map(|at| {
-                    let mass = random.between(6.0, 15.0);
-                    let length = random.between(0.7, 1.1);
+                    let mass = random.uniform_between(6.0, 15.0);
+                    let length = random.uniform_between(0.7, 1.1);
                     let inertia = mass * length * length / 12.0;
                     let values = [("m", mass), ("c", 0.5 * length), ("I", inertia)];
                     Hidden::new("rod_inertia", at, &values)
@@ -214,14 +214,14 @@ impl Drawn {
                 let mut all = Vec::new();
                 for at in DRIVES {
                     all.extend([c(at, coulomb(random)), v(at, viscous(random))]);
-                    let size = random.between(20.0, 50.0);
-                    let values = [("Fs", size), ("vs", random.between(0.015, 0.04))];
+                    let size = random.uniform_between(20.0, 50.0);
+                    let values = [("Fs", size), ("vs", random.uniform_between(0.015, 0.04))];
                     all.push(Hidden::new("stribeck_friction", at, &values));
                 }
                 all
             }
             "spring-and-offset" => {
-                let offset = random.sign() * random.between(10.0, 30.0);
+                let offset = random.sign() * random.uniform_between(10.0, 30.0);
                 let offset = Hidden::new("force_offset", there, &[("F0", offset)]);
                 vec![spring(here, random), offset]
             }

@@ -38,14 +38,14 @@ impl Law {
     pub(crate) fn draw(kind: &str, at: usize, random: &mut CaseRandom) -> Option<Self> {
         let (what, shape) = match kind {
             "end-stop" => {
-                let shape = random.between(0.7, 0.85);
+                let shape = random.uniform_between(0.7, 0.85);
                 let is_upper = random.chance(0.5);
                 (What::Stop, if is_upper { shape } else { 1.0 - shape })
             }
-            "fading-friction" => (What::Fading, random.between(3.0, 8.0)),
-            "power-even" => (What::Even, random.between(1.3, 1.7)),
+            "fading-friction" => (What::Fading, random.uniform_between(3.0, 8.0)),
+            "power-even" => (What::Even, random.uniform_between(1.3, 1.7)),
             "product" => (What::Product, 0.0),
-            "sine-rate" => (What::Sine, random.between(2.0, 5.0)),
+            "sine-rate" => (What::Sine, random.uniform_between(2.0, 5.0)),
             "hysteresis" => (What::Memory, random.log_between(0.002, 0.008)),
             _ => return None,
         };

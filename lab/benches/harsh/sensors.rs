@@ -139,18 +139,18 @@ impl Fault {
             "contact-check" => Self::Push {
                 force: size(45.0, 120.0),
                 lasts: size(0.3, 0.8),
-                at: random.between(0.15, 0.8),
+                at: random.uniform_between(0.15, 0.8),
             },
             "eccentric-joint" => Self::EccentricJoint {
                 at: side,
                 by: size(0.8e-3, 2.5e-3),
-                times: random.between(2.0, 7.0).floor(),
-                phase: random.between(0.0, TAU),
+                times: random.uniform_between(2.0, 7.0).floor(),
+                phase: random.uniform_between(0.0, TAU),
             },
             "eccentric-screw" => Self::EccentricScrew {
                 at: side,
                 by: size(6e-6, 15e-6),
-                phase: random.between(0.0, TAU),
+                phase: random.uniform_between(0.0, TAU),
             },
             "backlash" => Self::Backlash {
                 at: side,
@@ -294,7 +294,7 @@ pub(crate) fn record(
     let readings = readings(case, &along);
     let mut noises: Vec<CaseRandom> = (1..=4).map(stream).collect();
     let mut memories = [0.0; 2].map(|_: f64| noises[2].normal());
-    let phase = [noises[2].between(0.0, TAU), noises[3].between(0.0, TAU)];
+    let phase = [noises[2].uniform_between(0.0, TAU), noises[3].uniform_between(0.0, TAU)];
     let (mut errors, mut measured) = (Vec::new(), Vec::new());
     for (i, time) in stamps.iter().enumerate() {
         let _ = write!(csv, "{time:.9}");

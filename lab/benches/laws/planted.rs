@@ -136,7 +136,7 @@ impl std::fmt::Display for Planted {
 impl Planted {
     /// A law at places, with a shape that is drawn; the size is one.
     pub(crate) fn draw(law: Law, at: &str, other: Option<&str>, random: &mut CaseRandom) -> Self {
-        let mut number = || three_digits(random.between(0.0, 1.0));
+        let mut number = || three_digits(random.uniform_between(0.0, 1.0));
         Self {
             law,
             at: at.to_owned(),

@@ -26,6 +26,7 @@ mod flow;
 mod loops_in_space;
 mod many_states;
 mod many_twists;
+mod names;
 mod near_coincidence;
 mod no_numbers;
 mod on_request;
