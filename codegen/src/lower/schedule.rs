@@ -162,8 +162,7 @@ impl ProgramScheduler<'_> {
             _ => ProgramStage::Fixed,
         };
         op.for_each_operand(|operand| stage = stage.max(self.program.stages[operand.index()]));
-        let value =
-            ValueId(u32::try_from(self.program.ops.len()).expect("program below 4G operations"));
+        let value = ValueId::from_index(self.program.ops.len());
         self.program.ops.push(op.clone());
         self.program.stages.push(stage);
         self.known.insert(op, value);

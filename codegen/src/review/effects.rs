@@ -17,7 +17,7 @@ pub(super) fn effects(page: &mut PageDocument, mechanism: &Mechanism) {
         return;
     }
     // A coordinate or constant of the model may have that name.
-    let taken = crate::emit::tree::names::reserved_names(mechanism);
+    let taken = crate::names::reserved_names(mechanism);
     let free = |names: [&str; 4], last: &str| {
         let found = names.into_iter().find(|name| !taken.contains(*name));
         found.unwrap_or(last).to_owned()
@@ -37,8 +37,8 @@ pub(super) fn effects(page: &mut PageDocument, mechanism: &Mechanism) {
         effect.other.is_none()
             && terms.any(|term| {
                 term.expression.mentions(
-                &|symbol| matches!(symbol, modelmill_spec::ModelSymbol::Place(q) if q.is_other()),
-            )
+                    &|symbol| matches!(symbol, modelmill_spec::ModelSymbol::Place(q) if q.is_other()),
+                )
             })
     };
     if mechanism.effects.iter().any(is_coupled) {
@@ -75,11 +75,7 @@ pub(super) fn effects(page: &mut PageDocument, mechanism: &Mechanism) {
 }
 
 /// What an effect adds, as a formula where it is one, else in words.
-fn effect_contribution(
-    mechanism: &Mechanism,
-    effect: &ModelEffect,
-    each: &str,
-    other: &str,
+fn effect_contribution(mechanism: &Mechanism, effect: &ModelEffect, each: &str, other: &str,
 ) -> TextLine {
     let names: Vec<PrintedFormula> = (effect.terms.iter())
         .map(|term| PrintedFormula::name(&*mechanism.parameters[term.parameter.0].name))

@@ -20,7 +20,7 @@ macro_rules! snapshots {
             settings.bind(|| {
                 insta::assert_snapshot!(concat!($file, ".page"), page(&derivation, PageFormat::Markdown, None));
                 if !LONG.contains(&$file) {
-                    insta::assert_snapshot!(concat!($file, ".rs"), modelmill_codegen::emit(&derivation).file());
+                    insta::assert_snapshot!(concat!($file, ".rs"), modelmill_emit::emit(&derivation).file());
                 }
             });
         }
