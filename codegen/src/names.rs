@@ -19,18 +19,18 @@ use crate::{Derivation, ModelEvaluator, MotionStates};
 
 /// A state with all its atoms' values, and the quantities with a meaning there.
 #[derive(Clone, Debug)]
-pubstruct NamedQuantities {
+pub struct NamedQuantities {
     pub(crate) atoms: BTreeMap<Atom, f64>,
     known: Vec<(FormulaSymbol, f64)>,
 }
 
 /// What a value of a program is: a quantity with a name, or its negative.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pubstruct QuantityName {
+pub struct QuantityName {
     /// Its name.
-    pubsymbol: FormulaSymbol,
+    pub symbol: FormulaSymbol,
     /// Whether the value is the negative of what the name means.
-    pubnegative: bool,
+    pub negative: bool,
 }
 
 /// Relative agreement that counts as equality.
@@ -38,7 +38,7 @@ const RELATIVE_AGREEMENT: f64 = 1e-10;
 
 impl NamedQuantities {
     /// Evaluates the quantities that have a meaning; none where no state is found.
-    pubfn new(derivation: &Derivation) -> Self {
+    pub fn new(derivation: &Derivation) -> Self {
         let mut stream = RandomStream::new(0x6E61_6D65);
         for scale in [0.05, 0.02, 0.005, 0.001, 0.0002] {
             if let Some(atoms) = generic_state(derivation, scale, &mut stream) {
@@ -53,8 +53,7 @@ impl NamedQuantities {
     }
 
     /// What a program's values are, by position; each name is given once.
-    pubfn name_values(&self, program: &StraightLineProgram,
-    ) -> BTreeMap<usize, QuantityName> {
+    pub fn name_values(&self, program: &StraightLineProgram) -> BTreeMap<usize, QuantityName> {
         let mut names = BTreeMap::new();
         if self.known.is_empty() {
             return names;
@@ -62,7 +61,10 @@ impl NamedQuantities {
         let values = self.values(program);
         let mut free: Vec<&(FormulaSymbol, f64)> = self.known.iter().collect();
         for (i, (op, value)) in program.ops.iter().zip(&values).enumerate() {
-            if matches!(op, ProgramOp::Number(_) | ProgramOp::Input(_) | ProgramOp::Neg(_)) {
+            if matches!(
+                op,
+                ProgramOp::Number(_) | ProgramOp::Input(_) | ProgramOp::Neg(_)
+            ) {
                 continue;
             }
             let found = free
@@ -163,8 +165,7 @@ fn generic_state(
 }
 
 /// Values of all operations of a program at a state.
-fn operation_values(program: &StraightLineProgram, atoms: &BTreeMap<Atom, f64>,
-) -> Vec<f64> {
+fn operation_values(program: &StraightLineProgram, atoms: &BTreeMap<Atom, f64>) -> Vec<f64> {
     use crate::expr::{EvaluationDomain, Unary};
     let mut values: Vec<f64> = Vec::with_capacity(program.ops.len());
     for op in &program.ops {
@@ -179,7 +180,9 @@ fn operation_values(program: &StraightLineProgram, atoms: &BTreeMap<Atom, f64>,
             ProgramOp::Div(a, b) => at(a) / at(b),
             ProgramOp::Neg(a) => -at(a),
             ProgramOp::Unary(Unary::Sqrt, a) => at(a).sqrt(),
-            ProgramOp::Unary(function, a) => FloatDomain(|_| 0.0).unary(*function, &at(a)).unwrap_or(f64::NAN),
+            ProgramOp::Unary(function, a) => FloatDomain(|_| 0.0)
+                .unary(*function, &at(a))
+                .unwrap_or(f64::NAN),
             ProgramOp::Sin(a) => at(a).sin(),
             ProgramOp::Cos(a) => at(a).cos(),
             ProgramOp::Atan2(y, x) => at(y).atan2(at(x)),
@@ -190,7 +193,9 @@ fn operation_values(program: &StraightLineProgram, atoms: &BTreeMap<Atom, f64>,
 }
 
 /// Quantities with a meaning and their values; the first of several equal ones gives the name.
-fn evaluate_quantities(derivation: &Derivation, atoms: &BTreeMap<Atom, f64>,
+fn evaluate_quantities(
+    derivation: &Derivation,
+    atoms: &BTreeMap<Atom, f64>,
 ) -> Vec<(FormulaSymbol, f64)> {
     let mut graph = derivation.graph.clone();
     let mut named = trigonometric_quantities(&mut graph, derivation);
@@ -211,15 +216,16 @@ fn evaluate_quantities(derivation: &Derivation, atoms: &BTreeMap<Atom, f64>,
         // One that has no value takes it from all others.
         let value = match &together {
             Some(values) => Some(values[k]),
-            None => EvaluationTape::new(&graph, &[id]).evaluate(&FloatDomain(atom)).map(|v| v[0]),
+            None => EvaluationTape::new(&graph, &[id])
+                .evaluate(&FloatDomain(atom))
+                .map(|v| v[0]),
         };
         let Some(value) = value else {
             continue;
         };
-        let taken = known
-            .iter()
-            .any(|(s, v)| {
-            *s == symbol || (value.abs() - v.abs()).abs() <= RELATIVE_AGREEMENT * v.abs()});
+        let taken = known.iter().any(|(s, v)| {
+            *s == symbol || (value.abs() - v.abs()).abs() <= RELATIVE_AGREEMENT * v.abs()
+        });
         if value.is_finite() && value != 0.0 && !taken && !reserved.contains(&symbol.text()) {
             known.push((symbol, value));
         }
@@ -237,7 +243,9 @@ pub(crate) fn reserved_names(mechanism: &Mechanism) -> BTreeSet<String> {
 }
 
 /// Sines and cosines of sums of angles: `c_theta1_gamma1`.
-fn trigonometric_quantities(graph: &mut Graph, derivation: &Derivation,
+fn trigonometric_quantities(
+    graph: &mut Graph,
+    derivation: &Derivation,
 ) -> Vec<(FormulaSymbol, ExprId)> {
     let projection = &derivation.equations.projection;
     let mechanism = &derivation.mechanism;
@@ -265,7 +273,8 @@ fn trigonometric_quantities(graph: &mut Graph, derivation: &Derivation,
 fn trigonometric_name(
     mechanism: &Mechanism,
     letter: &str,
-    angle: &crate::expr::AtomAngleSum) -> FormulaSymbol {
+    angle: &crate::expr::AtomAngleSum,
+) -> FormulaSymbol {
     let mut name = letter.to_owned();
     for (atom, n) in angle.terms() {
         let factor = match n {
@@ -288,7 +297,9 @@ fn motion_quantities(graph: &mut Graph, derivation: &Derivation) -> Vec<(Formula
     let mut named = Vec::new();
     for (k, p) in projection.loops.passive.iter().enumerate() {
         let name = &*mechanism.coordinates[*p].name;
-        named.push((FormulaSymbol::time_derivative(name, 1), projection.passive_rates[k],
+        named.push((
+            FormulaSymbol::time_derivative(name, 1),
+            projection.passive_rates[k],
         ));
         named.push((
             FormulaSymbol::time_derivative(name, 2),
@@ -303,7 +314,9 @@ fn motion_quantities(graph: &mut Graph, derivation: &Derivation) -> Vec<(Formula
         let name = format!("l_{}", drive.name);
         named.push((FormulaSymbol::new(&*name), motion.coordinate));
         named.push((FormulaSymbol::time_derivative(&*name, 1), motion.rate));
-        named.push((FormulaSymbol::time_derivative(&*name, 2), motion.acceleration,
+        named.push((
+            FormulaSymbol::time_derivative(&*name, 2),
+            motion.acceleration,
         ));
         for (a, slope) in projection
             .loops
@@ -403,9 +416,13 @@ fn link_quantities(graph: &mut Graph, derivation: &Derivation) -> Vec<(FormulaSy
             let both = graph.add(squares[0], squares[1]);
             named.push((FormulaSymbol::new(entry(axis, axis)), graph.neg(both)));
             let product = graph.mul(omega[axis], omega[j]);
-            named.push((FormulaSymbol::new(entry(axis, j)), graph.sub(product, alpha[k]),
+            named.push((
+                FormulaSymbol::new(entry(axis, j)),
+                graph.sub(product, alpha[k]),
             ));
-            named.push((FormulaSymbol::new(entry(j, axis)), graph.add(product, alpha[k]),
+            named.push((
+                FormulaSymbol::new(entry(j, axis)),
+                graph.add(product, alpha[k]),
             ));
         }
         let parent = &mechanism.frames[frame.parent.0].name;

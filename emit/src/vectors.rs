@@ -13,7 +13,9 @@ use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
 use modelmill_codegen::expr::{Atom, Unary};
-use modelmill_codegen::{Derivation, PoseGuard, ProgramOp, ProgramStage, SINGULAR, ProgramStage, ValueId};
+use modelmill_codegen::{
+    Derivation, PoseGuard, ProgramOp, ProgramStage, SINGULAR, StraightLineProgram, ValueId,
+};
 use modelmill_spec::Mechanism;
 
 use super::tree::in_order;
@@ -32,7 +34,7 @@ const SUPPORT: &str = include_str!("vectors.c");
 /// The program is one of the derivation's; passive coordinates must have a closed form.
 pub fn vectors_c(derivation: &Derivation, program: &StraightLineProgram, width: usize) -> String {
     let mechanism = &derivation.mechanism;
-    let (active , _) = derivation.coordinates();
+    let (active, _) = derivation.coordinates();
     let n_active = active.len();
     let place = |coordinate: usize| {
         let place = active.iter().position(|a| *a == coordinate);
@@ -60,9 +62,14 @@ pub fn vectors_c(derivation: &Derivation, program: &StraightLineProgram, width: 
     for i in in_order(program, &vec![false; n], &vec![false; n], &vec![0; n]) {
         let op = &program.ops[i];
         let _ = match program.stages[i] {
-            ProgramStage::Fixed => writeln!(fixed, "    const double x{i} = {};", scalar_operation(op, mechanism)),
+            ProgramStage::Fixed => writeln!(
+                fixed,
+                "    const double x{i} = {};",
+                scalar_operation(op, mechanism)
+            ),
             ProgramStage::State => {
-                let statement = vector_statement(i, op, &|atom| input(atom).map(|(_, k)| k), &is_fixed);
+                let statement =
+                    vector_statement(i, op, &|atom| input(atom).map(|(_, k)| k), &is_fixed);
                 writeln!(of_state, "            {statement}")
             }
         };
@@ -212,7 +219,11 @@ fn vector_statement(
         ProgramOp::Atan2(y, x) => format!("const V x{i} = angle({}, {});", wide(y), wide(x)),
         ProgramOp::Unary(Unary::Abs, a) => format!("const V x{i} = absolute({});", wide(a)),
         ProgramOp::Unary(unary, a) => {
-            format!("V x{i} = {}; EACH(x{i}, {});", wide(a), function_name(*unary))
+            format!(
+                "V x{i} = {}; EACH(x{i}, {});",
+                wide(a),
+                function_name(*unary)
+            )
         }
         other => unreachable!("{other:?} is the same for all states"),
     }

@@ -4,7 +4,9 @@
 use std::ops::Range;
 use std::sync::OnceLock;
 
-use modelmill_codegen::{DynamicsPrograms, ModelEvaluator, MotionStates, PoseFault, PoseReason, ReactionPrograms};
+use modelmill_codegen::{
+    DynamicsPrograms, ModelEvaluator, MotionStates, PoseFault, PoseReason, ReactionPrograms,
+};
 use modelmill_emit::vectors_c;
 use rayon::prelude::*;
 
@@ -129,7 +131,9 @@ impl ModelFunctions {
     ///
     /// Fails when the function cannot be derived.
     pub fn shape(&self, function: ModelFunction) -> Outcome<[usize; 2]> {
-        let (active, drives) = (self.model.active_coordinates().len(), self.model.drives().len(),
+        let (active, drives) = (
+            self.model.active_coordinates().len(),
+            self.model.drives().len(),
         );
         Ok(match function {
             ModelFunction::InverseDynamics => [drives, 1],
@@ -145,7 +149,11 @@ impl ModelFunctions {
     ///
     /// Fails when something that the function reads is not given or has another length, and at the first state without an
     /// answer.
-    pub fn evaluate_at(&self, function: ModelFunction, given: &StateSamples<'_>, values: &[f64],
+    pub fn evaluate_at(
+        &self,
+        function: ModelFunction,
+        given: &StateSamples<'_>,
+        values: &[f64],
     ) -> Outcome<Vec<f64>> {
         let parts = self.checked_inputs(function, given)?;
         if values.len() != self.model.base.len() {
@@ -224,9 +232,14 @@ impl ModelFunctions {
     }
 
     /// Positions, rates, accelerations and forces as far as they are read, with their lengths looked at.
-    fn checked_inputs<'a>(&self, function: ModelFunction, given: &StateSamples<'a>,
+    fn checked_inputs<'a>(
+        &self,
+        function: ModelFunction,
+        given: &StateSamples<'a>,
     ) -> Outcome<[Option<StateMatrix<'a>>; 4]> {
-        let (active, drives) = (self.model.active_coordinates().len(), self.model.drives().len(),
+        let (active, drives) = (
+            self.model.active_coordinates().len(),
+            self.model.drives().len(),
         );
         let [rates, accelerations, forces] = function.required_inputs();
         let by_load = self.model.load_dependent_effects();

@@ -44,7 +44,10 @@ impl Derivation {
 
     /// How many gaps close the loops, couplings aside: eqs. (L1) to (Ln) of the page.
     pub fn loop_gap_count(&self) -> usize {
-        self.equations.projection.loops.n_gaps(&self.mechanism)
+        self.equations
+            .projection
+            .loops
+            .n_gap_equations(&self.mechanism)
     }
 
     /// How many determinants of the loops are divided by; their equations follow those of the gaps.
@@ -66,9 +69,9 @@ impl Derivation {
         let (mechanism, reduction) = (&self.mechanism, &self.reduction);
         let values = 0..reduction.retained.len();
         BaseFormulas {
-            sums: base::sums(mechanism, reduction),
+            sums: base::dependent_sums(mechanism, reduction),
             values: values
-                .map(|k| base::written_out(mechanism, reduction, k))
+                .map(|k| base::expanded_formula(mechanism, reduction, k))
                 .collect(),
             denominators: base::denominators(mechanism, reduction),
         }

@@ -11,7 +11,8 @@ mod share;
 #[cfg(test)]
 mod tests;
 
-pubuse program::{OperationCount, StraightLineProgram, SINGULAR, ProgramOp, ProgramStage, StraightLineProgram, ValueId,
+pub use program::{
+    OperationCount, PoseGuard, ProgramOp, ProgramStage, SINGULAR, StraightLineProgram, ValueId,
 };
 pub(crate) use schedule::{AtomDefinition, AtomRule};
 
@@ -69,7 +70,10 @@ pub(crate) fn lower(graph: &Graph, request: &LoweringRequest<'_>) -> StraightLin
 }
 
 /// Lowers them with some passes only.
-pub(crate) fn lower_with_passes(graph: &Graph, passes: &[LoweringPass], request: &LoweringRequest<'_>,
+pub(crate) fn lower_with_passes(
+    graph: &Graph,
+    passes: &[LoweringPass],
+    request: &LoweringRequest<'_>,
 ) -> StraightLineProgram {
     let mut roots: Vec<ExprId> = request.outputs.to_vec();
     roots.extend(request.reachable);

@@ -53,7 +53,7 @@ pub enum ProgramOp {
 impl ProgramOp {
     /// The same operation on other operands.
     #[must_use]
-    pubfn map_operands(self, new: impl Fn(ValueId) -> ValueId) -> Self {
+    pub fn map_operands(self, new: impl Fn(ValueId) -> ValueId) -> Self {
         match self {
             Self::Number(_) | Self::Input(_) => self,
             Self::Add(a, b) => Self::Add(new(a), new(b)),
@@ -95,7 +95,7 @@ pub enum ProgramStage {
 }
 
 /// A determinant this much smaller than the magnitude of its terms counts as zero.
-pubconst SINGULAR: f64 = 1e-9;
+pub const SINGULAR: f64 = 1e-9;
 
 /// What must hold at a pose for the model to have an answer.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -221,7 +221,7 @@ impl fmt::Display for OperationCount {
 impl StraightLineProgram {
     /// The same program without the operations that no output and no guard needs.
     #[must_use]
-    pubfn without_dead_code(self) -> Self {
+    pub fn without_dead_code(self) -> Self {
         let mut needed = vec![false; self.ops.len()];
         for value in self
             .outputs
@@ -251,7 +251,7 @@ impl StraightLineProgram {
 
     /// The same program with the operations that `order` names, in that order; operands stand before what needs them.
     #[must_use]
-    pubfn reorder(&self, order: &[usize]) -> Self {
+    pub fn reorder(&self, order: &[usize]) -> Self {
         let mut places: Vec<Option<ValueId>> = vec![None; self.ops.len()];
         let mut ordered = Self::default();
         for i in order {

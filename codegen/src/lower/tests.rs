@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use modelmill_algebra::field::{FieldElement, RandomStream};
 use super::{PASSES, cost};
 use crate::expr::{Atom, EvaluationTape, ExprId, FieldPoint, Graph};
 use crate::{Derivation, derive};
+use modelmill_algebra::field::{FieldElement, RandomStream};
 
 fn derivation(model: &str) -> Derivation {
     let path = Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -101,4 +101,3 @@ fn the_estimated_cost_is_what_the_program_counts() {
         "the estimate {estimate} is off by more than 2 % from {weight}"
     );
 }
-

@@ -16,7 +16,10 @@ pub(crate) fn base_parameter_name(k: usize) -> String {
 }
 
 /// Base parameter `k` written out term by term: what a script reads. It refers to [`sums`].
-pub(crate) fn expanded_formula(mechanism: &Mechanism, reduction: &BaseReduction, k: usize,
+pub(crate) fn expanded_formula(
+    mechanism: &Mechanism,
+    reduction: &BaseReduction,
+    k: usize,
 ) -> PrintedFormula {
     let mut terms = vec![product_formula(
         mechanism,
@@ -33,7 +36,9 @@ pub(crate) fn expanded_formula(mechanism: &Mechanism, reduction: &BaseReduction,
 
 /// What dependent products stand for that others go by: the product itself and theirs, as Gautier and Khalil (1990) group
 /// link by link. Each with its name, after those that it needs.
-pub(crate) fn dependent_sums(mechanism: &Mechanism, reduction: &BaseReduction,
+pub(crate) fn dependent_sums(
+    mechanism: &Mechanism,
+    reduction: &BaseReduction,
 ) -> Vec<(String, PrintedFormula)> {
     let outer_first = reduction.lines_in_dependency_order().into_iter().rev();
     let sum = |line: usize| {
@@ -69,7 +74,10 @@ fn sum_name(mechanism: &Mechanism, reduction: &BaseReduction, line: usize) -> Op
 }
 
 /// What a dependent product brings into others: its sum, or the product itself.
-pub(crate) fn lumped_formulas(mechanism: &Mechanism, reduction: &BaseReduction, line: usize,
+pub(crate) fn lumped_formulas(
+    mechanism: &Mechanism,
+    reduction: &BaseReduction,
+    line: usize,
 ) -> Vec<PrintedFormula> {
     match sum_name(mechanism, reduction, line) {
         Some(name) => vec![PrintedFormula::name(name)],
@@ -82,17 +90,19 @@ pub(crate) fn lumped_formulas(mechanism: &Mechanism, reduction: &BaseReduction, 
 
 /// What base parameters divide by: a function of the constants that may vanish.
 #[derive(Clone, Debug)]
-pubstruct BaseDenominator {
+pub struct BaseDenominator {
     /// The function.
-    pubvalue: PrintedFormula,
+    pub value: PrintedFormula,
     /// The sum of the magnitudes of its terms, sines and cosines taken as 1.
-    pubsize: PrintedFormula,
+    pub size: PrintedFormula,
     /// As people read it.
-    pubtext: String,
+    pub text: String,
 }
 
 /// Every denominator of eq. (16), powers of a constant by the constant itself.
-pub(crate) fn denominators(mechanism: &Mechanism, reduction: &BaseReduction,
+pub(crate) fn denominators(
+    mechanism: &Mechanism,
+    reduction: &BaseReduction,
 ) -> Vec<BaseDenominator> {
     let mut found: BTreeSet<TrigonometricPolynomial> = BTreeSet::new();
     let lines = reduction.dependencies.iter();
@@ -103,7 +113,8 @@ pub(crate) fn denominators(mechanism: &Mechanism, reduction: &BaseReduction,
         }
         let variables = factor.denominator.keys().flatten().map(|(v, _)| *v);
         let variables = variables.filter(|v| !matches!(v, FactorVariable::Root(_)));
-        found.extend(variables.map(|v| TrigonometricPolynomial::from([(vec![(v, 1)], Rational::ONE)])),
+        found.extend(
+            variables.map(|v| TrigonometricPolynomial::from([(vec![(v, 1)], Rational::ONE)])),
         );
     }
     let one = || TrigonometricPolynomial::from([(Vec::new(), Rational::ONE)]);
@@ -143,7 +154,9 @@ fn parameter_factors(mechanism: &Mechanism, product: &ParameterMonomial) -> Vec<
 }
 
 /// A product of parameters as a formula.
-pub(crate) fn product_formula(mechanism: &Mechanism, product: &ParameterMonomial,
+pub(crate) fn product_formula(
+    mechanism: &Mechanism,
+    product: &ParameterMonomial,
 ) -> PrintedFormula {
     PrintedFormula::product(Rational::ONE, parameter_factors(mechanism, product))
 }

@@ -37,8 +37,8 @@ pub(super) fn effects(page: &mut PageDocument, mechanism: &Mechanism) {
         effect.other.is_none()
             && terms.any(|term| {
                 term.expression.mentions(
-                    &|symbol| matches!(symbol, modelmill_spec::ModelSymbol::Place(q) if q.is_other()),
-                )
+                &|symbol| matches!(symbol, modelmill_spec::ModelSymbol::Place(q) if q.is_other()),
+            )
             })
     };
     if mechanism.effects.iter().any(is_coupled) {
@@ -75,7 +75,11 @@ pub(super) fn effects(page: &mut PageDocument, mechanism: &Mechanism) {
 }
 
 /// What an effect adds, as a formula where it is one, else in words.
-fn effect_contribution(mechanism: &Mechanism, effect: &ModelEffect, each: &str, other: &str,
+fn effect_contribution(
+    mechanism: &Mechanism,
+    effect: &ModelEffect,
+    each: &str,
+    other: &str,
 ) -> TextLine {
     let names: Vec<PrintedFormula> = (effect.terms.iter())
         .map(|term| PrintedFormula::name(&*mechanism.parameters[term.parameter.0].name))

@@ -57,12 +57,14 @@ pub(super) fn list_program(
             ProgramOp::Number(_) | ProgramOp::Input(_) | ProgramOp::Neg(_) => None,
             _ if names.contains_key(&i) => Some(names[&i].symbol.clone()),
             ProgramOp::Sin(a) | ProgramOp::Cos(a) => {
-                Some(lister.trigonometric_symbol(op, a.index()))}
+                Some(lister.trigonometric_symbol(op, a.index()))
+            }
             _ if simple => None,
             // An output used nowhere else is written where the outputs are.
             _ if is_output(i) && uses[i].count == 1 => None,
             ProgramOp::Atan2(..) | ProgramOp::Unary(..) => {
-                Some(lister.next_symbol(program.stages[i]))}
+                Some(lister.next_symbol(program.stages[i]))
+            }
             _ if uses[i].count > 1
                 || count_leaves(&formula) > MOST_LEAVES
                 || (program.stages[i] == ProgramStage::Fixed && uses[i].by_state) =>
@@ -164,7 +166,11 @@ impl ListingBuilder<'_> {
 
     /// `s_theta1`, `c_theta1`, ...
     fn trigonometric_symbol(&mut self, op: &ProgramOp, angle: usize) -> FormulaSymbol {
-        let letter = if matches!(op, ProgramOp::Sin(_)) { "s" } else { "c" };
+        let letter = if matches!(op, ProgramOp::Sin(_)) {
+            "s"
+        } else {
+            "c"
+        };
         if !self.angles.contains_key(&angle) {
             let name = angle_name(&self.formulas[angle])
                 .unwrap_or_else(|| format!("angle{}", self.angles.len() + 1));
@@ -183,7 +189,8 @@ impl ListingBuilder<'_> {
             ProgramOp::Number(n) => PrintedFormula::Number(n.clone()),
             ProgramOp::Input(a) => PrintedFormula::Symbol(atom(self.mechanism, *a)),
             ProgramOp::Add(a, b) if a == b => {
-                PrintedFormula::product(Rational::integer(2), [at(a)])}
+                PrintedFormula::product(Rational::integer(2), [at(a)])
+            }
             ProgramOp::Add(a, b) => PrintedFormula::sum([at(a), at(b)]),
             ProgramOp::Sub(a, b) => PrintedFormula::sum([at(a), at(b).negate()]),
             ProgramOp::Mul(a, b) => PrintedFormula::product(Rational::ONE, [at(a), at(b)]),
@@ -193,7 +200,8 @@ impl ListingBuilder<'_> {
             ProgramOp::Sin(a) => PrintedFormula::apply(FormulaFunction::Sin, at(a)),
             ProgramOp::Cos(a) => PrintedFormula::apply(FormulaFunction::Cos, at(a)),
             ProgramOp::Atan2(y, x) => {
-                PrintedFormula::Apply(FormulaFunction::Atan2, vec![at(y), at(x)])}
+                PrintedFormula::Apply(FormulaFunction::Atan2, vec![at(y), at(x)])
+            }
         }
     }
 }

@@ -4,11 +4,12 @@ use std::collections::BTreeSet;
 
 use modelmill_spec::{DriveKind, ModelDrive};
 
-use super::document::{PageBlock, PageDocument, PageEquation, PageTable, TextLine, cell, name, text,
+use super::document::{
+    PageBlock, PageDocument, PageEquation, PageTable, TextLine, cell, name, text,
 };
 use super::listing::{self, ProgramListing};
 use crate::expr::print::{FormulaSymbol, PrintedFormula};
-use crate::lower::{OperationCount, ProgramStage, ProgramStage};
+use crate::lower::{OperationCount, ProgramStage, StraightLineProgram};
 use crate::names::{NamedQuantities, QuantityName, reserved_names};
 use crate::reduce::base::base_parameter_name as base_name;
 use crate::{Derivation, PassivePosition};
@@ -33,12 +34,15 @@ pub(super) fn programs(page: &mut PageDocument, derivation: &Derivation) {
         if program.outputs.is_empty() {
             continue;
         }
-        for (stage, when) in [(ProgramStage::State, "state"), (ProgramStage::Fixed, "geometry"),
+        for (stage, when) in [
+            (ProgramStage::State, "state"),
+            (ProgramStage::Fixed, "geometry"),
         ] {
             let count = program.count_operations(stage);
             // A program that does nothing at a state, or nothing beforehand, needs no line for it.
             if count == OperationCount::default()
-                && (stage == ProgramStage::Fixed || program.count_operations(ProgramStage::Fixed) != count)
+                && (stage == ProgramStage::Fixed
+                    || program.count_operations(ProgramStage::Fixed) != count)
             {
                 continue;
             }
@@ -74,7 +78,11 @@ pub(super) fn programs(page: &mut PageDocument, derivation: &Derivation) {
 }
 
 /// A title, the names of the outputs, the program, and its equations.
-pub(super) type ListedProgram<'a> = (String, Vec<FormulaSymbol>, &'a StraightLineProgram, ProgramListing,
+pub(super) type ListedProgram<'a> = (
+    String,
+    Vec<FormulaSymbol>,
+    &'a StraightLineProgram,
+    ProgramListing,
 );
 
 /// The programs that are shown.
@@ -107,10 +115,9 @@ pub(super) fn listings(derivation: &Derivation) -> Vec<ListedProgram<'_>> {
     if !passive.is_empty() && matches!(programs.passive_position, PassivePosition::Closed) {
         let outputs: Vec<FormulaSymbol> = (0..3)
             .flat_map(|order| {
-                passive
-                    .iter()
-                    .map(move |p| {
-                    FormulaSymbol::time_derivative(&*mechanism.coordinates[*p].name, order)})
+                passive.iter().map(move |p| {
+                    FormulaSymbol::time_derivative(&*mechanism.coordinates[*p].name, order)
+                })
             })
             .collect();
         listings.push((
@@ -131,10 +138,9 @@ pub(super) fn listings(derivation: &Derivation) -> Vec<ListedProgram<'_>> {
             outputs.extend(lengths);
         }
         for d in &mechanism.drives {
-            let row = active
-                .iter()
-                .map(|a| {
-                FormulaSymbol::new(format!("J_{}_{}", d.name, mechanism.coordinates[*a].name))});
+            let row = active.iter().map(|a| {
+                FormulaSymbol::new(format!("J_{}_{}", d.name, mechanism.coordinates[*a].name))
+            });
             outputs.extend(row);
         }
         listings.push(("Drives and their Jacobian", outputs, &programs.drives, "D"));
@@ -233,7 +239,10 @@ fn is_motion(derivation: &Derivation, symbol: &FormulaSymbol) -> bool {
 
 fn is_trivial(program: &StraightLineProgram, i: usize) -> bool {
     use crate::lower::ProgramOp;
-    matches!(program.ops[i], ProgramOp::Number(_) | ProgramOp::Input(_) | ProgramOp::Neg(_))
+    matches!(
+        program.ops[i],
+        ProgramOp::Number(_) | ProgramOp::Input(_) | ProgramOp::Neg(_)
+    )
 }
 
 fn add_folded_listing(page: &mut PageDocument, title: &str, listing: ProgramListing) {
@@ -247,5 +256,6 @@ fn add_folded_listing(page: &mut PageDocument, title: &str, listing: ProgramList
     };
     part("Once per geometry:", fixed);
     part("At every state:", state);
-    page.blocks.push(PageBlock::Folded(title.to_owned(), blocks));
+    page.blocks
+        .push(PageBlock::Folded(title.to_owned(), blocks));
 }

@@ -6,7 +6,9 @@ use std::path::PathBuf;
 
 use modelmill_spec::Mechanism;
 
-use super::{NumericRank, PageFormat, ReducedEquations, base_expression, factored_base_expression, page, programs,
+use super::{
+    NumericRank, PageFormat, ReducedEquations, base_expression, factored_base_expression, page,
+    programs,
 };
 use crate::expr::Atom;
 use crate::expr::print::parse::parse;

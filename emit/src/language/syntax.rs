@@ -45,9 +45,17 @@ pub(crate) trait LanguageSyntax {
     }
 
     /// One operator on two operands; numbers may stand on one side only.
-    fn binary_text(&self, a: &CodeExpression, operator: &str, b: &CodeExpression, binding: OperatorPrecedence,
+    fn binary_text(
+        &self,
+        a: &CodeExpression,
+        operator: &str,
+        b: &CodeExpression,
+        binding: OperatorPrecedence,
     ) -> String {
-        let both = matches!((a, b), (CodeExpression::Number(_), CodeExpression::Number(_)));
+        let both = matches!(
+            (a, b),
+            (CodeExpression::Number(_), CodeExpression::Number(_))
+        );
         let left = if both {
             self.operand_text(a)
         } else {
@@ -57,7 +65,9 @@ pub(crate) trait LanguageSyntax {
             OperatorPrecedence::Sum => OperatorPrecedence::Product,
             _ => OperatorPrecedence::Negation,
         };
-        let (left, right) = (parenthesize(left, a, binding), parenthesize(self.expression_text(b), b, next),
+        let (left, right) = (
+            parenthesize(left, a, binding),
+            parenthesize(self.expression_text(b), b, next),
         );
         format!("{left} {operator} {right}")
     }

@@ -24,7 +24,12 @@ impl LeadingAngles {
             let fixed = program.stages[i] == ProgramStage::Fixed;
             let simple = matches!(
                 op,
-                ProgramOp::Number(_) | ProgramOp::Input(_) | ProgramOp::Add(..) | ProgramOp::Sub(..) | ProgramOp::Mul(..) | ProgramOp::Neg(_)
+                ProgramOp::Number(_)
+                    | ProgramOp::Input(_)
+                    | ProgramOp::Add(..)
+                    | ProgramOp::Sub(..)
+                    | ProgramOp::Mul(..)
+                    | ProgramOp::Neg(_)
             );
             plain[i] = fixed || simple && of_plain;
             if let ProgramOp::Sin(a) = op

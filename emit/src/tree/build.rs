@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use modelmill_codegen::expr::Atom;
 use modelmill_codegen::names::QuantityName;
-use modelmill_codegen::{PoseGuard, ProgramOp, StraightLineProgram, ProgramStage, ValueId};
+use modelmill_codegen::{PoseGuard, ProgramOp, ProgramStage, StraightLineProgram, ValueId};
 
 use super::angles::LeadingAngles;
 use super::order::order;
@@ -22,7 +22,10 @@ const GROUP: usize = 250;
 
 impl StatementRoutine {
     /// The statements of a program; `outputs` are names for its results, if they have any.
-    pub(crate) fn new(program: &StraightLineProgram, scope: &NameScope, outputs: &[String],
+    pub(crate) fn new(
+        program: &StraightLineProgram,
+        scope: &NameScope,
+        outputs: &[String],
     ) -> Self {
         Self::with_result_names(program, scope, outputs, false)
     }
@@ -39,7 +42,9 @@ impl StatementRoutine {
         let named = name_values(program, scope, outputs, &mut taken);
         let inside = inlined_values(program, &named, scope);
         let last = (!results_have_names).then_some(scope.sections.force_section());
-        let sections = scope.sections.value_sections(program, &inside, &named, last);
+        let sections = scope
+            .sections
+            .value_sections(program, &inside, &named, last);
         let turns_signs = sections.is_some();
         let sections = sections.unwrap_or_else(|| vec![0; program.ops.len()]);
         let order = order(program, &inside, &first.done, &sections);
@@ -168,7 +173,10 @@ fn name_values(
 }
 
 /// Values that are written inside the only formula that uses them.
-fn inlined_values(program: &StraightLineProgram, named: &BTreeMap<usize, NamedValue>, scope: &NameScope,
+fn inlined_values(
+    program: &StraightLineProgram,
+    named: &BTreeMap<usize, NamedValue>,
+    scope: &NameScope,
 ) -> Vec<bool> {
     let n = program.ops.len();
     let (uses, by_state) = count_uses(program);
@@ -180,7 +188,8 @@ fn inlined_values(program: &StraightLineProgram, named: &BTreeMap<usize, NamedVa
             ProgramOp::Input(atom) => scope.input_name(*atom).len(),
             ProgramOp::Neg(_) => 1,
             ProgramOp::Unary(..) | ProgramOp::Sin(_) | ProgramOp::Cos(_) | ProgramOp::Atan2(..) => {
-                8}
+                8
+            }
             ProgramOp::Add(..) | ProgramOp::Sub(..) | ProgramOp::Mul(..) | ProgramOp::Div(..) => 3,
         };
         let mut open = Vec::new();
@@ -195,7 +204,9 @@ fn inlined_values(program: &StraightLineProgram, named: &BTreeMap<usize, NamedVa
             let once = uses[k] == 1 && !named.contains_key(&k) && !sine && same_time;
             if is_leaf(&program.ops[k]) {
                 total += width[k];
-            } else if (once || negation) && !(by_state[k] && program.stages[k] == ProgramStage::Fixed) {
+            } else if (once || negation)
+                && !(by_state[k] && program.stages[k] == ProgramStage::Fixed)
+            {
                 inside[k] = once;
                 total += width[k];
                 if once {
@@ -320,7 +331,11 @@ impl Builder<'_> {
 
     /// What each output is called, after the statements.
     fn results(&self) -> Vec<CodeExpression> {
-        self.program.outputs.iter().map(|v| self.operand_expression(*v)).collect()
+        self.program
+            .outputs
+            .iter()
+            .map(|v| self.operand_expression(*v))
+            .collect()
     }
 
     /// Inputs that statements of either stage name.
@@ -370,18 +385,24 @@ impl Builder<'_> {
             ProgramOp::Number(value) => CodeExpression::number(value),
             ProgramOp::Input(atom) => self.scope.input_expression(*atom),
             ProgramOp::Add(a, b) => {
-                CodeExpression::add(self.operand_expression(*a), self.operand_expression(*b))}
+                CodeExpression::add(self.operand_expression(*a), self.operand_expression(*b))
+            }
             ProgramOp::Sub(a, b) => {
-                CodeExpression::sub(self.operand_expression(*a), self.operand_expression(*b))}
+                CodeExpression::sub(self.operand_expression(*a), self.operand_expression(*b))
+            }
             ProgramOp::Mul(a, b) => {
-                CodeExpression::mul(self.operand_expression(*a), self.operand_expression(*b))}
+                CodeExpression::mul(self.operand_expression(*a), self.operand_expression(*b))
+            }
             ProgramOp::Div(a, b) => {
-                CodeExpression::div(self.operand_expression(*a), self.operand_expression(*b))}
+                CodeExpression::div(self.operand_expression(*a), self.operand_expression(*b))
+            }
             ProgramOp::Neg(a) => CodeExpression::neg(self.operand_expression(*a)),
             ProgramOp::Unary(function, a) => {
-                CodeExpression::call(*function, self.operand_expression(*a))}
+                CodeExpression::call(*function, self.operand_expression(*a))
+            }
             ProgramOp::Atan2(y, x) => {
-                CodeExpression::atan2(self.operand_expression(*y), self.operand_expression(*x))}
+                CodeExpression::atan2(self.operand_expression(*y), self.operand_expression(*x))
+            }
             ProgramOp::Sin(a) => return self.write_sine(i, *a, statements),
             ProgramOp::Cos(a) => {
                 if !self
@@ -410,7 +431,9 @@ impl Builder<'_> {
         let unnamed = is_leaf(&op)
             || self.inside[i]
             || only_put && !self.is_precomputed(i)
-            || matches!(op, ProgramOp::Neg(_)) && !self.named.contains_key(&i) && !self.is_precomputed(i);
+            || matches!(op, ProgramOp::Neg(_))
+                && !self.named.contains_key(&i)
+                && !self.is_precomputed(i);
         if unnamed || (self.uses[i] == 0) {
             self.values[i] = Some(value);
             return;
@@ -544,7 +567,8 @@ impl Builder<'_> {
             // Its magnitude is what counts.
             PoseGuard::Regular(v, size) => match self.operand_expression(v) {
                 CodeExpression::Neg(value) => {
-                    PoseCheck::Regular(*value, self.operand_expression(size))}
+                    PoseCheck::Regular(*value, self.operand_expression(size))
+                }
                 value => PoseCheck::Regular(value, self.operand_expression(size)),
             },
             PoseGuard::Finite(v) => PoseCheck::Finite(self.operand_expression(v)),
@@ -553,7 +577,9 @@ impl Builder<'_> {
 }
 
 /// The statements without names that nothing reads: a value may be written out in all places that use it, its sign turned.
-fn without_unread(statements: Vec<CodeStatement>, results: &[CodeExpression],
+fn without_unread(
+    statements: Vec<CodeStatement>,
+    results: &[CodeExpression],
 ) -> Vec<CodeStatement> {
     let mut read = BTreeSet::new();
     for result in results {
@@ -594,7 +620,9 @@ fn without_empty(statements: Vec<CodeStatement>) -> Vec<CodeStatement> {
 /// Long programs in groups of statements, each a block that hands on what later ones need: every name opens a scope inside
 /// the one before, and a compiler that writes debug information scope by scope into each other runs out of stack where
 /// there are many thousands.
-pub(super) fn group_statements(statements: Vec<CodeStatement>, kept: &[String],
+pub(super) fn group_statements(
+    statements: Vec<CodeStatement>,
+    kept: &[String],
 ) -> Vec<CodeStatement> {
     if statements.len() <= LONG {
         return statements;
@@ -634,7 +662,11 @@ impl CodeStatement {
         match self {
             Self::Section(_) | Self::Group { .. } => {}
             Self::Let { value, .. } | Self::Put { value, .. } => value.for_each_name(visit),
-            Self::SinCos { angle, requested: asked, .. } => match asked {
+            Self::SinCos {
+                angle,
+                requested: asked,
+                ..
+            } => match asked {
                 Some(_) => visit(ANGLES),
                 None => angle.for_each_name(visit),
             },

@@ -44,7 +44,10 @@ impl CodeExpression {
         match (a, b) {
             (a, Self::Neg(b)) => Self::sub(a, *b),
             (Self::Neg(a), b) => Self::sub(b, *a),
-            (a, b) if b.precedence() == OperatorPrecedence::Sum && a.precedence() > OperatorPrecedence::Sum => {
+            (a, b)
+                if b.precedence() == OperatorPrecedence::Sum
+                    && a.precedence() > OperatorPrecedence::Sum =>
+            {
                 Self::Add(Box::new(b), Box::new(a))
             }
             (a, b) => Self::Add(Box::new(a), Box::new(b)),
@@ -69,7 +72,8 @@ impl CodeExpression {
     }
 
     fn product(a: Self, b: Self) -> Self {
-        let nested = b.precedence() == OperatorPrecedence::Product && a.precedence() != OperatorPrecedence::Product;
+        let nested = b.precedence() == OperatorPrecedence::Product
+            && a.precedence() != OperatorPrecedence::Product;
         let number = matches!(b, Self::Number(_)) && a.precedence() != OperatorPrecedence::Product;
         let (a, b) = if nested || number { (b, a) } else { (a, b) };
         Self::Mul(Box::new(a), Box::new(b))
@@ -139,7 +143,8 @@ impl CodeExpression {
             Self::Neg(_) => OperatorPrecedence::Negation,
             Self::Number(x) if x.is_sign_negative() => OperatorPrecedence::Negation,
             Self::Number(_) | Self::Name(_) | Self::Call(..) | Self::Atan2(..) => {
-                OperatorPrecedence::Whole}
+                OperatorPrecedence::Whole
+            }
         }
     }
 
@@ -178,8 +183,7 @@ impl CodeExpression {
     }
 
     /// A printed formula as an expression; `rename` says how its names are called.
-    pub(crate) fn from_formula(formula: &PrintedFormula, rename: &dyn Fn(&str) -> String,
-    ) -> Self {
+    pub(crate) fn from_formula(formula: &PrintedFormula, rename: &dyn Fn(&str) -> String) -> Self {
         let of = |f: &PrintedFormula| Self::from_formula(f, rename);
         match formula {
             PrintedFormula::Number(value) => Self::number(value),

@@ -23,7 +23,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use modelmill_codegen::expr::Atom;
 use modelmill_codegen::expr::print::PrintedFormula;
-use modelmill_codegen::{Derivation, ProgramOp, PassivePosition, StraightLineProgram};
+use modelmill_codegen::{Derivation, PassivePosition, ProgramOp, StraightLineProgram};
 
 /// A program as statements.
 #[derive(Clone, Debug)]
@@ -62,7 +62,9 @@ impl StatementRoutine {
 
     /// Whether a statement of a state is such.
     fn has_statement(&self, is_such: &dyn Fn(&CodeStatement) -> bool) -> bool {
-        fn has_statement_in(statements: &[CodeStatement], is_such: &dyn Fn(&CodeStatement) -> bool,
+        fn has_statement_in(
+            statements: &[CodeStatement],
+            is_such: &dyn Fn(&CodeStatement) -> bool,
         ) -> bool {
             statements.iter().any(|statement| match statement {
                 CodeStatement::Group { statements, .. } => has_statement_in(statements, is_such),
@@ -98,7 +100,9 @@ pub(crate) enum CodeStatement {
     /// What must hold for the model to have an answer.
     Guard(PoseCheck),
     /// A result.
-    Put { output: usize, value: CodeExpression,
+    Put {
+        output: usize,
+        value: CodeExpression,
     },
     /// A part of a long program that hands on what later parts need.
     Group {
@@ -155,8 +159,7 @@ pub(crate) fn inputs_of_state(derivation: &Derivation, with_passive: bool) -> Ve
 }
 
 /// Whether a program needs passive coordinates that Newton's method finds.
-pub(crate) fn reads_passive(derivation: &Derivation, program: &StraightLineProgram,
-) -> bool {
+pub(crate) fn reads_passive(derivation: &Derivation, program: &StraightLineProgram) -> bool {
     let (_, passive) = derivation.coordinates();
     matches!(
         derivation.programs.passive_position,
@@ -185,8 +188,7 @@ pub(crate) struct GuardedDivisor {
 }
 
 /// The base parameters of a derivation, by the names of a scope.
-pub(crate) fn base_parameters(derivation: &Derivation, scope: &NameScope,
-) -> BaseParameterCode {
+pub(crate) fn base_parameters(derivation: &Derivation, scope: &NameScope) -> BaseParameterCode {
     let mechanism = &derivation.mechanism;
     let constants = mechanism.constants.iter().enumerate();
     let parameters = mechanism.parameters.iter().enumerate();
@@ -206,14 +208,11 @@ pub(crate) fn base_parameters(derivation: &Derivation, scope: &NameScope,
         value
     };
     let formulas = derivation.base_formulas();
-    let sums = (formulas.sums
-        .iter())
+    let sums = (formulas.sums.iter())
         .map(|(name, formula)| (name.clone(), expression(formula)))
         .collect();
-    let values = formulas.values.iter()
-        .map(&mut expression)
-        .collect();
-    let divisors = (formulas.denominators .into_iter())
+    let values = formulas.values.iter().map(&mut expression).collect();
+    let divisors = (formulas.denominators.into_iter())
         .map(|denominator| GuardedDivisor {
             value: expression(&denominator.value),
             size: expression(&denominator.size),

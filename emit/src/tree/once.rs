@@ -39,7 +39,8 @@ impl PrecomputedValues {
                 CodeStatement::Let { name, value, note } => {
                     let known = self.statements.iter().find_map(|other| match other {
                         CodeStatement::Let { name, value: v, .. } if *v == value => {
-                            Some(name.clone())}
+                            Some(name.clone())
+                        }
                         _ => None,
                     });
                     let new = known.unwrap_or_else(|| {

@@ -64,7 +64,10 @@ pub(crate) fn order(
 }
 
 /// The statements of those operations that are to be put in order.
-fn statements(program: &StraightLineProgram, fused: &[bool], wanted: &dyn Fn(usize) -> bool,
+fn statements(
+    program: &StraightLineProgram,
+    fused: &[bool],
+    wanted: &dyn Fn(usize) -> bool,
 ) -> Vec<SchedulerStatement> {
     let n = program.ops.len();
     let mut statements: Vec<SchedulerStatement> = Vec::new();
@@ -118,7 +121,10 @@ fn statements(program: &StraightLineProgram, fused: &[bool], wanted: &dyn Fn(usi
     for k in (0..statements.len()).rev() {
         let longest = |users: &[usize]| users.iter().map(|u| statements[*u].height).max();
         let after = longest(&statements[k].users).unwrap_or(0);
-        let own = statements[k].ops.iter().map(|i| latency_cycles(&program.ops[*i]));
+        let own = statements[k]
+            .ops
+            .iter()
+            .map(|i| latency_cycles(&program.ops[*i]));
         // Half of a formula's operations wait for the other half.
         let own = own
             .sum::<usize>()
@@ -160,7 +166,11 @@ fn schedule_statements(statements: &[SchedulerStatement]) -> Vec<usize> {
         };
         let best = (0..ready.len()).min_by_key(|place| {
             let k = ready[*place];
-            let pressure = if live < MOST_WAITING_VALUES { 0 } else { kept(k) };
+            let pressure = if live < MOST_WAITING_VALUES {
+                0
+            } else {
+                kept(k)
+            };
             (
                 statements[k].section,
                 pressure,

@@ -3,11 +3,13 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use modelmill_codegen::expr::Atom;
-use modelmill_codegen::{Derivation, PoseGuard, ProgramOp, StraightLineProgram, ProgramStage, ValueId};
-use rustc_hash::FxHashMap;
 use super::scope::NameScope;
 use super::{PrecomputedValues, StatementRoutine};
+use modelmill_codegen::expr::Atom;
+use modelmill_codegen::{
+    Derivation, PoseGuard, ProgramOp, ProgramStage, StraightLineProgram, ValueId,
+};
+use rustc_hash::FxHashMap;
 /// The common part, and which values of it programs read.
 #[derive(Clone, Debug)]
 pub(crate) struct SharedPose {
@@ -38,12 +40,17 @@ impl SharedPose {
         let mut numbers = FxHashMap::default();
         let numbered = programs.map(|program| {
             let values = numbers_of(program, &mut numbers);
-            let guards: Vec<PoseGuard> = program.guards.iter().map(|g| g.map_values(&values)).collect();
+            let guards: Vec<PoseGuard> = program
+                .guards
+                .iter()
+                .map(|guard| renumber_guard(*guard, &values))
+                .collect();
             (program, values, guards)
         });
         let plain = programs.map(pose_dependent_values);
         // The begin of the guards that all programs have that have any of it.
-        let common = |a: &[PoseGuard], b: &[PoseGuard]| a.iter().zip(b).take_while(|(a, b)| a == b).count();
+        let common =
+            |a: &[PoseGuard], b: &[PoseGuard]| a.iter().zip(b).take_while(|(a, b)| a == b).count();
         let (_, _, first) = &numbered[0];
         let others = numbered[1..].iter();
         let shared = others.map(|(_, _, guards)| common(first, guards));
@@ -107,14 +114,16 @@ impl SharedPose {
     }
 
     /// What is left of a program whose common part is computed before; none if it has another one.
-    pub(crate) fn remaining_program(&self, program: &StraightLineProgram,
+    pub(crate) fn remaining_program(
+        &self,
+        program: &StraightLineProgram,
     ) -> Option<StraightLineProgram> {
         let mut numbers = self.numbers.clone();
         let values = numbers_of(program, &mut numbers);
         let guards: Vec<PoseGuard> = program
             .guards
             .iter()
-            .map(|guard| guard.map_values(&values))
+            .map(|guard| renumber_guard(*guard, &values))
             .collect();
         if !guards.starts_with(&self.guards) {
             return None;
@@ -130,20 +139,20 @@ impl SharedPose {
     }
 }
 
-impl PoseGuard {
-    /// The same guard of the values that stand for its own.
-    fn map_values(self, values: &[ValueId]) -> Self {
-        let of = |v: ValueId| values[v.index()];
-        match self {
-            Self::Reachable(v) => Self::Reachable(of(v)),
-            Self::Regular(v, size) => Self::Regular(of(v), of(size)),
-            Self::Finite(v) => Self::Finite(of(v)),
-        }
+/// The same guard of the values that stand for its own.
+fn renumber_guard(guard: PoseGuard, values: &[ValueId]) -> PoseGuard {
+    let new = |v: ValueId| values[v.index()];
+    match guard {
+        PoseGuard::Reachable(v) => PoseGuard::Reachable(new(v)),
+        PoseGuard::Regular(v, size) => PoseGuard::Regular(new(v), new(size)),
+        PoseGuard::Finite(v) => PoseGuard::Finite(new(v)),
     }
 }
 
 /// The numbers of a program's operations, the same for equal ones.
-fn numbers_of(program: &StraightLineProgram, numbers: &mut FxHashMap<ProgramOp, ValueId>,
+fn numbers_of(
+    program: &StraightLineProgram,
+    numbers: &mut FxHashMap<ProgramOp, ValueId>,
 ) -> Vec<ValueId> {
     let mut values: Vec<ValueId> = Vec::with_capacity(program.ops.len());
     for op in &program.ops {
@@ -189,7 +198,8 @@ fn shared_program<'a>(
     let mut places: BTreeMap<ValueId, ValueId> = BTreeMap::new();
     for (part, values, plain) in parts {
         for (i, op) in part.ops.iter().enumerate() {
-            let of_known = matches!(op, ProgramOp::Neg(v) if places.contains_key(&values[v.index()]));
+            let of_known =
+                matches!(op, ProgramOp::Neg(v) if places.contains_key(&values[v.index()]));
             let fixed = part.stages[i] == ProgramStage::Fixed;
             let wanted = fixed || is_leaf(op) || of_known || shared(&values[i]);
             if !wanted || !plain[i] || places.contains_key(&values[i]) {

@@ -198,17 +198,17 @@ fn value_notes(derivation: &Derivation) -> BTreeMap<String, String> {
         notes.insert(format!("Delta_{}", k + 1), tag);
     }
     let mut tag = 0;
-    for (d, drive ) in mechanism.drives .iter().enumerate() {
+    for (d, drive) in mechanism.drives.iter().enumerate() {
         if !matches!(drive.kind, DriveKind::Linear { .. }) {
             continue;
         }
         tag += 1;
         notes.insert(format!("l_{}", drive.name), format!("eq. (D{tag})"));
-        for a in derivation.coordinates_that_move(d){
-                tag += 1;
-                let name = format!("J_{}_{}", drive.name, mechanism.coordinates[a].name);
-                notes.insert(name, format!("eq. (D{tag})"));
-            }
+        for a in derivation.coordinates_that_move(d) {
+            tag += 1;
+            let name = format!("J_{}_{}", drive.name, mechanism.coordinates[a].name);
+            notes.insert(name, format!("eq. (D{tag})"));
+        }
     }
     notes
 }

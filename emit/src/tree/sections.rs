@@ -186,9 +186,8 @@ impl CodeSections {
 
 /// What is said of the loops.
 fn closure_heading(derivation: &Derivation) -> String {
-    let n_gap_equations = derivation.loop_gap_count();
-    let names: Vec<String> = (derivation.mechanism
-        )
+    let n_gaps = derivation.loop_gap_count();
+    let names: Vec<String> = (derivation.mechanism)
         .loops
         .iter()
         .map(|l| format!("`{}`", l.name))

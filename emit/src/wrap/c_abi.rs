@@ -114,7 +114,9 @@ pub(super) fn storage_words(face: &LanguageBinding<'_>) -> usize {
 
 fn fixed_values(program: &modelmill_codegen::StraightLineProgram) -> usize {
     let fixed = program.stages.iter();
-    fixed.filter(|stage| **stage == modelmill_codegen::ProgramStage::Fixed).count()
+    fixed
+        .filter(|stage| **stage == modelmill_codegen::ProgramStage::Fixed)
+        .count()
 }
 
 #[allow(clippy::too_many_lines, reason = "one text from top to bottom")]
@@ -394,7 +396,10 @@ fn items(face: &LanguageBinding<'_>) -> TokenStream {
 }
 
 /// A function of one state; one that is `near` takes passive coordinates of a pose near by.
-fn single_state_function(face: &LanguageBinding<'_>, one: &WrappedFunction, near: bool,
+fn single_state_function(
+    face: &LanguageBinding<'_>,
+    one: &WrappedFunction,
+    near: bool,
 ) -> TokenStream {
     let suffix = if near { "_near" } else { "" };
     let name = format_ident!("{}_{}{suffix}", face.name, one.name);

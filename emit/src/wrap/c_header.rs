@@ -154,10 +154,13 @@ int32_t {name}_prepare({name}_dynamics *dynamics, const double *geometry, const 
             );
         }
     }
-    let states = face.state_parts().iter().fold(String::new(), |mut s, (part, _)| {
-        _ = write!(s, "const double *{part}, ");
-        s
-    });
+    let states = face
+        .state_parts()
+        .iter()
+        .fold(String::new(), |mut s, (part, _)| {
+            _ = write!(s, "const double *{part}, ");
+            s
+        });
     _ = writeln!(
         text,
         "

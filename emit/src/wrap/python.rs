@@ -105,7 +105,9 @@ fn items(face: &LanguageBinding<'_>) -> TokenStream {
         .clone()
         .map(|one| format_ident!("{}", python_name(one)))
         .collect();
-    let singles: Vec<TokenStream> = singles.map(|one| single_state_function(face, one)).collect();
+    let singles: Vec<TokenStream> = singles
+        .map(|one| single_state_function(face, one))
+        .collect();
     let doc_forces = "Forces of the drives, N or N m, for base parameters `p`. `parallel` uses all cores; `geometry` names known \
                       quantities that differ from the model file's.";
     let doc_regressor = "H_min: one row per drive, one column per base parameter. `parallel` and `geometry` as in `inverse_dynamics`.";

@@ -294,7 +294,10 @@ pub(crate) fn record(
     let readings = readings(case, &along);
     let mut noises: Vec<CaseRandom> = (1..=4).map(stream).collect();
     let mut memories = [0.0; 2].map(|_: f64| noises[2].normal());
-    let phase = [noises[2].uniform_between(0.0, TAU), noises[3].uniform_between(0.0, TAU)];
+    let phase = [
+        noises[2].uniform_between(0.0, TAU),
+        noises[3].uniform_between(0.0, TAU),
+    ];
     let (mut errors, mut measured) = (Vec::new(), Vec::new());
     for (i, time) in stamps.iter().enumerate() {
         let _ = write!(csv, "{time:.9}");

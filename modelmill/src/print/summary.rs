@@ -5,7 +5,8 @@ use modelmill_codegen::review::NumericMethod;
 use modelmill_codegen::{BaseReduction, Derivation, ReductionMethod};
 use modelmill_emit::module_name;
 use modelmill_spec::{
-    CoordinateMotion, Diagnostic, DiagnosticSeverity, DriveKind, LoadFailure, LoadedModel, Mechanism, SourceFiles,
+    CoordinateMotion, Diagnostic, DiagnosticSeverity, DriveKind, LoadFailure, LoadedModel,
+    Mechanism, SourceFiles,
 };
 use serde_json::{Value, json};
 
@@ -73,7 +74,9 @@ pub fn warnings(loaded: &LoadedModel, spelling: &dyn RemedySpelling) -> Vec<Valu
 }
 
 /// Diagnostics of a model file as JSON, with file, line and column where they are known.
-fn diagnostics(found: &[Diagnostic], sources: &SourceFiles,
+fn diagnostics(
+    found: &[Diagnostic],
+    sources: &SourceFiles,
     spelling: &dyn RemedySpelling,
 ) -> Vec<Value> {
     found
@@ -203,7 +206,9 @@ impl ModelSummary {
             ),
             ReductionMethod::Exact {
                 at_values: true, ..
-            } => line("reduced", "exactly, for the values of this file only".to_owned(),
+            } => line(
+                "reduced",
+                "exactly, for the values of this file only".to_owned(),
             ),
             ReductionMethod::Exact { .. } | ReductionMethod::Unreduced => {}
         }

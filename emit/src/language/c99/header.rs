@@ -276,7 +276,12 @@ pub(super) fn signature(
     declaration(unit, function.name, owner, near, function.result)
 }
 
-fn declaration(unit: &TranslationUnit<'_>, what: &str, owner: &str, near: bool, result: &str,
+fn declaration(
+    unit: &TranslationUnit<'_>,
+    what: &str,
+    owner: &str,
+    near: bool,
+    result: &str,
 ) -> String {
     let name = &unit.name;
     let (suffix, passive) = if near {

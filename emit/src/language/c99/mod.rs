@@ -109,19 +109,20 @@ impl<'a> TranslationUnit<'a> {
         let programs = &derivation.programs;
         let (active, passive) = derivation.coordinates();
         let of_coordinate = |i: &usize| mechanism.coordinates[*i].name.clone();
-        let function = |program: &'a StraightLineProgram, name, doc: String, result, outputs: Vec<String>| {
-            let routine = StatementRoutine::new(program, &scope, &outputs);
-            let follows = reads_passive(derivation, program);
-            CFunction {
-                program,
-                name,
-                doc,
-                result,
-                routine,
-                follows,
-                is_public: true,
-            }
-        };
+        let function =
+            |program: &'a StraightLineProgram, name, doc: String, result, outputs: Vec<String>| {
+                let routine = StatementRoutine::new(program, &scope, &outputs);
+                let follows = reads_passive(derivation, program);
+                CFunction {
+                    program,
+                    name,
+                    doc,
+                    result,
+                    routine,
+                    follows,
+                    is_public: true,
+                }
+            };
         let each = |letter: &str, suffix: &str| -> Vec<String> {
             let drives = mechanism.drives.iter();
             drives

@@ -349,7 +349,11 @@ fn write_state_inputs(unit: &TranslationUnit<'_>, text: &mut String) {
 }
 
 /// A function that may be called from outside, and its fellow with a guess.
-fn write_public_function(unit: &TranslationUnit<'_>, function: &CFunction<'_>, owner: &str, text: &mut String,
+fn write_public_function(
+    unit: &TranslationUnit<'_>,
+    function: &CFunction<'_>,
+    owner: &str,
+    text: &mut String,
 ) {
     let TranslationUnit { name, upper, .. } = unit;
     let n_state: usize = unit.state_parts().iter().map(|(_, n)| n).sum();
@@ -495,7 +499,11 @@ fn write_forward_dynamics(unit: &TranslationUnit<'_>, text: &mut String) {
 }
 
 /// What the reactions compute once.
-fn write_reaction_preparation(unit: &TranslationUnit<'_>, function: &CFunction<'_>, once: &PrecomputedValues, text: &mut String,
+fn write_reaction_preparation(
+    unit: &TranslationUnit<'_>,
+    function: &CFunction<'_>,
+    once: &PrecomputedValues,
+    text: &mut String,
 ) {
     let TranslationUnit { name, upper, .. } = unit;
     let c = unit.syntax();

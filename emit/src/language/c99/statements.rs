@@ -200,7 +200,8 @@ impl CSyntax<'_> {
                 ));
             }
             CodeStatement::Angles(angles) => {
-                let mut values: Vec<String> = angles.iter().map(|a| self.operand_text(&a.value)).collect();
+                let mut values: Vec<String> =
+                    angles.iter().map(|a| self.operand_text(&a.value)).collect();
                 // They are computed in pairs.
                 if values.len() % 2 == 1 {
                     values.extend(values.last().cloned());

@@ -5,12 +5,17 @@ use proc_macro2::TokenStream;
 use quote::quote;
 
 use super::items::operation_count;
-use super::program::{ExtraItems, PreparationInputs, ProgramMethod, ProgramStateInputs, ProgramStruct, ResultConversion,
+use super::program::{
+    ExtraItems, PreparationInputs, ProgramMethod, ProgramStateInputs, ProgramStruct,
+    ResultConversion,
 };
 use crate::tree::{NameScope, reads_passive};
 
 /// The struct `Dynamics`.
-pub(super) fn dynamics(derivation: &Derivation, scope: &NameScope, dynamics: &DynamicsPrograms,
+pub(super) fn dynamics(
+    derivation: &Derivation,
+    scope: &NameScope,
+    dynamics: &DynamicsPrograms,
 ) -> TokenStream {
     let (active, _) = derivation.coordinates();
     let names = active
@@ -71,20 +76,21 @@ pub(super) fn dynamics(derivation: &Derivation, scope: &NameScope, dynamics: &Dy
             vector,
         ),
     ];
-    let functions = functions.map(|([name, item], program, doc, outputs, output)| ProgramMethod {
-        program,
-        name,
-        item,
-        doc: format!("{doc} {}.", operation_count(program)),
-        inputs: ProgramStateInputs::Motion,
-        outputs,
-        output: Some(output),
-        // The Jacobian stands behind the bias in its program.
-        results: (name == "bias").then(|| ResultConversion {
-            from_type: quote! { Linearisation<T, N_ACTIVE, N_DRIVES> },
-            conversion: quote! { found.values },
-        }),
-    },
+    let functions = functions.map(
+        |([name, item], program, doc, outputs, output)| ProgramMethod {
+            program,
+            name,
+            item,
+            doc: format!("{doc} {}.", operation_count(program)),
+            inputs: ProgramStateInputs::Motion,
+            outputs,
+            output: Some(output),
+            // The Jacobian stands behind the bias in its program.
+            results: (name == "bias").then(|| ResultConversion {
+                from_type: quote! { Linearisation<T, N_ACTIVE, N_DRIVES> },
+                conversion: quote! { found.values },
+            }),
+        },
     );
     ProgramStruct {
         derivation,

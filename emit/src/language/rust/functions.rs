@@ -6,7 +6,8 @@ use quote::quote;
 
 use super::items::operation_count;
 use super::newton::newton;
-use super::program::{ExtraItems, PreparationInputs, ProgramMethod, ProgramStateInputs, ProgramStruct,
+use super::program::{
+    ExtraItems, PreparationInputs, ProgramMethod, ProgramStateInputs, ProgramStruct,
 };
 use crate::tree::{NameScope, reads_passive};
 
@@ -119,7 +120,10 @@ pub(super) fn inverse_dynamics(derivation: &Derivation, scope: &NameScope) -> To
         program,
         name: "forces",
         item: "Forces",
-        doc: format!("Forces of the drives, N or N m. {}.", operation_count(program)),
+        doc: format!(
+            "Forces of the drives, N or N m. {}.",
+            operation_count(program)
+        ),
         inputs: ProgramStateInputs::Motion,
         outputs: drives.map(|d| format!("f_{}", d.name)).collect(),
         output: Some(quote! { [T; N_DRIVES] }),

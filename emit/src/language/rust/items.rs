@@ -10,7 +10,8 @@ use quote::{format_ident, quote};
 
 use super::functions::{inverse_dynamics, is_newton, model};
 use super::program::single_value;
-use super::statements::{RustSyntax, fill_lines, line_tokens, number_token as signed, verbatim_tokens,
+use super::statements::{
+    RustSyntax, fill_lines, line_tokens, number_token as signed, verbatim_tokens,
 };
 use crate::identifier::field_identifier;
 use crate::language::syntax::LanguageSyntax;
@@ -262,7 +263,8 @@ fn base_parameters(derivation: &Derivation, scope: &NameScope) -> TokenStream {
     };
     let geometry = argument("geometry", |atom| matches!(atom, Atom::Constant(_)));
     let parameters = argument("parameters", |atom| matches!(atom, Atom::Parameter(_)));
-    let given = super::program::parameter_bindings(derivation, scope, &read, &geometry, &parameters, "");
+    let given =
+        super::program::parameter_bindings(derivation, scope, &read, &geometry, &parameters, "");
     let names: Vec<_> = (0..n_base)
         .map(|k| field_identifier(scope.input_name(Atom::Base(k))))
         .collect();

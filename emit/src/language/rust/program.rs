@@ -16,7 +16,9 @@ use quote::{format_ident, quote};
 use super::statements::{RustSyntax, fill_lines, line_tokens, statements, verbatim_tokens};
 use crate::identifier::field_identifier;
 use crate::language::syntax::LanguageSyntax;
-use crate::tree::{CodeStatement, NameScope, PrecomputedValues, SharedPose, StatementRoutine, inputs_of_state, reads_passive,
+use crate::tree::{
+    CodeStatement, NameScope, PrecomputedValues, SharedPose, StatementRoutine, inputs_of_state,
+    reads_passive,
 };
 
 /// What a program is made of besides the geometry.
@@ -145,7 +147,11 @@ impl ProgramStruct<'_> {
                 .any(|f| reads_passive(self.derivation, f.program));
         let model_field = newton.then(|| quote! { model: Model<T>, });
         let model_init = newton.then(|| quote! { model: Model::new(geometry), });
-        let kept: Vec<Ident> = once.kept.iter().map(|name| field_identifier(name)).collect();
+        let kept: Vec<Ident> = once
+            .kept
+            .iter()
+            .map(|name| field_identifier(name))
+            .collect();
         let n_kept = Literal::usize_unsuffixed(kept.len());
         let has_once = !kept.is_empty();
         let once_field = has_once.then(|| {
@@ -160,7 +166,9 @@ impl ProgramStruct<'_> {
             quote! { let n = &ScalarNumbers::<T>::new(); #given #statements }
         });
         let once_init = has_once.then(|| quote! { once: values![#(#kept),*], });
-        let (parameters, prepares) = (self.preparation.parameter_tokens(), format!(" {}", self.prepares),
+        let (parameters, prepares) = (
+            self.preparation.parameter_tokens(),
+            format!(" {}", self.prepares),
         );
         let check = self.preparation.check_tokens();
         let ExtraItems {
@@ -291,7 +299,9 @@ impl ProgramStruct<'_> {
         };
         let run = |inputs: TokenStream| match &function.results {
             None => quote! { run_checked(&#item(self), #inputs) },
-            Some(ResultConversion { from_type: of, conversion: made ,
+            Some(ResultConversion {
+                from_type: of,
+                conversion: made,
             }) => quote! {
                 let found: #of = run_checked(&#item(self), #inputs)?;
                 Ok(#made)
@@ -358,8 +368,8 @@ impl ProgramStruct<'_> {
         function: &ProgramMethod<'_>,
         routine: &StatementRoutine,
     ) -> (Vec<TokenStream>, TokenStream) {
-        let newton =
-            function.inputs == ProgramStateInputs::Motion && reads_passive(self.derivation, function.program);
+        let newton = function.inputs == ProgramStateInputs::Motion
+            && reads_passive(self.derivation, function.program);
         let atoms = match function.inputs {
             ProgramStateInputs::Motion => inputs_of_state(self.derivation, newton),
             ProgramStateInputs::Pose => {
@@ -426,7 +436,9 @@ pub(super) fn parameter_bindings(
             return TokenStream::new();
         }
         let fields = wanted.iter().map(|i| {
-            let (field, name) = (field_identifier(names[*i]), field_identifier(scope.input_name(atom(*i))),
+            let (field, name) = (
+                field_identifier(names[*i]),
+                field_identifier(scope.input_name(atom(*i))),
             );
             if field == name {
                 quote! { #field }
@@ -466,7 +478,9 @@ fn array_bindings(entries: impl Iterator<Item = (Ident, usize)>, array: &str) ->
 fn precomputed_bindings(once: &PrecomputedValues, routine: &StatementRoutine) -> TokenStream {
     let places = once.kept.iter().enumerate();
     let read = places.filter(|(_, name)| routine.kept.contains(name));
-    array_bindings(read.map(|(k, name)| (field_identifier(name), k)), "self.once",
+    array_bindings(
+        read.map(|(k, name)| (field_identifier(name), k)),
+        "self.once",
     )
 }
 
@@ -486,7 +500,12 @@ pub(super) fn pose(derivation: &Derivation, scope: &NameScope) -> TokenStream {
     let written_once = statements(&pose.once.statements());
     let begin = (!pose.once.kept.is_empty())
         .then(|| quote! { let n = &ScalarNumbers::<T>::new(); #given_once #written_once });
-    let names: Vec<Ident> = pose.once.kept.iter().map(|name| field_identifier(name)).collect();
+    let names: Vec<Ident> = pose
+        .once
+        .kept
+        .iter()
+        .map(|name| field_identifier(name))
+        .collect();
     let n_kept = Literal::usize_unsuffixed(names.len());
     let read = parameter_bindings(
         derivation,
@@ -505,7 +524,8 @@ pub(super) fn pose(derivation: &Derivation, scope: &NameScope) -> TokenStream {
     let state = pose.routine.state.iter();
     let state = state.filter(|statement| !matches!(statement, CodeStatement::Put { .. }));
     let state = statements(&state.cloned().collect::<Vec<CodeStatement>>());
-    let results = (0..pose.routine.results.len()).map(|k| RustSyntax.name(scope.input_name(Atom::Shared(k))));
+    let results =
+        (0..pose.routine.results.len()).map(|k| RustSyntax.name(scope.input_name(Atom::Shared(k))));
     let results = verbatim_tokens(&fill_lines("Ok(variables![", results, "])").join("\n"));
     quote! {
         /// Where the loops close and the drives are at a pose, the same for all programs.
@@ -538,14 +558,20 @@ pub(super) fn pose(derivation: &Derivation, scope: &NameScope) -> TokenStream {
 }
 
 /// The value of a program without a state, with `geometry` in scope.
-pub(super) fn single_value(derivation: &Derivation, scope: &NameScope, program: &StraightLineProgram,
+pub(super) fn single_value(
+    derivation: &Derivation,
+    scope: &NameScope,
+    program: &StraightLineProgram,
 ) -> TokenStream {
     let routine = StatementRoutine::new(program, scope, &[]);
     let (geometry, nothing) = (quote! { geometry }, TokenStream::new());
     let read: BTreeSet<Atom> = routine.read_once.union(&routine.read).copied().collect();
     let given = parameter_bindings(derivation, scope, &read, &geometry, &nothing, "");
     let once = statements(&routine.once);
-    let result = routine.results.first().map(|result| RustSyntax.operand_text(result));
+    let result = routine
+        .results
+        .first()
+        .map(|result| RustSyntax.operand_text(result));
     let result: TokenStream = result.unwrap_or_default().parse().unwrap_or_default();
     quote! { { let n = &ScalarNumbers::<T>::new(); #given #once (#result).get() } }
 }

@@ -5,7 +5,9 @@ use proc_macro2::{Literal, TokenStream};
 use quote::quote;
 
 use super::items::operation_count;
-use super::program::{ExtraItems, PreparationInputs, ProgramMethod, ProgramStateInputs, ProgramStruct, ResultConversion,
+use super::program::{
+    ExtraItems, PreparationInputs, ProgramMethod, ProgramStateInputs, ProgramStruct,
+    ResultConversion,
 };
 use crate::tree::NameScope;
 

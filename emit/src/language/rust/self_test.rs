@@ -5,7 +5,8 @@ use proc_macro2::{Literal, TokenStream};
 use quote::quote;
 
 use super::items::{loop_scale, nominal_values};
-use super::program::{ExtraItems, PreparationInputs, ProgramMethod, ProgramStateInputs, ProgramStruct,
+use super::program::{
+    ExtraItems, PreparationInputs, ProgramMethod, ProgramStateInputs, ProgramStruct,
 };
 use crate::identifier::field_identifier;
 use crate::tree::{NameScope, uses_load};

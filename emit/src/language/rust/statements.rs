@@ -67,7 +67,10 @@ pub(super) fn line_tokens(written: &[String]) -> TokenStream {
 }
 
 /// Items of a list between its begin and its end, in as many lines as they need.
-pub(super) fn fill_lines(start: &str, items: impl Iterator<Item = String>, end: &str,
+pub(super) fn fill_lines(
+    start: &str,
+    items: impl Iterator<Item = String>,
+    end: &str,
 ) -> Vec<String> {
     let mut lines = vec![start.to_owned()];
     let mut items = items.peekable();
@@ -184,16 +187,26 @@ fn write(statement: &CodeStatement, depth: usize, lines: &mut Vec<String>) {
         }
         CodeStatement::Guard(check) => line(match check {
             PoseCheck::Reachable(value) => {
-                format!("n.reachable({})?;", RustSyntax.operand_text(value))}
+                format!("n.reachable({})?;", RustSyntax.operand_text(value))
+            }
             PoseCheck::Regular(value, size) => {
-                format!("n.regular({}, {})?;", RustSyntax.operand_text(value), RustSyntax.operand_text(size))
+                format!(
+                    "n.regular({}, {})?;",
+                    RustSyntax.operand_text(value),
+                    RustSyntax.operand_text(size)
+                )
             }
             PoseCheck::Finite(value) => format!("n.finite({})?;", RustSyntax.operand_text(value)),
         }),
         CodeStatement::Put { output, value } => {
-            line(format!("n.put({output}, {});", RustSyntax.operand_text(value)));
+            line(format!(
+                "n.put({output}, {});",
+                RustSyntax.operand_text(value)
+            ));
         }
-        CodeStatement::Group { statements, exported: handed ,
+        CodeStatement::Group {
+            statements,
+            exported: handed,
         } => {
             let names: Vec<String> = handed.iter().map(|name| RustSyntax.name(name)).collect();
             let names = names.join(", ");
