@@ -321,7 +321,7 @@ impl WithSimd for BlockExecution<'_, '_> {
                 SlotInstruction::Unary(to, Unary::Abs, a) => apply_unary(memory, to, a, f64::abs),
                 SlotInstruction::Unary(to, Unary::Sign, a) => apply_unary(memory, to, a, sign),
                 SlotInstruction::Unary(to, function, a) => {
-                    apply_unary(memory, to, a, |x| evaluate_unary(function, x))
+                    apply_unary(memory, to, a, |x| evaluate_unary(function, x));
                 }
                 SlotInstruction::SinCos(sin, cos, a) => {
                     let [sin, cos, a] = distinct_slots(memory, [sin, cos, a]);

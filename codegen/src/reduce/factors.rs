@@ -180,7 +180,9 @@ impl PrimeFieldOracle for MotionFactorOracle<'_> {
                     break;
                 }
                 let rows = self.regressor.draw_rows(constants, &mut self.sampling)?;
-                open.iter_mut().for_each(|relation| relation.take(&rows));
+                for relation in &mut open {
+                    relation.take(&rows);
+                }
             }
             let values = open.iter().map(RelationRows::values);
             return Ok(values.collect::<Result<Vec<_>, _>>()?.concat());

@@ -389,7 +389,7 @@ impl AngleAccumulator {
                 for operand in operands {
                     match operand {
                         ExactExpression::Rational(value) => {
-                            factor = &factor * &Rational::from(value.clone())
+                            factor = &factor * &Rational::from(value.clone());
                         }
                         _ if rest.is_none() => rest = Some(operand),
                         _ => return None,

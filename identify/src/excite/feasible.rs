@@ -75,7 +75,7 @@ fn shrink_to_plant_limits(
             }
             // Steps follow the excess, so that little is given away.
             Some((_, excess)) => {
-                factor *= (1.0 - 0.5 * (excess + 2.0 * LIMIT_CLEARANCE)).clamp(0.8, 0.9999)
+                factor *= (1.0 - 0.5 * (excess + 2.0 * LIMIT_CLEARANCE)).clamp(0.8, 0.9999);
             }
             None => factor *= 0.9,
         }

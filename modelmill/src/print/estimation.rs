@@ -173,7 +173,7 @@ pub(crate) fn text(
     match &found.refined {
         RefinementResult::Nothing => {}
         RefinementResult::Prior(_, beliefs) => {
-            lines.push(prior_text(*beliefs, found.unknown.len()))
+            lines.push(prior_text(*beliefs, found.unknown.len()));
         }
         RefinementResult::Essential(dropped, rise) => {
             let names: Vec<String> = dropped.iter().map(|one| name(one.parameter)).collect();

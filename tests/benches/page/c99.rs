@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use modelmill_codegen::Derivation;
-use modelmill_emit::LANGUAGES;
+use modelmill_emit::{EmissionRequest, LANGUAGES};
 
 use crate::models::{Motion, STATES};
 

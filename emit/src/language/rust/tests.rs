@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use modelmill_codegen::{Derivation, Op, Stage, derive};
+use modelmill_codegen::{Derivation, ProgramOp, ProgramStage, derive};
 use proc_macro2::{Delimiter, TokenStream, TokenTree};
 use quote::ToTokens as _;
 
@@ -27,7 +27,7 @@ fn the_printed_count_equals_a_recount_of_the_emitted_source() {
             // What closes loops stands once, in a function of its own, for all programs.
             let [own, pose] = [&format!("{method}_program"), "at"].map(|m| recount(&file, m));
             let recount = (own.0 + pose.0, own.1 + pose.1, own.2 + pose.2);
-            let count = program.count(Stage::State);
+            let count = program.count(ProgramStage::State);
             assert_eq!(
                 recount,
                 (count.add, count.mul, count.div),
@@ -42,7 +42,7 @@ fn the_printed_count_equals_a_recount_of_the_emitted_source() {
             let numbers = program
                 .ops
                 .iter()
-                .filter(|op| matches!(op, Op::Number(_)))
+                .filter(|op| matches!(op, ProgramOp::Number(_)))
                 .count();
             assert!(numbers < program.ops.len());
         }
