@@ -1,4 +1,4 @@
-//! Inner products of columns, channel by channel and apart for fit and check, so that any set of columns is fitted in
+//! Inner products of columns, by channel and separately for fit and validation, so that any set of columns is fitted in
 //! microseconds.
 //!
 //! Decision: a search fits many thousands of sets, so samples are read once. Weights, which change with each
@@ -18,40 +18,47 @@ use super::numbered::ColumnMap;
 use super::problem::SampleLayout;
 use super::tile;
 
-/// Inner products of a column with earlier ones by part (0 is the fit, 1 the check) and channel on which both act, the parts one
-/// after the other; or by fold and channel.
+/// Inner products of a column with earlier ones, by part (0 is the fit, 1 the validation) and channel on which both
+/// act, first all channels of one part. In the maps for folds they are ordered by fold and channel.
 type PairProducts = ColumnMap<Box<[f64]>>;
-/// Inner products of fewer numbers are made as they stand.
+/// Inner products of fewer numbers are computed without dispatch to vector instructions.
 const SHORT: usize = 64;
-/// Sums that an inner product has at once.
+/// Number of partial sums of an inner product.
 pub(crate) const LANES: usize = 16;
 /// Folds of the cross-validation where there is no check.
 const FOLDS: usize = 10;
-/// Fewer inner products of a tile are made one by one.
+/// If fewer products of a tile are unknown, they are computed one by one.
 const FEW: usize = 3;
 
-/// Columns with their inner products, each of which is computed when it is asked for first.
+/// Columns with their inner products, each of which is computed when it is first needed.
 pub(crate) struct ColumnPool<'a> {
+    /// The columns; callers refer to them by index.
     columns: Vec<Cow<'a, ForceColumn>>,
-    /// Channels on which each column acts, a bit for each.
+    /// Channels on which each column acts, one bit per channel.
     acts: Vec<Box<[u64]>>,
-    /// How many there are.
+    /// Number of channels.
     channels: usize,
+    /// Samples of the fit.
     fit: Range<usize>,
+    /// Samples of the validation runs.
     check: Range<usize>,
+    /// Known inner products of each column.
     products: RefCell<Vec<PairProducts>>,
+    /// Known inner products of each column by fold.
     of_folds: RefCell<Vec<PairProducts>>,
     /// Folds of all samples.
     folds: Vec<Range<usize>>,
-    /// Samples that were not measured, by channel: nothing counts them.
+    /// Samples that were not measured, `[channel][sample]`: they never count.
     lost: Vec<Vec<bool>>,
-    /// Samples that are left out of every product, by channel and in order; the lost ones are among them.
+    /// Indices of the samples that are excluded from every product, by channel and sorted; those that were not measured
+    /// are among them.
     left_out: Vec<Vec<usize>>,
-    /// What is known of the factors of the first columns beforehand, as further equations: the inverse of their covariance.
+    /// Prior knowledge of the factors of the first columns, as further equations: the inverse of their covariance.
     pub(crate) prior_equations: Option<DMatrix<f64>>,
 }
 
 impl<'a> ColumnPool<'a> {
+    /// An empty pool for a layout of samples.
     pub(crate) fn new(layout: &SampleLayout) -> Self {
         let fit = layout.fit_samples();
         Self {
@@ -73,7 +80,7 @@ impl<'a> ColumnPool<'a> {
         }
     }
 
-    /// Leaves further samples out of all products and of what is left.
+    /// Excludes further samples, `[channel][sample]`, from all products and residuals.
     pub(crate) fn exclude_samples(mut self, left_out: &[Vec<bool>]) -> Self {
         let all = left_out.iter().enumerate().map(|(d, out)| {
             let lost = self.lost.get(d);
@@ -88,7 +95,7 @@ impl<'a> ColumnPool<'a> {
         self
     }
 
-    /// Inner product of two columns' values on a channel over some samples, without those that are left out.
+    /// Inner product of two columns' values on a channel over a range of samples, without excluded ones.
     pub(crate) fn inner_product(
         &self,
         channel: usize,
@@ -100,7 +107,7 @@ impl<'a> ColumnPool<'a> {
         dot(&a[range.clone()], &b[range]) - less
     }
 
-    /// What samples that are left out would add to an inner product.
+    /// Contribution of the excluded samples to an inner product.
     fn excluded_product(&self, channel: usize, a: &[f64], b: &[f64], range: &Range<usize>) -> f64 {
         let out = self.left_out.get(channel).map_or(&[][..], Vec::as_slice);
         let from = out.partition_point(|i| *i < range.start);
@@ -108,12 +115,12 @@ impl<'a> ColumnPool<'a> {
         out[from..to].iter().map(|i| a[*i] * b[*i]).sum()
     }
 
-    /// All samples.
+    /// Range of all samples.
     pub(crate) fn all_samples(&self) -> Range<usize> {
         0..self.check.end
     }
 
-    /// Makes a series that begins at a sample zero where samples are left out.
+    /// Sets the excluded samples of a series to zero; the series begins at the sample `start`.
     pub(crate) fn zero_excluded(&self, channel: usize, start: usize, values: &mut [f64]) {
         let out = self.left_out.get(channel).map_or(&[][..], Vec::as_slice);
         let from = out.partition_point(|i| *i < start);
@@ -123,7 +130,7 @@ impl<'a> ColumnPool<'a> {
         }
     }
 
-    /// Adds a column; its place.
+    /// Adds a column and returns its index.
     pub(crate) fn add(&mut self, column: impl Into<Cow<'a, ForceColumn>>) -> usize {
         let column = column.into();
         let mut acts = vec![0; column.0.len().div_ceil(64)];
@@ -137,11 +144,12 @@ impl<'a> ColumnPool<'a> {
         self.columns.len() - 1
     }
 
+    /// Number of columns, released ones included.
     pub(crate) fn len(&self) -> usize {
         self.columns.len()
     }
 
-    /// Takes the columns from a place on out again, with all their products.
+    /// Removes all columns from an index on, with their products, and returns them.
     pub(crate) fn split_off(&mut self, known: usize) -> Vec<Cow<'a, ForceColumn>> {
         self.acts.truncate(known);
         self.products.get_mut().truncate(known);
@@ -149,7 +157,7 @@ impl<'a> ColumnPool<'a> {
         self.columns.split_off(known)
     }
 
-    /// Lets go of what a column holds; its place is not given to another.
+    /// Releases the memory of a column; its index is not used again.
     pub(crate) fn release_column(&mut self, k: usize) {
         self.acts[k].fill(0);
         self.columns[k] = Cow::Owned(ForceColumn::default());
@@ -157,27 +165,29 @@ impl<'a> ColumnPool<'a> {
         self.of_folds.get_mut()[k] = PairProducts::default();
     }
 
+    /// The column with an index.
     pub(crate) fn column(&self, k: usize) -> &ForceColumn {
         &self.columns[k]
     }
 
-    /// The values of a column on a channel; `None` where they are zero throughout.
+    /// Values of a column on a channel; `None` where they are all zero.
     fn values(&self, k: usize, channel: usize) -> Option<&[f64]> {
         self.columns[k].0.get(channel)?.as_deref()
     }
 
+    /// Whether a column acts on a channel.
     fn acts_on(&self, k: usize, channel: usize) -> bool {
         let word = self.acts[k].get(channel / 64);
         word.is_some_and(|word| word >> (channel % 64) & 1 == 1)
     }
 
-    /// Whether two columns act on a channel both.
+    /// Whether there is a channel on which both columns act.
     fn has_common_channel(&self, a: usize, b: usize) -> bool {
         let mut words = self.acts[a].iter().zip(&*self.acts[b]);
         words.any(|(a, b)| a & b != 0)
     }
 
-    /// Inner products of two columns by part and common channel.
+    /// Computes the inner products of two columns by part and common channel.
     fn products_of(&self, a: usize, b: usize) -> Box<[f64]> {
         let [a, b] = [a, b].map(|k| &self.columns[k]);
         let parts = [&self.fit, &self.check].into_iter();
@@ -189,10 +199,10 @@ impl<'a> ColumnPool<'a> {
         parts.flat_map(of_part).collect()
     }
 
-    /// Computes the inner products of some columns that are not known yet, those of neighbours together.
+    /// Computes the unknown inner products of some columns, in tiles of neighbouring columns.
     pub(crate) fn compute_products(&self, which: &[usize]) {
         let mut which = which.to_vec();
-        // Neighbours act on the same channels.
+        // Sorted by channels, the columns of a tile mostly act on the same ones.
         which.sort_unstable_by_key(|k| (&self.acts[*k], *k));
         which.dedup();
         let mut products = self.products.borrow_mut();
@@ -202,6 +212,7 @@ impl<'a> ColumnPool<'a> {
                 let mut unknown = Vec::with_capacity(tile::SIDE * tile::SIDE);
                 for (r, a) in rows.iter().enumerate() {
                     for (c, b) in columns.iter().enumerate() {
+                        // A tile on the diagonal has each pair twice.
                         let is_twice = rows == columns && c > r;
                         let (later, earlier) = (*a.max(b), a.min(b));
                         if !is_twice
@@ -224,7 +235,8 @@ impl<'a> ColumnPool<'a> {
         }
     }
 
-    /// The same as [`Pool::products_of`] of some pairs of a tile, in their order.
+    /// The same as [`Self::products_of`] for some pairs of a tile, in their order; a pair is (row, column) within the
+    /// tile.
     fn compute_tile(
         &self,
         rows: &[usize],
@@ -245,7 +257,7 @@ impl<'a> ColumnPool<'a> {
                 {
                     continue;
                 }
-                // Those that do not act here stand in for nothing.
+                // Columns that do not act on this channel are replaced by any other one; their products are not used.
                 let rows = r.map(|one| &one.unwrap_or(any)[part.clone()]);
                 let columns = c.map(|one| &one.unwrap_or(any)[part.clone()]);
                 let sums = tile::tile_products(rows, columns);
@@ -259,12 +271,12 @@ impl<'a> ColumnPool<'a> {
         found.into_iter().map(Vec::into_boxed_slice).collect()
     }
 
-    /// Weighted inner product of two columns on all samples.
+    /// Inner product of two columns on all samples, weighted by channel.
     pub(crate) fn weighted_product(&self, a: usize, b: usize, weights: &[f64]) -> f64 {
         self.scoped_product(a, b, weights, FitScope::All)
     }
 
-    /// The same of columns that need not be in the pool, computed anew.
+    /// The same for columns that are not in the pool; nothing is stored.
     pub(crate) fn weighted_product_of(
         &self,
         a: &ForceColumn,
@@ -275,6 +287,7 @@ impl<'a> ColumnPool<'a> {
         a.common_channels(b).map(on).sum()
     }
 
+    /// Inner product of two columns on fit or all samples, weighted by channel; computed at the first call.
     fn scoped_product(&self, a: usize, b: usize, weights: &[f64], on: FitScope) -> f64 {
         if !self.has_common_channel(a, b) {
             return 0.0;
@@ -285,7 +298,7 @@ impl<'a> ColumnPool<'a> {
             .entry(b)
             .or_insert_with(|| self.products_of(a, b));
         let (fit, check) = known.split_at(known.len() / 2);
-        // Which channels these are is told without a look at the columns.
+        // The bits give the common channels without reading the columns.
         let common = (0..self.channels).filter(|d| self.acts_on(a, *d) && self.acts_on(b, *d));
         let sums = common.zip(fit.iter().zip(check)).map(|(d, (fit, check))| {
             weights[d]
@@ -298,7 +311,7 @@ impl<'a> ColumnPool<'a> {
         sums.sum()
     }
 
-    /// Weighted inner products of some columns on fit, check or both.
+    /// Matrix of weighted inner products of some columns on fit or all samples, with the prior equations added.
     pub(crate) fn gram(&self, which: &[usize], weights: &[f64], on: FitScope) -> DMatrix<f64> {
         let n = which.len();
         let mut gram = DMatrix::zeros(n, n);
@@ -313,7 +326,7 @@ impl<'a> ColumnPool<'a> {
         gram
     }
 
-    /// What is known of two factors before any sample, as part of their inner product.
+    /// Entry of the prior equations for two factors; zero without prior.
     fn prior_term(&self, a: usize, b: usize) -> f64 {
         let entry = self
             .prior_equations
@@ -322,7 +335,7 @@ impl<'a> ColumnPool<'a> {
         entry.copied().unwrap_or(0.0)
     }
 
-    /// Weighted inner products of some columns on each fold.
+    /// Matrices of weighted inner products of some columns, one for each fold with its range of samples.
     pub(crate) fn fold_grams(
         &self,
         which: &[usize],
@@ -335,7 +348,7 @@ impl<'a> ColumnPool<'a> {
         for i in 0..n {
             for j in 0..=i {
                 let (a, b) = (which[i].max(which[j]), which[i].min(which[j]));
-                // Each fold has its share of it.
+                // The prior is divided equally between the folds.
                 let before = self.prior_term(a, b) / self.folds.len() as f64;
                 for gram in &mut grams {
                     gram[(i, j)] = before;
@@ -364,7 +377,7 @@ impl<'a> ColumnPool<'a> {
         self.folds.iter().cloned().zip(grams).collect()
     }
 
-    /// What is left of the column `of` when others are taken off with some factors; zero where samples are left out.
+    /// Column `of` minus the other columns times their factors, `[channel][sample]`; zero at excluded samples.
     pub(crate) fn residual(&self, of: usize, others: &[usize], factors: &[f64]) -> Vec<Vec<f64>> {
         let mut rest = self.full_residual(of, others, factors);
         for (d, rest) in rest.iter_mut().enumerate() {
@@ -373,7 +386,7 @@ impl<'a> ColumnPool<'a> {
         rest
     }
 
-    /// The same of all samples but those that were not measured.
+    /// The same with excluded samples kept; only those that were not measured are zero.
     pub(crate) fn full_residual(
         &self,
         of: usize,
@@ -400,19 +413,20 @@ impl<'a> ColumnPool<'a> {
     }
 }
 
-/// Where something is said, in order.
+/// Indices of the true entries, ascending.
 fn true_indices(said: &[bool]) -> Vec<usize> {
     let samples = said.iter().enumerate();
     samples.filter_map(|(i, said)| said.then_some(i)).collect()
 }
 
+/// Sets values to zero where `out` is true.
 fn zero_where(values: &mut [f64], out: &[bool]) {
     for (value, _) in values.iter_mut().zip(out).filter(|(_, out)| **out) {
         *value = 0.0;
     }
 }
 
-/// Samples that count.
+/// Samples to which a set is fitted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum FitScope {
     /// Those of the fit.
@@ -421,10 +435,10 @@ pub(crate) enum FitScope {
     All,
 }
 
-/// Inner product; several sums at once, which is faster and rounds less. The sums are the same in vectors of any width, so that
-/// a diagnosis decides alike on every machine.
+/// Inner product of two series. Several partial sums are faster and round less. They do not depend on the width of the
+/// vectors, so that a diagnosis decides equally on every machine.
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    // Of a few numbers the choice would cost more than the sum.
+    // For a few numbers the dispatch would cost more than the sum.
     if a.len() < SHORT {
         return sum_products(a, b);
     }
@@ -435,6 +449,7 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     clippy::inline_always,
     reason = "what is inlined has the vectors of its caller"
 )]
+/// Inner product with [`LANES`] partial sums; see [`dot`].
 #[inline(always)]
 fn sum_products(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0; LANES];
@@ -453,11 +468,12 @@ fn sum_products(a: &[f64], b: &[f64]) -> f64 {
     sums.iter().sum::<f64>() + tail
 }
 
-/// A least squares fit from inner products: factors of the first columns, by which the last is explained best, and the
-/// sum of squares that is left. Columns that depend on those before them get the factor zero.
+/// Least squares fit from inner products: factors of the first columns that explain the last column best, and the sum
+/// of squares of the residual. Columns that depend on earlier ones get the factor zero.
 pub(crate) fn solve_gram(gram: &DMatrix<f64>) -> (DVector<f64>, f64) {
     let n = gram.nrows() - 1;
-    // Cholesky's decomposition with columns scaled to 1; rows of the factor are columns here, which lie in one piece.
+    // Cholesky decomposition with columns scaled to 1. It is stored transposed, so that each row of the factor is
+    // contiguous.
     let scale: Vec<f64> = (0..=n).map(|i| gram[(i, i)].sqrt()).collect();
     let mut upper = DMatrix::<f64>::zeros(n + 1, n + 1);
     let mut kept = vec![false; n];
@@ -486,6 +502,7 @@ pub(crate) fn solve_gram(gram: &DMatrix<f64>) -> (DVector<f64>, f64) {
             }
         }
     }
+    // Back substitution for the independent columns; then undo the scaling.
     let mut factors = DVector::zeros(n);
     for i in (0..n).rev() {
         if !kept[i] {
@@ -507,7 +524,7 @@ pub(crate) fn solve_gram(gram: &DMatrix<f64>) -> (DVector<f64>, f64) {
     (factors, upper[(n, n)] * scale[n] * scale[n])
 }
 
-/// Share of a column's squares below which what others leave of it is rounding.
+/// A column is dependent if less than this share of its squares remains after the projection on the others.
 pub(crate) const DEPENDENT: f64 = 1e-9;
 
 #[cfg(test)]
