@@ -17,6 +17,7 @@ const ROUNDING: f64 = 1e-9;
 
 /// A fitted set, prepared for bounds on the residual with further effects.
 pub(crate) struct ExtensionBound<'a> {
+    /// Inner products of all columns, with the base projected out.
     table: &'a ProjectedGram,
     /// What the set explains: `L^-1 c` for the products `c` of each column of the table with the set, as columns.
     halves: DMatrix<f64>,
@@ -179,8 +180,8 @@ mod tests {
         }
     }
 
-    /// What is passed over is worse than the bound that it is passed over for: the bound is never above the criterion, and near
-    /// it where no sign matters.
+    /// What is passed over is worse than the bound that it is passed over for: the bound is never above the criterion,
+    /// and near it where no sign matters.
     #[test]
     fn no_set_is_better_than_its_bound() {
         let value = |i: u32| (0.09 * f64::from(i)).sin() - 0.4 * (0.31 * f64::from(i)).cos();

@@ -1,9 +1,9 @@
-//! What an effect adds to the forces along all recordings.
+//! Columns: what a parameter adds to the forces along all recordings, per unit of the parameter.
 
 use std::borrow::Cow;
 
-/// Numbers along all recordings, for each channel one for every sample: recordings of the fit first, then those of the
-/// check; `None` for a channel on which the column is zero throughout.
+/// Values along all recordings, `[channel][sample]`: recordings of the fit first, then validation runs. `None` for a
+/// channel on which the column is zero throughout.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ForceColumn(pub Vec<Option<Vec<f64>>>);
 
@@ -19,6 +19,7 @@ impl ForceColumn {
         for (slot, values) in self.0.iter_mut().zip(&other.0) {
             let Some(values) = values else { continue };
             match slot {
+                // A channel that is zero so far takes a copy of the other column.
                 Some(sum) => {
                     for (s, x) in sum.iter_mut().zip(values) {
                         *s += factor * x;

@@ -1,5 +1,5 @@
-//! What changes in the course of a recording: the zero of a force's sensor, and friction that warms up. Each recording has
-//! numbers of its own, and a zero that drifts has a level besides, since nobody knows when it was right.
+//! Drift within a recording: of the zero of a force sensor, and of friction that warms up. Each recording has its own
+//! parameters. A drifting zero also has a level, since its correct value is unknown.
 
 use super::column::ForceColumn;
 use super::problem::{
@@ -7,24 +7,27 @@ use super::problem::{
     EffectParameter, LocatedEffect, SignConstraint,
 };
 
-/// A drift of the offset and of the friction of every channel; `units` are those of the forces.
+/// Candidates for a drift of the offset and of the friction of every channel; `units` are those of the forces,
+/// `[channel]`.
 pub fn drift_candidates(problem: &DiagnosisProblem, units: &[String]) -> Vec<CandidateEffect> {
     let layout = &problem.layout;
     let mut recordings: Vec<&str> = layout.segments.iter().map(|s| s.name.as_str()).collect();
     recordings.dedup();
+    // Level and ramp of each recording.
     let ramps: Vec<[Vec<f64>; 2]> = recordings
         .iter()
         .map(|name| recording_ramp(problem, name))
         .collect();
     let mut candidates = Vec::new();
     for (d, channel) in layout.channels.iter().enumerate() {
+        // Friction column of one channel times a function of time.
         let product = |ramp: &[f64], column: &ForceColumn| -> ForceColumn {
             let mut only = ForceColumn(vec![None; layout.channels.len()]);
             let values = column.0[d].iter().flatten();
             only.0[d] = Some(values.zip(ramp).map(|(x, r)| x * r).collect());
             only
         };
-        // Rate, sign of the rate, and a constant.
+        // Columns of the friction of a drive: rate, sign of the rate, and a constant.
         let Some([rate, sign, one]) = problem.friction.get(3 * d..3 * d + 3) else {
             continue;
         };
@@ -35,9 +38,11 @@ pub fn drift_candidates(problem: &DiagnosisProblem, units: &[String]) -> Vec<Can
             let mut parameters = Vec::new();
             let mut columns = Vec::new();
             let has_level = kind == "offset_drift";
+            // Without a sensor there is no offset.
             if has_level && problem.is_idle(d) {
                 continue;
             }
+            // Every recording has parameters of its own.
             for ([level, ramp], name) in ramps.iter().zip(&recordings) {
                 let changes = shapes.iter().map(|shape| ("change of ", ramp, shape));
                 let levels = shapes.iter().map(|shape| ("", level, shape));
@@ -45,6 +50,7 @@ pub fn drift_candidates(problem: &DiagnosisProblem, units: &[String]) -> Vec<Can
                     changes.chain(levels.take(if has_level { shapes.len() } else { 0 }))
                 {
                     let column = product(ramp, shape);
+                    // The drive does not move in this recording.
                     if column.0[d].iter().flatten().all(|x| *x == 0.0) {
                         continue;
                     }
@@ -85,7 +91,8 @@ pub fn drift_candidates(problem: &DiagnosisProblem, units: &[String]) -> Vec<Can
     candidates
 }
 
-/// One along one recording and zero along the others, and the same from minus to plus a half.
+/// Two functions of time: 1 within one recording and 0 in the others, and a ramp from -1/2 to 1/2 within that
+/// recording.
 fn recording_ramp(problem: &DiagnosisProblem, recording: &str) -> [Vec<f64>; 2] {
     let stretches = &problem.layout.segments;
     let of = stretches.iter().filter(|s| s.name == recording);

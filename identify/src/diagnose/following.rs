@@ -20,6 +20,7 @@ impl EffectSelector<'_> {
         &mut self,
         picks: &[SelectedEffect],
     ) -> HashMap<usize, SelectedEffect> {
+        // Without load-dependent candidates the load is not needed.
         let is_carried = |c: &CandidateEffect| matches!(c.source, ColumnSource::LoadDependent);
         if !self.problem.candidates.iter().any(is_carried) {
             return HashMap::new();
@@ -40,6 +41,7 @@ impl EffectSelector<'_> {
             let candidate = self.candidate(pick);
             pick.columns.iter().map(|_| candidate.is_part_of_load)
         });
+        // Masses and weight count, of the model as well as of the set.
         let is_part_of_load: Vec<bool> = (self.problem.base_is_part_of_load.iter().copied())
             .chain(of_picks)
             .collect();
@@ -54,6 +56,7 @@ impl EffectSelector<'_> {
     /// drive.
     fn load_with_friction(&self, picks: &[SelectedEffect]) -> ForceColumn {
         let (factors, _) = self.fit(picks, FitScope::All);
+        // The load-dependent effects themselves are not part of their own load.
         let is_own = picks.iter().flat_map(|pick| {
             let is_carried = matches!(self.candidate(pick).source, ColumnSource::LoadDependent);
             pick.columns.iter().map(move |_| is_carried)
@@ -66,6 +69,7 @@ impl EffectSelector<'_> {
 
     /// Sum of some columns times factors and of the forces of fixed parameters.
     fn sum_columns(&self, parts: impl Iterator<Item = (usize, f64)>) -> ForceColumn {
+        // Forces of fixed parameters are part of every load.
         let mut sum = self.problem.fixed_forces.clone().unwrap_or_default();
         sum.0.resize(self.weights.len(), None);
         for (k, factor) in parts {
@@ -111,6 +115,7 @@ impl EffectSelector<'_> {
             factors.as_slice()[start..start + picks[i].columns.len()].to_vec()
         });
         let columns: Vec<ForceColumn> = match &self.problem.candidates[candidate].source {
+            // Tilt: derivatives with respect to gravity, combined along the directions in which it turns.
             ColumnSource::Tilt(tilt) => {
                 // Forces per component of gravity, then along the directions in which gravity turns.
                 let angles = found.unwrap_or_else(|| vec![0.0; tilt.axes.len()]);
@@ -134,6 +139,7 @@ impl EffectSelector<'_> {
                     })
                     .collect()
             }
+            // Sensor fault: computed from the fitted force without the column of the fault itself.
             ColumnSource::ReadingFault(reading) => {
                 // The force that acts: the fitted force without the part that the fault itself explains.
                 let mut force = self.problem.fixed_forces.clone().unwrap_or_default();
@@ -150,9 +156,11 @@ impl EffectSelector<'_> {
                     found.map_or(0.0, |value| value[0]),
                 )]
             }
+            // Body: derivatives at the estimated centre.
             ColumnSource::Body(body) => {
                 body.columns(found.map_or([0.0; 3], |values| body.centre(&values)))
             }
+            // Constant: secant between no error and the estimated error.
             ColumnSource::Constant(constant) => {
                 let error = found.map_or(0.0, |values| values[0]);
                 // The derivatives are those of the base columns, whose factors come first.
@@ -180,6 +188,7 @@ impl EffectSelector<'_> {
         let candidate = picks[member].candidate;
         let value = picks[member].constants.first().map(|(_, value)| *value);
         let which = LoadDependentQuery::One(candidate, value);
+        // Columns for both definitions of the load; the better one is kept.
         let loads = [self.load(picks), self.load_with_friction(picks)];
         let ways = loads.map(|load| self.load_friction_effects(&load, which).remove(&candidate));
         let squares = |way: &SelectedEffect| {
@@ -206,8 +215,10 @@ impl EffectSelector<'_> {
                 ) {
                     continue;
                 }
+                // Later members use the new columns of earlier ones.
                 let (factors, _) = self.fit(&picks, FitScope::All);
                 let rank = picks[i].rank;
+                // The rank stays, since the columns change only slightly.
                 let anew = match self.problem.candidates[candidate].source {
                     ColumnSource::LoadDependent => self.best_load_dependent(&picks, i),
                     _ => Some(self.linearise_model_change(candidate, &picks.clone(), &factors)),
@@ -226,6 +237,7 @@ impl EffectSelector<'_> {
         let added = self.pool.split_off(known);
         let is_known = |columns: &[usize]| columns.iter().all(|k| *k < known);
         (self.span_cache.get_mut()).retain(|(one, other), _| is_known(one) && is_known(other));
+        // Columns of the set are added again behind the known ones.
         for k in picks.iter_mut().flat_map(|pick| &mut pick.columns) {
             if *k >= known {
                 *k = self.pool.add(added[*k - known].clone());
@@ -239,6 +251,7 @@ impl EffectSelector<'_> {
         known: usize,
         but: impl IntoIterator<Item = &'p SelectedEffect>,
     ) {
+        // Indices that must stay valid.
         let kept: HashSet<usize> = (but.into_iter())
             .flat_map(|pick| pick.columns.iter().copied())
             .collect();

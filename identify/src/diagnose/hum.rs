@@ -95,6 +95,7 @@ pub(crate) fn remove_lines(problem: &mut DiagnosisProblem, rest: &[Vec<f64>]) ->
 
 /// A slow spectral line in one channel.
 pub(crate) struct SlowSpectralLine {
+    /// Index of the channel.
     channel: usize,
     /// Frequency, Hz.
     frequency: f64,
@@ -156,6 +157,7 @@ pub(crate) fn slow_lines(
 /// Fits one sinusoid to the residual of a channel, with its own amplitude and phase in every segment, together with
 /// base and friction.
 struct SinusoidFitter<'a> {
+    /// Segments, base columns and friction.
     problem: &'a DiagnosisProblem,
     channel: usize,
     /// Residual of the channel without a sinusoid.
@@ -165,11 +167,13 @@ struct SinusoidFitter<'a> {
     base_columns: Vec<usize>,
     /// Pool column of the residual of all channels.
     target: usize,
+    /// Weight of each channel: one over the mean square of its residual.
     weights: Vec<f64>,
 }
 
 /// A fitted sinusoid.
 struct SinusoidFit {
+    /// Its force at every sample of the channel, N or N m.
     explained: Vec<f64>,
     /// Residual of its channel.
     residual: Vec<f64>,

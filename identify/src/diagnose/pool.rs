@@ -133,6 +133,7 @@ impl<'a> ColumnPool<'a> {
     /// Adds a column and returns its index.
     pub(crate) fn add(&mut self, column: impl Into<Cow<'a, ForceColumn>>) -> usize {
         let column = column.into();
+        // Store the channels as bits, so that common channels are found without reading values.
         let mut acts = vec![0; column.0.len().div_ceil(64)];
         for d in column.channels() {
             acts[d / 64] |= 1 << (d % 64);
@@ -190,6 +191,7 @@ impl<'a> ColumnPool<'a> {
     /// Computes the inner products of two columns by part and common channel.
     fn products_of(&self, a: usize, b: usize) -> Box<[f64]> {
         let [a, b] = [a, b].map(|k| &self.columns[k]);
+        // Fit and validation separately, each over the common channels.
         let parts = [&self.fit, &self.check].into_iter();
         let of_part = |range: &Range<usize>| {
             let range = range.clone();
@@ -206,6 +208,7 @@ impl<'a> ColumnPool<'a> {
         which.sort_unstable_by_key(|k| (&self.acts[*k], *k));
         which.dedup();
         let mut products = self.products.borrow_mut();
+        // Every pair of groups is a tile of at most SIDE x SIDE products.
         let groups: Vec<&[usize]> = which.chunks(tile::SIDE).collect();
         for (i, rows) in groups.iter().enumerate() {
             for columns in &groups[..=i] {
@@ -214,6 +217,7 @@ impl<'a> ColumnPool<'a> {
                     for (c, b) in columns.iter().enumerate() {
                         // A tile on the diagonal has each pair twice.
                         let is_twice = rows == columns && c > r;
+                        // A product is stored with the column of the larger index.
                         let (later, earlier) = (*a.max(b), a.min(b));
                         if !is_twice
                             && self.has_common_channel(*a, *b)
@@ -226,6 +230,7 @@ impl<'a> ColumnPool<'a> {
                 if unknown.len() < FEW {
                     continue; // Single products cost less.
                 }
+                // One pass over the samples gives all unknown products of the tile.
                 let made = self.compute_tile(rows, columns, &unknown);
                 for ((r, c), found) in unknown.into_iter().zip(made) {
                     let (a, b) = (rows[r], columns[c]);
@@ -248,6 +253,7 @@ impl<'a> ColumnPool<'a> {
             for d in 0..self.channels {
                 let r: [_; tile::SIDE] = array::from_fn(|k| self.values(*rows.get(k)?, d));
                 let c: [_; tile::SIDE] = array::from_fn(|k| self.values(*columns.get(k)?, d));
+                // No row of the tile acts on this channel.
                 let Some(any) = r.iter().flatten().next() else {
                     continue;
                 };
@@ -292,11 +298,13 @@ impl<'a> ColumnPool<'a> {
         if !self.has_common_channel(a, b) {
             return 0.0;
         }
+        // Products are stored with the column of the larger index.
         let (a, b) = (a.max(b), a.min(b));
         let mut products = self.products.borrow_mut();
         let known = products[a]
             .entry(b)
             .or_insert_with(|| self.products_of(a, b));
+        // First half: products on the fit; second half: on the validation runs.
         let (fit, check) = known.split_at(known.len() / 2);
         // The bits give the common channels without reading the columns.
         let common = (0..self.channels).filter(|d| self.acts_on(a, *d) && self.acts_on(b, *d));
@@ -357,6 +365,7 @@ impl<'a> ColumnPool<'a> {
                 if !self.has_common_channel(a, b) {
                     continue;
                 }
+                // Common channels of both columns, with their values.
                 let both = || self.columns[a].common_channels(&self.columns[b]);
                 common.clear();
                 common.extend(both().map(|(d, ..)| weights[d]));
@@ -367,6 +376,7 @@ impl<'a> ColumnPool<'a> {
                     };
                     self.folds.iter().flat_map(of_fold).collect()
                 });
+                // Weighted sum over the channels of each fold.
                 for (gram, part) in grams.iter_mut().zip(known.chunks(common.len())) {
                     let sum: f64 = part.iter().zip(&common).map(|(p, w)| p * w).sum();
                     gram[(i, j)] = sum + before;
@@ -393,6 +403,7 @@ impl<'a> ColumnPool<'a> {
         others: &[usize],
         factors: &[f64],
     ) -> Vec<Vec<f64>> {
+        // Start with the column and subtract the others one after the other.
         let samples = self.check.end;
         let mut rest: Vec<Vec<f64>> = (self.columns[of].0.iter())
             .map(|values| values.clone().unwrap_or_else(|| vec![0.0; samples]))
@@ -453,6 +464,7 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
 #[inline(always)]
 fn sum_products(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0; LANES];
+    // Groups of LANES numbers, each with its own partial sum; the tail is added at the end.
     let (chunks_a, chunks_b) = (a.chunks_exact(LANES), b.chunks_exact(LANES));
     let tail: f64 = chunks_a
         .remainder()
@@ -485,11 +497,14 @@ pub(crate) fn solve_gram(gram: &DMatrix<f64>) -> (DVector<f64>, f64) {
             if j < i && !kept[j] {
                 continue;
             }
+            // The part that earlier columns of the factor explain.
             let known = dot(
                 &upper.column(i).as_slice()[..j],
                 &upper.column(j).as_slice()[..j],
             );
             let sum = gram[(j, i)] / (scale[i] * scale[j]) - known;
+            // Off-diagonal entry, squared residual of the last column, or a new diagonal entry; dependent columns are
+            // cleared.
             if j < i {
                 upper[(j, i)] = sum / upper[(j, j)];
             } else if i == n {

@@ -78,6 +78,7 @@ pub(crate) struct EffectSearchResult {
 impl EffectSelector<'_> {
     /// Searches forward until no further set is supported, then exchanges and removes members.
     pub(crate) fn search_sets(&mut self) -> EffectSearchResult {
+        // The accepted set grows from step to step; the beam contains other good sets that are extended as well.
         let mut accepted: Vec<SelectedEffect> = Vec::new();
         let mut steps = Vec::new();
         let mut beam: Vec<Vec<SelectedEffect>> = vec![Vec::new()];
@@ -104,10 +105,12 @@ impl EffectSelector<'_> {
                 .map(|other| other.picks.clone())
                 .collect();
             accepted.clone_from(&step.picks);
+            // The accepted set is always extended, even if other sets have better scores.
             if !beam.contains(&accepted) {
                 beam.insert(0, accepted.clone());
             }
             steps.push(step);
+            // A limit for recordings that no set explains.
             if accepted.len() >= MOST {
                 break;
             }
@@ -126,6 +129,7 @@ impl EffectSelector<'_> {
         } else {
             pruned
         };
+        // Parameters with random signs are set to zero in the result as well.
         let pruned = self.fit_set(pruned).picks;
         if pruned != accepted {
             steps.push(EffectSetChange {
@@ -148,6 +152,7 @@ impl EffectSelector<'_> {
         refused: &mut Vec<RejectedCandidate>,
     ) -> Option<EffectSetChange> {
         loop {
+            // The first set that is supported by evidence.
             let next = self.next_supported_set(accepted, trials, refused)?;
             // Prefer simple effects, then refine constants and compare with close rivals.
             let (trial, evidence) = self
@@ -170,6 +175,7 @@ impl EffectSelector<'_> {
                     evidence: Some(evidence),
                 });
             }
+            // The set has lost its support; try the next one without it.
             trials.retain(|trial| candidate_indices(&trial.picks) != next.candidates);
         }
     }
@@ -182,6 +188,7 @@ impl EffectSelector<'_> {
         trials: &[ScoredEffectSet],
         refused: &mut Vec<RejectedCandidate>,
     ) -> Option<SupportedEffectSet> {
+        // Sets that only add an effect, and all others.
         let (grown, exchanged): (Vec<&ScoredEffectSet>, Vec<&ScoredEffectSet>) =
             trials.iter().partition(|t| self.is_addition(accepted, t));
         let mut additions = grown.into_iter();
@@ -193,6 +200,7 @@ impl EffectSelector<'_> {
             .map_or(f64::INFINITY, |next| next.trial.score - MUCH_BETTER);
         let mut others = exchanged.into_iter().filter(|t| t.score < bound);
         let other = self.first_supported_set(accepted, &mut others, &mut Vec::new());
+        // Compare the other set directly with the grown one.
         let other = other.filter(|other| {
             chosen.as_ref().is_none_or(|grown| {
                 let evidence = self.evidence_between(&grown.trial.picks, &other.trial.picks);
@@ -259,6 +267,7 @@ impl EffectSelector<'_> {
             if tested == TESTED {
                 break;
             }
+            // Columns that depend on the fit are computed for this set before it is tested.
             let tried = candidate_indices(&trial.picks);
             let trial = self.refit_dependent_columns(trial);
             // A set that is impossible once its columns have the right size does not count as a test.
@@ -272,6 +281,7 @@ impl EffectSelector<'_> {
                     evidence,
                 });
             }
+            // Only single effects are reported as rejected; a pair has no reason of its own.
             if let [pick] = news.as_slice() {
                 refused.push(RejectedCandidate {
                     pick: pick.clone(),
@@ -298,6 +308,7 @@ impl EffectSelector<'_> {
         let (factors, _) = self.fit(accepted, FitScope::All);
         let rest = self.residual(accepted, &factors);
         let channels: Vec<usize> = (0..rest.len()).collect();
+        // Number of independent equations for the information criterion.
         let worth = self.effective_equations(&rest, &channels);
         let mut trials: Vec<ScoredEffectSet> = Vec::new();
         let mut known: HashSet<Vec<usize>> = HashSet::new();
@@ -319,6 +330,7 @@ impl EffectSelector<'_> {
                     picks = rest;
                 }
                 picks.push(pick);
+                // The same set may be reached from several sets of the beam.
                 if known.insert(candidate_indices(&picks)) {
                     trials.push(self.fit_from_gram(&table, picks));
                 }
@@ -342,6 +354,7 @@ impl EffectSelector<'_> {
                     .max(self.effective_equations(&self.residual(&best.picks, &factors), &channels))
             });
         let problem = self.problem;
+        // Sort by the criterion and keep the best sets.
         let score = |trial: &ScoredEffectSet| criterion(problem, trial, worth);
         trials.sort_by(|a, b| score(a).total_cmp(&score(b)));
         trials.dedup_by(|a, b| is_same_set(&a.picks, &b.picks));
@@ -358,6 +371,7 @@ impl EffectSelector<'_> {
         let table = self.projected_gram(&all);
         // Stage 3: exchange every member of the best sets for every other candidate, as long as a set gets better.
         for k in 0..trials.len().min(BEAM) {
+            // Repeat as long as any exchange improves the set.
             let mut best = trials[k].clone();
             loop {
                 let mut better: Option<ScoredEffectSet> = None;
@@ -381,6 +395,7 @@ impl EffectSelector<'_> {
                         picks[i] = pick;
                         let trial = self.fit_from_gram(&table, picks);
                         let own = score(&trial);
+                        // The best exchange of this round.
                         if own < bound {
                             bound = own;
                             better = Some(trial);
@@ -424,6 +439,7 @@ impl EffectSelector<'_> {
             set.push(pick.clone());
             self.fit_from_gram(table, set).squares
         };
+        // Only effects with at most two estimated numbers take part in pairs.
         let simple = self.current_choices.iter().flatten().filter(is_new);
         let simple = simple.filter(|pick| self.freedoms(pick) <= 2);
         let mut further: Vec<(f64, &SelectedEffect)> =
@@ -454,6 +470,7 @@ impl EffectSelector<'_> {
                     let trial = self.fit_from_gram(table, picks);
                     let own = criterion(self.problem, &trial, worth);
                     if best.len() < BEST_PAIRS || best.last().is_some_and(|(last, _)| own < *last) {
+                        // Insert in order, so that the last entry is the worst of the list.
                         let at = best.partition_point(|(other, _)| *other < own);
                         best.insert(at, (own, trial));
                         best.truncate(BEST_PAIRS);
@@ -467,6 +484,7 @@ impl EffectSelector<'_> {
     /// Exchanges members of a set for candidates that are nearly as good, each with finely searched constants: on the
     /// grids, the wrong candidate may have been nearer to its best value.
     fn exchange_finely(&mut self, mut picks: Vec<SelectedEffect>) -> Vec<SelectedEffect> {
+        // Whether a candidate has constants that are searched.
         let is_searched =
             |bench: &Self, pick: &SelectedEffect| bench.candidate(pick).searched_constants > 0;
         let mut table = self.projected_gram(&picks);
@@ -482,6 +500,8 @@ impl EffectSelector<'_> {
                 others_are_searched
                     && (one.kind == two.kind || one.at.iter().any(|place| two.at.contains(place)))
             };
+            // Rivals with no more estimated numbers, if one of both has searched constants or if they are similar
+            // effects.
             let rivals: Vec<SelectedEffect> = self
                 .current_choices
                 .iter()
@@ -510,6 +530,7 @@ impl EffectSelector<'_> {
                 };
                 let kind = |pick: &SelectedEffect| self.candidate(pick).effect.kind.clone();
                 let squares = self.fit_set(tuned.clone()).squares;
+                // Only rivals that are close on the grid are worth a fine search.
                 let is_close = if kind(&tuned[i]) == kind(&own) {
                     squares <= CLOSE_ON_A_GRID * best.squares
                 } else {
@@ -521,6 +542,7 @@ impl EffectSelector<'_> {
                 }
                 let tuned = self.refine_around_member(tuned, i);
                 let trial = self.fit_set(tuned);
+                // Compare the squared residuals with finely searched constants.
                 if trial.is_possible() && trial.squares < best.squares {
                     best = trial;
                 }
@@ -540,6 +562,7 @@ impl EffectSelector<'_> {
         accepted: &[SelectedEffect],
         best: &ScoredEffectSet,
     ) -> Option<(ScoredEffectSet, SelectionEvidence)> {
+        // Estimated numbers that the large effect adds: the budget for simple ones.
         let before: usize = accepted.iter().map(|p| self.freedoms(p)).sum();
         let budget = best.freedoms.checked_sub(before)?;
         if budget < 2 {
@@ -548,6 +571,7 @@ impl EffectSelector<'_> {
         let mut all = accepted.to_vec();
         all.extend(best.picks.iter().cloned());
         let table = self.projected_gram(&all);
+        // Simple effects have one estimated number and are no sensor faults or wrong constants.
         let simple: Vec<&SelectedEffect> = self
             .current_choices
             .iter()
@@ -576,6 +600,7 @@ impl EffectSelector<'_> {
             let next = trials.min_by(|a, b| a.squares.total_cmp(&b.squares))?;
             set.clone_from(&next.picks);
             first.get_or_insert_with(|| next.clone());
+            // The simple effects together explain more; accept the first one, if it is supported.
             if next.squares < best.squares {
                 let first = first?;
                 let news = set_difference(&first.picks, accepted);
@@ -599,11 +624,13 @@ impl EffectSelector<'_> {
         let mut chosen = (best, evidence);
         // A kind that contains a simpler one, such as friction that depends on the direction, comes after it. A
         // refinement of a member comes after other simple kinds.
+        // Whether the best set replaces a member by a more general effect.
         let refines = !Self::replaced_effects(accepted, &chosen.0.picks).is_empty();
         let beside = self.conditioning_set(accepted);
         let nested = trials.iter().filter(|trial| {
             let news = set_difference(&trial.picks, accepted);
             let bests = set_difference(&chosen.0.picks, accepted);
+            // Both sets must differ from the accepted one by exactly one effect.
             let [simple] = news.as_slice() else {
                 return false;
             };
@@ -626,6 +653,7 @@ impl EffectSelector<'_> {
             let is_refined = set_difference(&chosen.0.picks, accepted)
                 .iter()
                 .any(|best| self.candidate(best).refines.as_ref() == Some(kind));
+            // Share of the gain that the simpler kind must reach.
             let most_of = if refines || is_refined {
                 OTHER_KIND_SHARE
             } else {
@@ -646,6 +674,7 @@ impl EffectSelector<'_> {
             }
             let news = set_difference(&trial.picks, accepted);
             let channels = self.affected_channels(&news);
+            // Twice the logarithm of the likelihood ratio must be small.
             let ratio = trial.squares / chosen.0.squares.max(f64::MIN_POSITIVE);
             if chosen.1.effective_samples * ratio.ln() > 2.0 {
                 continue;
@@ -685,6 +714,7 @@ const PLACE: f64 = 0.01;
 /// places.
 fn overlap(problem: &DiagnosisProblem, picks: &[SelectedEffect]) -> f64 {
     let effect = |pick: &SelectedEffect| &problem.candidates[pick.candidate].effect;
+    // Number of later effects of the same kind that share a place.
     let twice = |(i, one): (usize, &SelectedEffect)| {
         let others = picks[i + 1..].iter().filter(|other| {
             effect(one).kind == effect(other).kind

@@ -18,6 +18,7 @@ impl EffectSelector<'_> {
     /// Replaces members by simpler kinds if no evidence supports the general one.
     fn simplify(&mut self, mut picks: Vec<SelectedEffect>) -> Vec<SelectedEffect> {
         for i in 0..picks.len() {
+            // An effect with one parameter cannot be simplified.
             if picks[i].columns.len() < 2 {
                 continue;
             }
@@ -38,6 +39,7 @@ impl EffectSelector<'_> {
                 .filter(|one| self.is_in_conditional_span(one, &own, &beside))
                 .cloned()
                 .collect();
+            // Evidence is computed on the channels of the member only.
             let channels = self.affected_channels(std::slice::from_ref(&own));
             for simple in nested {
                 let mut set = picks.clone();
@@ -73,6 +75,7 @@ impl EffectSelector<'_> {
     /// than the set at the start.
     pub(crate) fn prune(&mut self, picks: Vec<SelectedEffect>) -> Vec<SelectedEffect> {
         self.weigh_channels(&picks);
+        // The set before any removal is the reference for all removals.
         let whole = picks.clone();
         let mut picks = self.simplify(picks);
         loop {
@@ -92,6 +95,7 @@ impl EffectSelector<'_> {
                 .collect();
             // Try the removals in order of their gain, the smallest first.
             unsupported.sort_by(|a, b| a.1.total_cmp(&b.1));
+            // Remove the first member without which the set is not worse than the reference.
             let fewer = unsupported.into_iter().find_map(|(i, _)| {
                 // Members that explain little one by one may explain much together.
                 (!self.is_worse(&fewer[i], &whole)).then(|| fewer[i].clone())
@@ -109,6 +113,7 @@ impl EffectSelector<'_> {
     fn refit_without(&mut self, picks: &[SelectedEffect], member: usize) -> Vec<SelectedEffect> {
         let place = &self.candidate(&picks[member]).effect.at;
         let rest = without_members(picks, &[member]);
+        // Whether an effect is a curve with searched constants at the place of the member.
         let is_bent_there = |pick: &SelectedEffect| {
             let candidate = self.candidate(pick);
             let is_bent = candidate.searched_constants > 0 && candidate.parameters.len() > 1;
@@ -134,6 +139,7 @@ impl EffectSelector<'_> {
                     .or_else(|| self.merge_similar_pair(&picks, i, j));
                 if let Some(joined) = joined {
                     picks = joined;
+                    // Positions have changed, so start again.
                     return self.join_equivalent(picks);
                 }
                 self.drop_columns_since(known, []);
@@ -152,8 +158,10 @@ impl EffectSelector<'_> {
     ) -> Option<Vec<SelectedEffect>> {
         let pair = [picks[i].clone(), picks[j].clone()];
         let others = without_members(picks, &[i, j]);
+        // Candidates that have enough columns for both.
         let wide = self.wider_candidates(&pair);
         let seen = self.choose_candidates(&others, &|k| wide.contains(&k));
+        // The same number of independent columns, and both members in its span: the spans are equal.
         let same = seen.into_iter().flatten().find(|one| {
             let is_new = picks.iter().all(|p| p.candidate != one.candidate);
             is_new && one.rank == n_columns(&pair) && pair.iter().all(|p| self.is_in_span(p, one))
@@ -174,6 +182,7 @@ impl EffectSelector<'_> {
     ) -> Option<Vec<SelectedEffect>> {
         let pair = [picks[i].clone(), picks[j].clone()];
         let [one, two] = pair.each_ref().map(|p| &self.candidate(p).effect);
+        // Only effects at the same place are joined here.
         if one.at != two.at {
             return None;
         }
@@ -191,6 +200,7 @@ impl EffectSelector<'_> {
         let seen = self.choose_candidates(&others, &is_curve);
         let channels = self.affected_channels(&pair);
         for one in seen.into_iter().flatten() {
+            // The candidate is one of the pair with other constants, or contains one of the pair.
             let is_held =
                 |p: &SelectedEffect| p.candidate == one.candidate || self.is_in_span(p, &one);
             if !pair.iter().any(is_held) {
@@ -200,6 +210,7 @@ impl EffectSelector<'_> {
             set.insert(i, one);
             let set = self.refine_around_member(set, i);
             let trial = self.fit_set(set);
+            // Evidence for the pair compared with the single effect.
             let for_both = self.evidence(&trial.picks, picks, &channels);
             if trial.is_possible()
                 && !for_both.is_sufficient()
@@ -219,6 +230,7 @@ impl EffectSelector<'_> {
     fn wider_candidates(&self, pair: &[SelectedEffect]) -> Vec<usize> {
         let candidates = self.problem.candidates.iter().enumerate();
         let may_hold = candidates.filter(|(k, candidate)| {
+            // A candidate that contains both needs at least as many parameters.
             let has_room =
                 candidate.searched_constants == 0 && candidate.parameters.len() >= n_columns(pair);
             // Columns that do not depend on the fit can be tested at once.
@@ -240,6 +252,7 @@ impl EffectSelector<'_> {
         let (factors, _) = self.fit(&picks, FitScope::All);
         let rest = self.residual(&picks, &factors);
         let channels: Vec<usize> = (0..rest.len()).collect();
+        // The criterion uses the residual of the complete set.
         let worth = self.effective_equations(&rest, &channels);
         for i in 0..picks.len() {
             let mut others = picks.clone();
@@ -268,6 +281,7 @@ impl EffectSelector<'_> {
                     best = (score, ahead, Some(trial));
                 }
             }
+            // Fit the best rival again with its own columns before it is accepted.
             if let (score, ahead, Some(trial)) = best {
                 let settled = self.refit_dependent_columns(&trial);
                 let changes = settled.picks != trial.picks;
