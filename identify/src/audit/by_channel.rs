@@ -1,5 +1,5 @@
-//! Rows of a regressor, channel by channel: of a channel only the columns that act on it are kept, as the joints of a leg know
-//! nothing of the other, and friction acts on one drive.
+//! A regressor stored by channel: for each channel only the columns that are not zero. This saves most of the work, as
+//! the joints of one leg do not depend on those of another, and friction acts on one drive.
 
 use std::ops::Range;
 
@@ -8,19 +8,23 @@ use nalgebra::{DMatrix, DVector};
 /// A regressor whose rows are those of some channels at some samples.
 #[derive(Debug, Clone)]
 pub struct ChannelRegressor {
+    /// Number of all columns.
     columns: usize,
+    /// Rows of each channel.
     channels: Vec<ChannelRows>,
 }
 
-/// Rows of a channel, `[sample, own column]`, and which columns these are.
+/// Rows of one channel with its own columns.
 #[derive(Debug, Clone)]
 struct ChannelRows {
+    /// Indices of its columns among all columns.
     column_indices: Vec<usize>,
+    /// Values, `[sample, own column]`.
     rows: DMatrix<f64>,
 }
 
 impl ChannelRegressor {
-    /// From rows interleaved per sample, `row = sample * channels + channel`.
+    /// Splits a regressor whose rows are interleaved per sample, `row = sample * channels + channel`.
     pub fn new(regressor: &DMatrix<f64>, channels: usize) -> Self {
         let samples = regressor.nrows() / channels.max(1);
         let one = |c: usize| {
@@ -55,7 +59,7 @@ impl ChannelRegressor {
         self.channels.first().map_or(0, |c| c.rows.nrows())
     }
 
-    /// One sample of so many each.
+    /// Keeps every `step`-th sample.
     #[must_use]
     pub fn subsample(&self, step: usize) -> Self {
         let kept: Vec<usize> = (0..self.samples()).step_by(step).collect();
@@ -69,7 +73,8 @@ impl ChannelRegressor {
         }
     }
 
-    /// With further columns behind the others, each of which takes what is given of the channels that `takes` says.
+    /// Appends `further` columns. Channel `c` gets the values of `of` (interleaved per sample) in the new column
+    /// `takes(c)`.
     pub(super) fn append_columns(
         &self,
         further: usize,
@@ -96,7 +101,7 @@ impl ChannelRegressor {
         }
     }
 
-    /// What values of the columns give, interleaved per sample.
+    /// Product of the regressor with parameter values, interleaved per sample.
     pub fn multiply(&self, values: &[f64]) -> DVector<f64> {
         let n = self.channels.len();
         let mut result = DVector::zeros(self.samples() * n);
@@ -112,7 +117,7 @@ impl ChannelRegressor {
         result
     }
 
-    /// Inner products of all columns with what is given, interleaved per sample.
+    /// Inner products of all columns with a vector that is interleaved per sample.
     pub(super) fn multiply_transposed(&self, of: &DVector<f64>) -> DVector<f64> {
         let n = self.channels.len();
         let mut result = DVector::zeros(self.columns);
@@ -129,7 +134,8 @@ impl ChannelRegressor {
         result
     }
 
-    /// Normal equations of some samples with weighted rows: their matrix and right side.
+    /// Normal equations of a range of samples: matrix and right side. `weights` and `measured` are interleaved per
+    /// sample.
     pub(super) fn normal_equations(
         &self,
         weights: &DVector<f64>,
@@ -140,11 +146,13 @@ impl ChannelRegressor {
         let mut normal = DMatrix::zeros(self.columns, self.columns);
         let mut right = DVector::zeros(self.columns);
         for (c, channel) in self.channels.iter().enumerate() {
+            // Interleaved index of a sample of the range.
             let at = |i: usize| (samples.start + i) * n + c;
             let mut weighted = channel.rows.rows_range(samples.clone()).transpose();
             for (i, mut column) in weighted.column_iter_mut().enumerate() {
                 column *= weights[at(i)];
             }
+            // Products among the columns of this channel, then added to their places in the complete matrix.
             let own = &weighted * channel.rows.rows_range(samples.clone());
             let forces = DVector::from_fn(samples.len(), |i, _| measured[at(i)]);
             let own_right = &weighted * forces;
@@ -158,8 +166,8 @@ impl ChannelRegressor {
         (normal, right)
     }
 
-    /// Rows of some channels that count, below each other, times a weight of each channel; with their places,
-    /// `sample * channels + channel`. Only columns that act on these channels.
+    /// Used rows of some channels as one dense matrix, each multiplied by the weight of its channel; with their
+    /// indices, `sample * channels + channel`. It has only the columns of these channels.
     pub(super) fn dense_rows(
         &self,
         of: &[usize],
@@ -169,6 +177,7 @@ impl ChannelRegressor {
         let n = self.channels.len();
         let mut place = vec![None; self.columns];
         let mut width = 0;
+        // Number the columns of these channels in the order in which they first appear.
         for k in of.iter().flat_map(|c| &self.channels[*c].column_indices) {
             place[*k].get_or_insert_with(|| {
                 width += 1;
