@@ -109,7 +109,7 @@ fn impossibility_reason(matrix: &DMatrix<f64>) -> String {
     if mass.is_nan() || mass <= 0.0 {
         return format!("its mass {mass} kg is not positive");
     }
-    "its inertia about the centre of mass is not that of any distribution of mass (principal moments must be positive, and \
-     each at most the sum of the other two)"
+    "its inertia about the centre of mass is impossible (principal moments must be positive, and each at most the sum of \
+     the other two)"
         .to_owned()
 }

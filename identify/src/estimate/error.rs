@@ -62,10 +62,10 @@ impl fmt::Display for LeastSquaresError {
             Self::NoParameters => f.write_str("there is no parameter to identify; the regressor has no columns"),
             Self::Shape { regressor, measured, columns } => write!(
                 f,
-                "{regressor} numbers of the regressor do not make {measured} rows of {columns} columns"
+                "the regressor has {regressor} numbers, but {measured} measured values need {measured} rows of {columns} columns"
             ),
             Self::Channels { rows, channels } => {
-                write!(f, "{rows} rows are not whole samples of {channels} channels; give whole samples in each block")
+                write!(f, "{rows} rows are not complete samples of {channels} channels; pass complete samples in each block")
             }
             Self::NotFinite { row, column: Some(column) } => write!(
                 f,
@@ -83,12 +83,12 @@ impl fmt::Display for LeastSquaresError {
             Self::WeakInstruments { correlation } => write!(
                 f,
                 "the instruments do not determine the parameters: the smallest canonical correlation between them and the \
-                 regressor is {correlation:.1e}; are they of the same motion, and in step with the recording? Does the \
-                 recording itself determine all parameters? Identify without instruments to see"
+                 regressor is {correlation:.1e}. Check that they belong to the same motion and are synchronous with the \
+                 recording. Identify without instruments to see whether the recording itself determines all parameters"
             ),
             Self::PassesDiffer { first, this_pass: now } => write!(
                 f,
-                "the second pass showed {now} rows where the first showed {first}; show the same rows in all passes"
+                "the second pass had {now} rows, but the first had {first}; pass the same rows each time"
             ),
         }
     }
@@ -116,11 +116,11 @@ impl fmt::Display for PhysicalError {
         match self {
             Self::NominalImpossible { body, why } => write!(
                 f,
-                "the nominal values of {body} are those of no body: {why}; give nominal values that a body can have, as a \
-                 CAD system prints them"
+                "the nominal values of {body} are physically impossible: {why}; give values that a body can have, for \
+                 example from a CAD system"
             ),
             Self::NoConvergence => {
-                f.write_str("the search for physical parameters did not settle; are the nominal values of the right size?")
+                f.write_str("the search for physical parameters did not converge; check the magnitudes of the nominal values")
             }
         }
     }

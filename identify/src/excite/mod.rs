@@ -191,11 +191,11 @@ impl fmt::Display for ExciteError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::NoStart { attempts: tried, most_exceeded: most } => {
-                write!(f, "none of {tried} random trajectories kept the limits: ")?;
+                write!(f, "none of {tried} random trajectories is within the limits: ")?;
                 match most {
-                    Some(name) => write!(f, "`{name}` was exceeded most often; widen it"),
+                    Some(name) => write!(f, "`{name}` was exceeded most often; widen this limit"),
                     None => f.write_str(
-                        "the mechanism could not follow; narrow the positions so that the loops close within them",
+                        "the mechanism cannot reach the positions; narrow their limits so that the loops close everywhere within them",
                     ),
                 }
             }
@@ -203,10 +203,10 @@ impl fmt::Display for ExciteError {
                 "there is nothing to excite: the model has no base parameter that a force depends on",
             ),
             Self::Deficient => f.write_str(
-                "no trajectory within the limits tells all base parameters apart; widen the limits or use more harmonics",
+                "no trajectory within the limits distinguishes all base parameters; widen the limits or use more harmonics",
             ),
             Self::Inseparable => {
-                f.write_str("no trajectory within the limits tells the effects apart")
+                f.write_str("no trajectory within the limits distinguishes the effects")
             }
         }
     }

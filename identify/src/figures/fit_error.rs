@@ -82,7 +82,7 @@ impl FitFileError {
         let identify = Remedy::command(CommandName::Identify);
         match &self.fault {
             FitFault::Unreadable { reason } => message!(
-                "{file}: the fit cannot be read: {reason}; make it with {} ({})",
+                "{file}: the fit cannot be read: {reason}; create it with {} ({})",
                 identify,
                 Remedy::option(OptionName::Out).with_value(file)
             ),
@@ -96,7 +96,7 @@ impl FitFileError {
                 identify
             ),
             FitFault::NoJson => message!(
-                "{file} is no fit: the JSON that {} writes is expected; recordings go to {}",
+                "{file} is not a fit: the JSON that {} writes is expected; pass recordings to {}",
                 identify,
                 Remedy::option(OptionName::Data)
             ),
@@ -109,17 +109,17 @@ impl FitFileError {
                     .as_ref()
                     .map(|near| format!(" (the closest is `{near}`)"));
                 message!(
-                    "{file}: the model's parameter `{name}` is not in the fit{}, which holds {}; identify this model again",
+                    "{file}: the model's parameter `{name}` is not in the fit{}, which has {}; identify this model again",
                     nearest.unwrap_or_default(),
                     backquoted_list(present)
                 )
             }
             FitFault::UnknownParameters { names } => message!(
-                "{file}: the fit holds {}, which the model does not have; identify this model again",
+                "{file}: the fit has {}, which the model does not have; identify this model again",
                 backquoted_list(names)
             ),
             FitFault::DuplicateParameter { name } => {
-                message!("{file}: the fit holds `{name}` twice; remove one")
+                message!("{file}: the fit has `{name}` twice; remove one")
             }
             FitFault::ConstantDiffers {
                 name,

@@ -421,9 +421,9 @@ mod tests {
         assert_eq!(
             says(&[("p1_min", "m"), ("p3_min", "fc"), ("p2_min", "fv")]),
             "fit.json: the model's parameter `p3_min` is not in the fit (the closest is `p1_min`), \
-             which holds `p1_min`, `p2_min`; identify this model again"
+             which has `p1_min`, `p2_min`; identify this model again"
         );
-        assert!(says(&[("p1_min", "m")]).contains("holds `p2_min`, which the model does not have"));
+        assert!(says(&[("p1_min", "m")]).contains("has `p2_min`, which the model does not have"));
         assert!(
             says(&[("p1_min", "m + d"), ("p2_min", "fv")])
                 .contains("`m` in the fit but `m + d` in the model")

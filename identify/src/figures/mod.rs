@@ -106,7 +106,7 @@ impl fmt::Display for FiguresError {
                 channels,
             } => write!(
                 f,
-                "{measured} measured and {model} model values are no matching samples of {channels} channels"
+                "{measured} measured and {model} model values differ in number, or are not complete samples of {channels} channels"
             ),
             Self::NotFinite { channel, sample } => write!(
                 f,

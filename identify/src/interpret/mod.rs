@@ -88,8 +88,8 @@ impl fmt::Display for InterpretError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::TooHard => f.write_str(
-                "the equations are of too high degree to be solved exactly; take fewer unknowns, such as those that \
-                 the page of equations shows to be coupled least",
+                "the degree of the equations is too high for an exact solution; choose fewer unknowns, for example \
+                 those that are coupled least on the page of equations",
             ),
         }
     }
