@@ -1,4 +1,4 @@
-//! Why parameters cannot be estimated, with what to do.
+//! Errors of estimates, with remedies.
 
 use std::fmt;
 
@@ -8,16 +8,16 @@ use std::fmt;
 pub enum LeastSquaresError {
     /// The regressor has no columns.
     NoParameters,
-    /// Rows and measured values do not fit together.
+    /// Rows and measured values do not match.
     Shape {
-        /// Numbers of the regressor given.
+        /// Number of values of the regressor.
         regressor: usize,
-        /// Measured values given.
+        /// Number of measured values.
         measured: usize,
-        /// Columns of the regressor.
+        /// Number of columns of the regressor.
         columns: usize,
     },
-    /// A block does not hold whole samples of all channels.
+    /// A block does not contain complete samples of all channels.
     Channels {
         /// Rows of the block.
         rows: usize,
@@ -26,7 +26,7 @@ pub enum LeastSquaresError {
     },
     /// A number of the regressor or of the measured values is NaN or infinite.
     NotFinite {
-        /// Row among all that were given, from 0.
+        /// Index of the row among all rows.
         row: usize,
         /// Column of the regressor; `None` for the measured value.
         column: Option<usize>,
@@ -42,12 +42,12 @@ pub enum LeastSquaresError {
     },
     /// The singular value iteration did not converge; only extreme numbers can cause it.
     NoConvergence,
-    /// The instruments say too little about the regressor.
+    /// The instruments contain too little information about the regressor.
     WeakInstruments {
         /// The smallest canonical correlation between both.
         correlation: f64,
     },
-    /// The second pass over the rows did not show the rows of the first.
+    /// The second pass over the rows differs from the first.
     PassesDiffer {
         /// Rows of the first pass.
         first: usize,
@@ -96,18 +96,18 @@ impl fmt::Display for LeastSquaresError {
 
 impl std::error::Error for LeastSquaresError {}
 
-/// Why no possible parameters were found.
+/// Why no physically possible parameters were found.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum PhysicalError {
-    /// A body is not possible with its nominal values, so that nothing can be near to them.
+    /// A body is impossible with its nominal values, which are the start of the search.
     NominalImpossible {
         /// The body.
         body: String,
         /// What is wrong with it.
         why: String,
     },
-    /// The iteration did not settle; only extreme numbers can cause it.
+    /// The iteration did not converge; only extreme numbers can cause it.
     NoConvergence,
 }
 

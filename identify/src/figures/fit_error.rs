@@ -1,4 +1,4 @@
-//! What can be wrong with the file of a fit, each with what to do.
+//! Faults of a fit file, each with a remedy.
 
 use std::fmt;
 
@@ -22,7 +22,7 @@ pub struct FitFileError {
 pub enum FitFault {
     /// The file cannot be opened or read.
     Unreadable {
-        /// The operating system's words.
+        /// Message of the operating system.
         reason: String,
     },
     /// The text is not the JSON of `identify`.
@@ -34,39 +34,39 @@ pub enum FitFault {
         /// What is wrong there.
         reason: String,
     },
-    /// The text does not begin as JSON does: a recording or a model file, perhaps.
+    /// The text is not JSON: possibly a recording or a model file.
     NoJson,
     /// A parameter of the model is not in the file.
     MissingParameter {
-        /// The parameter.
+        /// Name of the parameter.
         name: String,
         /// The closest name in the file.
         nearest: Option<String>,
         /// The names in the file.
         present: Vec<String>,
     },
-    /// The file holds parameters that the model does not have.
+    /// The file has parameters that the model does not have.
     UnknownParameters {
-        /// Those parameters.
+        /// Names of these parameters.
         names: Vec<String>,
     },
-    /// The file holds a parameter twice.
+    /// The file has a parameter twice.
     DuplicateParameter {
-        /// The parameter.
+        /// Name of the parameter.
         name: String,
     },
-    /// A constant that an expression of the base parameters holds has another value.
+    /// A constant in an expression of the base parameters has another value.
     ConstantDiffers {
-        /// The constant.
+        /// Name of the constant.
         name: String,
         /// Its value in the file.
         file: f64,
         /// Its value in the model.
         model: f64,
     },
-    /// A parameter has the same name but stands for another expression.
+    /// A parameter has the same name but another expression.
     ExpressionDiffers {
-        /// The parameter.
+        /// Name of the parameter.
         name: String,
         /// The expression in the file.
         file: String,
