@@ -28,6 +28,7 @@ impl ChannelRegressor {
     pub fn new(regressor: &DMatrix<f64>, channels: usize) -> Self {
         let samples = regressor.nrows() / channels.max(1);
         let one = |c: usize| {
+            // A column belongs to a channel if it is not zero in all of its rows.
             let acts = |k: &usize| (0..samples).any(|i| regressor[(i * channels + c, *k)] != 0.0);
             let which: Vec<usize> = (0..regressor.ncols()).filter(acts).collect();
             let rows = DMatrix::from_fn(samples, which.len(), |i, k| {
@@ -62,6 +63,7 @@ impl ChannelRegressor {
     /// Keeps every `step`-th sample.
     #[must_use]
     pub fn subsample(&self, step: usize) -> Self {
+        // The columns of a channel stay the same, even if one becomes zero.
         let kept: Vec<usize> = (0..self.samples()).step_by(step).collect();
         let channels = self.channels.iter().map(|channel| ChannelRows {
             column_indices: channel.column_indices.clone(),
@@ -83,6 +85,7 @@ impl ChannelRegressor {
     ) -> Self {
         let n = self.channels.len();
         let channels = self.channels.iter().enumerate().map(|(c, channel)| {
+            // The new column is the last one of each channel.
             let own = channel.column_indices.len();
             let mut which = channel.column_indices.clone();
             which.push(self.columns + takes(c));
@@ -106,6 +109,7 @@ impl ChannelRegressor {
         let n = self.channels.len();
         let mut result = DVector::zeros(self.samples() * n);
         for (c, channel) in self.channels.iter().enumerate() {
+            // Values of the columns of this channel.
             let own = DVector::from_iterator(
                 channel.column_indices.len(),
                 channel.column_indices.iter().map(|k| values[*k]),
@@ -122,6 +126,7 @@ impl ChannelRegressor {
         let n = self.channels.len();
         let mut result = DVector::zeros(self.columns);
         for (c, channel) in self.channels.iter().enumerate() {
+            // Entries of this channel.
             let own = DVector::from_fn(channel.rows.nrows(), |i, _| of[i * n + c]);
             for (k, column) in channel
                 .column_indices
@@ -148,6 +153,7 @@ impl ChannelRegressor {
         for (c, channel) in self.channels.iter().enumerate() {
             // Interleaved index of a sample of the range.
             let at = |i: usize| (samples.start + i) * n + c;
+            // Transposed rows times their weights.
             let mut weighted = channel.rows.rows_range(samples.clone()).transpose();
             for (i, mut column) in weighted.column_iter_mut().enumerate() {
                 column *= weights[at(i)];
@@ -184,6 +190,7 @@ impl ChannelRegressor {
                 width - 1
             });
         }
+        // Used rows, channel by channel.
         let rows: Vec<usize> = (of.iter())
             .flat_map(|c| (0..self.samples()).map(move |i| i * n + c))
             .filter(|row| counts[*row])
@@ -193,6 +200,7 @@ impl ChannelRegressor {
             let channel = &self.channels[row % n];
             let weight = weights[row % n];
             for (j, k) in channel.column_indices.iter().enumerate() {
+                // Each value goes to the column with the new number.
                 if let Some(at) = place[*k] {
                     matrix[(to, at)] = weight * channel.rows[(row / n, j)];
                 }

@@ -42,6 +42,7 @@ impl SignalRecording {
 
     /// Warning about a clock that runs too fast or too slowly; `None` if it agrees with the rates.
     fn clock_error_note(&self, time: &[f64], coordinates: &[&str]) -> Option<RecordingNote> {
+        // One ratio for each coordinate with a recorded rate.
         let mut ratios: BTreeMap<String, f64> = BTreeMap::new();
         for name in coordinates {
             let rate = format!("{name}_d");
@@ -73,6 +74,7 @@ impl SignalRecording {
         } else {
             ("too fast", "shorter")
         };
+        // The true duration is the recorded one times the ratio.
         let duration = time[time.len() - 1] - time[0];
         Some(RecordingNote::warning(format!(
             "`t` in {} runs {runs}: positions change by {} times the integral of the recorded {}. So the run takes {} s \
@@ -96,6 +98,7 @@ impl SignalRecording {
             .filter(|q| q.iter().any(|v| v.total_cmp(&q[0]).is_ne()))
             .collect();
         let n = time.len();
+        // A single position may repeat by chance, and so may few samples.
         if positions.len() < 2 || n < 100 {
             return None;
         }
@@ -118,6 +121,7 @@ impl SignalRecording {
             .iter()
             .map(|q| (1..n).filter(|i| same(q, *i)).count() as f64 / n as f64)
             .product();
+        // Report only if repetitions are clearly more frequent than by chance.
         let part = all as f64 / n as f64;
         (part > REPEATED + 3.0 * by_chance).then(|| {
             RecordingNote::warning(message!(
@@ -136,6 +140,7 @@ impl SignalRecording {
 fn change_by_integral(time: &[f64], q: &[f64], qd: &[f64]) -> Option<f64> {
     let n = time.len();
     let piece = (n / PIECES).next_multiple_of(2).max(SHORTEST);
+    // Change of the position and integral of the rate, piece by piece.
     let pairs: Vec<(f64, f64)> = (0..n.saturating_sub(piece))
         .step_by(piece)
         .map(|start| {
@@ -154,6 +159,7 @@ fn change_by_integral(time: &[f64], q: &[f64], qd: &[f64]) -> Option<f64> {
     // A rate may have an offset, so means are subtracted.
     let mean = |of: fn(&(f64, f64)) -> f64| pairs.iter().map(of).sum::<f64>() / pairs.len() as f64;
     let (change, integral) = (mean(|pair| pair.0), mean(|pair| pair.1));
+    // Sums of products of both, around their means.
     let (mut qi, mut ii, mut qq) = (0.0, 0.0, 0.0);
     for (q, i) in &pairs {
         let (q, i) = (q - change, i - integral);

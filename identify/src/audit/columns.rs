@@ -27,6 +27,7 @@ impl PreparedRun {
     /// Warnings about measured forces that are 0 in every sample; parameters of 0 would explain them exactly.
     /// `undriven` are drives whose force is known to be zero.
     pub fn zero_force_notes(&self, drives: &[String], undriven: &[String]) -> Vec<RecordingNote> {
+        // Forces may be missing from the recording.
         let forces = self.force.iter().flatten();
         let idle: Vec<String> = drives
             .iter()
@@ -90,6 +91,7 @@ impl SignalRecording {
             )));
         }
         notes.extend(rates);
+        // The clock is compared with the recorded rates.
         let names: Vec<&str> = coordinates.iter().map(|(name, _)| name.as_str()).collect();
         notes.extend(self.clock_notes(&names));
         notes
@@ -98,6 +100,7 @@ impl SignalRecording {
     /// Options that convert an angle recorded in degrees, and those of its recorded derivatives that are in degrees
     /// too: all except those that are the derivatives in rad of the recorded signal before them.
     pub fn degree_conversion_options(&self, name: &str) -> Vec<OptionSetting> {
+        // An option that reads a column in another unit.
         let map = |column: &str, unit: &str| {
             OptionSetting::new(OptionName::Columns, format!("{column}={column} [{unit}]"))
         };
@@ -136,6 +139,7 @@ impl SignalRecording {
             let Some(first) = steps.iter().position(jumps) else {
                 continue;
             };
+            // The message gives the first jump and the number of all.
             let n = steps.iter().filter(|step| jumps(step)).count();
             let times = if n == 1 { "once" } else { "first" };
             let all = if n == 1 {
@@ -167,6 +171,7 @@ impl SignalRecording {
         let mut found: Vec<(Message, Vec<String>, Vec<String>, f64)> = Vec::new();
         let mut settled = false;
         for (name, is_angle) in coordinates {
+            // Rates are compared with positions, accelerations with rates.
             for (of, rate) in [("", "_d"), ("_d", "_dd")] {
                 let [of, rate] = [of, rate].map(|suffix| format!("{name}{suffix}"));
                 let (Ok(q), Ok(qd)) = (self.column(&of), self.column(&rate)) else {
@@ -175,6 +180,7 @@ impl SignalRecording {
                 let Some((ratio, misfit)) = compare_rate(time, q, qd) else {
                     continue;
                 };
+                // The column is the derivative.
                 if misfit < MISFIT && (ratio - 1.0).abs() < RATIO_TOLERANCE {
                     settled = true;
                     continue;
@@ -197,12 +203,14 @@ impl SignalRecording {
                 }
             }
         }
+        // One sentence for all columns with the same explanation.
         let notes = found.into_iter().map(|(why, ofs, rates, ratio)| {
             let (is, derivative) = if rates.len() == 1 {
                 ("is", "the derivative")
             } else {
                 ("are", "the derivatives")
             };
+            // Without an explanation the columns may be mixed up.
             let how = if why.is_empty() {
                 message!(
                     "nor a multiple of it: check which column is which ({})",
@@ -265,9 +273,11 @@ fn compare_rate(time: &[f64], position: &[f64], rate: &[f64]) -> Option<(f64, f6
     if time.len() < 16 || qq <= rounding || steps > 0.5 * qq {
         return None;
     }
+    // The rate is zero, although the position moves.
     if ii <= 0.0 {
         return Some((0.0, 1.0));
     }
+    // Least squares ratio, and the share that a linear relation does not explain.
     let ratio = qi / qq;
     Some((ratio, (1.0 - qi * qi / (qq * ii)).max(0.0).sqrt()))
 }
@@ -276,6 +286,7 @@ fn compare_rate(time: &[f64], position: &[f64], rate: &[f64]) -> Option<(f64, f6
 /// Empty if the ratio is 1; a negative ratio adds that the signs differ.
 fn explain_ratio(ratio: f64, is_angle: bool) -> Message {
     let degree = 180.0 / PI;
+    // Whether the ratio is near a value, with either sign.
     let is = |value: f64| (ratio.abs() / value - 1.0).abs() < RATIO_TOLERANCE;
     let why = if is(1.0) {
         Message::new()
@@ -306,6 +317,7 @@ fn explain_ratio(ratio: f64, is_angle: bool) -> Message {
         )
     };
     if ratio < 0.0 {
+        // The sign is reported in addition to the unit.
         let and = if why.is_empty() { "" } else { ", and " };
         return message!("the signs differ{and}{}", why);
     }

@@ -34,6 +34,7 @@ impl SignalRecording {
         coordinates: &[(String, bool)],
         drives: &[String],
     ) -> Vec<RecordingNote> {
+        // Positions show whether the mechanism moves.
         let positions: Vec<&[f64]> = coordinates
             .iter()
             .filter_map(|(name, _)| self.column(name).ok())
@@ -51,6 +52,7 @@ impl SignalRecording {
                 continue;
             };
             notes.extend(self.slow_update_note(drive, force));
+            // An exact limit is searched first; only without one a noisy limit.
             let saturated = self.saturation_note(drive, force, &positions);
             notes
                 .extend(saturated.or_else(|| self.noisy_saturation_note(drive, force, &positions)));
@@ -72,6 +74,7 @@ impl SignalRecording {
         let n = gaps.len();
         gaps.sort_unstable();
         let usual = gaps[n / 2];
+        // Most distances are equal if the signal is updated at a fixed rate.
         let share = gaps.iter().filter(|gap| **gap == usual).count() as f64 / n as f64;
         (usual > 1 && share > 0.9).then(|| {
             RecordingNote::warning(message!(
@@ -87,6 +90,7 @@ impl SignalRecording {
     /// Warning about an angle that is too large for rad; `None` otherwise.
     fn large_angle_note(&self, name: &str, q: &[f64]) -> Option<RecordingNote> {
         let largest = q.iter().map(|v| v.abs()).fold(0.0, f64::max);
+        // One decimal, or seven digits for very large values.
         let rounded = |value: f64| match value {
             value if value < 1e7 => format!("{value:.1}"),
             value => seven_digits(value),
@@ -116,6 +120,7 @@ impl SignalRecording {
             return None;
         }
         let mut found: Vec<(f64, usize, usize)> = Vec::new();
+        // Search an upper and a lower limit: level, number of samples, first sample.
         for is_high in [true, false] {
             let (level, spread) = crowded_level(force, is_high)?;
             // Friction causes plateaus too, but they are less sharp.
@@ -128,6 +133,7 @@ impl SignalRecording {
             if beyond.count() > n / 1000 {
                 continue;
             }
+            // Whether a sample lies within the band around the level.
             let is_near = |i: usize| (force[i] - level).abs() <= spread;
             let (mut count, mut first) = (0, None);
             let mut i = 0;
@@ -137,8 +143,10 @@ impl SignalRecording {
                 while i < n && is_near(i) {
                     i += 1;
                 }
+                // A plateau from `start` to `i`.
                 let length = i - start;
                 // Slopes just before and just after the plateau, over three steps.
+                // Change per sample over three samples; `None` at the ends of the recording.
                 let slope = |a: Option<usize>, b: usize| {
                     let (a, b) = (force.get(a?)?, force.get(b)?);
                     Some((a - b).abs() / 3.0)
@@ -148,6 +156,7 @@ impl SignalRecording {
                 let steepest = [before, behind].into_iter().flatten().fold(0.0, f64::max);
                 // At the top of a parabola, slope times length is 8 times the half width of the band; a plateau has
                 // more.
+                // A position differs between both ends of the plateau.
                 let moves = |q: &&[f64]| length > 0 && q[start].total_cmp(&q[i - 1]).is_ne();
                 let is_moving = positions.iter().any(moves);
                 if is_moving
@@ -163,6 +172,7 @@ impl SignalRecording {
                 found.push((level, count, first));
             }
         }
+        // The upper limit is named first; the lower one is added if both were found.
         let (level, count, first) = *found.first()?;
         let other = found.get(1).map(|(level, count, _)| {
             let samples = count_of(*count, "sample", "samples");
@@ -211,6 +221,7 @@ impl SignalRecording {
             (low, above.fold(f64::INFINITY, f64::min)),
         ];
         let mut found: Vec<(f64, usize, usize)> = Vec::new();
+        // Compare the limit with the next value inside.
         for (limit, next) in ends {
             let (count, first) = count_at_value(force, limit, positions);
             // A quantised force stays at each of its steps.
@@ -222,6 +233,7 @@ impl SignalRecording {
                 found.push((limit, count, first));
             }
         }
+        // Both limits are in one message.
         let (limit, count, first) = *found.first()?;
         let other = found
             .get(1)
@@ -254,6 +266,7 @@ fn count_at_value(force: &[f64], value: f64, positions: &[&[f64]]) -> (usize, Op
         while i < force.len() && force[i].total_cmp(&value).is_eq() {
             i += 1;
         }
+        // Something must move during the run of equal values.
         let moves = |q: &&[f64]| i > start && q[start].total_cmp(&q[i - 1]).is_ne();
         if i - start >= 3 && positions.iter().any(moves) {
             count += i - start;
@@ -269,12 +282,14 @@ fn count_at_value(force: &[f64], value: f64, positions: &[&[f64]]) -> (usize, Op
 fn crowded_level(force: &[f64], is_high: bool) -> Option<(f64, f64)> {
     let mut sorted = force.to_vec();
     sorted.sort_unstable_by(f64::total_cmp);
+    // In reversed order the end of interest is always the last part.
     if !is_high {
         sorted.reverse();
     }
     let n = sorted.len();
     // The narrowest interval with this many samples, within the outer third of the values.
     let few = (n / 100).max(FEWEST_AT_LIMIT);
+    // Only the outer third of the values can be at a limit.
     let upper = &sorted[n - n / 3..];
     let crowd = (0..upper.len().checked_sub(few)?).min_by(|a, b| {
         let width = |i: usize| (upper[i + few] - upper[i]).abs();

@@ -34,6 +34,7 @@ impl EffectSelector<'_> {
             return vec![Vec::new(); picks.len()];
         }
         self.weigh_channels(picks);
+        // Reference: the squared residual of the set.
         let (factors, squares) = self.fit(picks, super::pool::FitScope::All);
         let rest = self.residual(picks, &factors);
         let mut all = Vec::new();
@@ -53,6 +54,7 @@ impl EffectSelector<'_> {
             // effect adds to `fewer`.
             let in_place =
                 |bench: &Self, fewer: &[SelectedEffect], trial: &ScoredEffectSet| -> Option<f64> {
+                    // Squared residual without the effect, and without its partner if `fewer` lacks two.
                     let left = bench.fit_from_gram(&table, fewer.to_vec()).squares;
                     let worse = worth * (trial.squares / squares.max(f64::MIN_POSITIVE)).ln();
                     // An effect that explains nothing cannot be replaced.
@@ -68,6 +70,7 @@ impl EffectSelector<'_> {
                     continue;
                 }
                 // The same kind at more or fewer places is another form of the set.
+                // Kind and place of the effect and of the candidate.
                 let (one, two) = (
                     &self.candidate(&pick).effect,
                     &self.candidate(candidate).effect,
@@ -86,6 +89,7 @@ impl EffectSelector<'_> {
                 {
                     continue;
                 }
+                // Fit the candidate in place of the effect.
                 let mut set = others.clone();
                 set.push(candidate.clone());
                 let tried = self.fit_from_gram(&table, set);
@@ -105,6 +109,7 @@ impl EffectSelector<'_> {
                 let second = fewer.remove(j);
                 for candidate in self.current_choices.iter().flatten() {
                     let is_new = picks.iter().all(|p| p.candidate != candidate.candidate);
+                    // The candidate must not have more parameters than both effects together.
                     let size = n_columns(&[pick.clone(), second.clone()]);
                     if !is_new || candidate.columns.len() > size {
                         continue;
@@ -135,6 +140,7 @@ impl EffectSelector<'_> {
                     });
                 }
             }
+            // The closest alternative comes first.
             found.sort_by(|a, b| a.criterion_loss.total_cmp(&b.criterion_loss));
             all.push(found);
         }
@@ -150,6 +156,7 @@ impl EffectSelector<'_> {
         others: &[SelectedEffect],
         in_place: impl Fn(&Self, &[SelectedEffect], &ScoredEffectSet) -> Option<f64>,
     ) -> Vec<(LocatedEffect, f64)> {
+        // Simpler effects whose columns lie in the span of the effect.
         let halves: Vec<&SelectedEffect> = (self.current_choices.iter().flatten())
             .filter(|one| one.rank < pick.rank && self.candidate(one).searched_constants == 0)
             .filter(|one| picks.iter().all(|p| p.candidate != one.candidate))
@@ -178,6 +185,7 @@ impl EffectSelector<'_> {
         squares: f64,
     ) -> ScoredEffectSet {
         let source = &self.candidate(candidate).source;
+        // Only these have columns that change with their estimates.
         let is_sized = matches!(
             source,
             ColumnSource::ReadingFault(_) | ColumnSource::Body(_)
@@ -191,6 +199,7 @@ impl EffectSelector<'_> {
 
     /// Whether all columns of one effect lie in the span of the base and of another effect; results are stored.
     pub(crate) fn is_in_span(&self, one: &SelectedEffect, other: &SelectedEffect) -> bool {
+        // Span tests are repeated often, so their results are stored.
         let key = (one.columns.clone(), other.columns.clone());
         let known = self.span_cache.borrow().get(&key).copied();
         known.unwrap_or_else(|| {

@@ -103,6 +103,7 @@ impl<'a> EffectSelector<'a> {
         let measured = pool.add(&problem.measured);
         let zero = pool.add(ForceColumn(vec![None; problem.layout.channels.len()]));
         let friction = problem.friction.iter().map(|c| pool.add(c)).collect();
+        // Known columns enter the pool once, for every choice of the constants.
         let mut of_choice =
             |choice: &'a ColumnChoice| choice.columns.iter().map(|c| pool.add(c)).collect();
         let of_candidate = |candidate: &'a CandidateEffect| match &candidate.source {
@@ -181,6 +182,7 @@ impl<'a> EffectSelector<'a> {
     pub(crate) fn weigh_channels(&mut self, picks: &[SelectedEffect]) {
         let (factors, _) = self.fit(picks, FitScope::All);
         let rest = self.residual(picks, &factors);
+        // Mean square of a series.
         let size = |values: &[f64]| dot(values, values) / values.len().max(1) as f64;
         let measured = self.pool.column(self.measured);
         for (d, values) in rest.iter().enumerate() {
@@ -217,6 +219,7 @@ impl<'a> EffectSelector<'a> {
         picks: &[SelectedEffect],
         is_asked: &dyn Fn(usize) -> bool,
     ) -> Vec<Option<SelectedEffect>> {
+        // What the set explains already.
         let beside = self.conditioning_set(picks);
         let problem = self.problem;
         let candidates = problem.candidates.iter().enumerate();
@@ -326,6 +329,7 @@ impl<'a> EffectSelector<'a> {
                     && candidate.searched_constants == 0
                     && columns.count() > 1
             };
+            // Set one parameter with a wrong sign to zero and fit again, as long as the residual allows it.
             let wrong = self.wrong_parameters(&picks, factors.as_slice());
             let Some((i, j)) = wrong.into_iter().find(|(i, _)| several(*i)) else {
                 break;
@@ -416,6 +420,7 @@ impl<'a> EffectSelector<'a> {
             let parameters = &self.candidate(pick).parameters;
             let own = &factors[at..at + parameters.len()];
             at += parameters.len();
+            // Values that are zero up to rounding have no sign.
             let largest = own.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
             let is_wrong = |(p, x): (&EffectParameter, &f64)| match p.sign {
                 SignConstraint::Positive => *x < -1e-9 * largest,
@@ -441,6 +446,7 @@ impl<'a> EffectSelector<'a> {
     /// are tried without the base.
     pub(crate) fn projected_gram(&self, also: &[SelectedEffect]) -> ProjectedGram {
         let mut columns: Vec<usize> = Vec::new();
+        // Each column once, zero and the measured forces at the end.
         let mut known = HashSet::new();
         for pick in self.current_choices.iter().flatten().chain(also) {
             columns.extend(pick.columns.iter().filter(|k| known.insert(**k)));

@@ -75,6 +75,7 @@ impl EffectSelector<'_> {
             .any(|p| p.sign != SignConstraint::Any);
         let is_body = matches!(candidate.source, ColumnSource::Body(_));
         let may_lose = candidate.refines.is_none() && candidate.searched_constants == 0;
+        // One estimated number is the least that remains.
         if may_lose && (has_sign || is_body) {
             pick.rank.min(1)
         } else {
@@ -102,6 +103,7 @@ impl ExtensionBound<'_> {
         let mut places = [self.measured_index(); MOST + 1];
         let mut n = 0;
         for k in columns {
+            // Too many columns: zero is a valid bound.
             if n == MOST {
                 return 0.0;
             }
@@ -119,6 +121,7 @@ impl ExtensionBound<'_> {
         // Gaussian elimination of the added columns; the last diagonal entry is the squared residual.
         for i in 0..n {
             let own = self.table.gram[(places[i], places[i])];
+            // A dependent column explains nothing more.
             if left[i][i] <= NEGLIGIBLE_SHARE * own {
                 continue;
             }

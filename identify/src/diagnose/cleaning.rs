@@ -56,6 +56,7 @@ fn count_removed_squares(
     problem: &mut DiagnosisProblem,
     clean: impl FnOnce(&mut DiagnosisProblem) -> Vec<Disturbance>,
 ) -> Vec<Disturbance> {
+    // Compare the forces before and after cleaning.
     let before = problem.measured.clone();
     let found = clean(problem);
     let squares = |(old, new): (&Option<Vec<f64>>, &Option<Vec<f64>>)| {
@@ -72,6 +73,7 @@ fn count_removed_squares(
 
 /// Residual of base parameters and friction, `[channel][sample]`, with all channels weighted equally.
 fn base_residual(problem: &DiagnosisProblem) -> Vec<Vec<f64>> {
+    // Fit base and friction to all samples, except those that decide nothing.
     let mut pool = ColumnPool::new(&problem.layout).exclude_samples(&problem.undecided_samples());
     let columns = problem.base.iter().chain(&problem.friction);
     let mut which: Vec<usize> = columns.map(|c| pool.add(c)).collect();
@@ -81,6 +83,7 @@ fn base_residual(problem: &DiagnosisProblem) -> Vec<Vec<f64>> {
             .as_ref()
             .map_or(0.0, |v| dot(v, v) / v.len().max(1) as f64)
     };
+    // First weights from the size of the forces.
     let weight = |values: &Option<Vec<f64>>| 1.0 / size(values).max(f64::MIN_POSITIVE);
     let mut weights: Vec<f64> = problem.measured.0.iter().map(weight).collect();
     which.push(measured);
@@ -102,6 +105,7 @@ fn base_residual(problem: &DiagnosisProblem) -> Vec<Vec<f64>> {
 fn remove_outliers(problem: &mut DiagnosisProblem) -> Vec<Disturbance> {
     let mut flagged: Vec<Vec<bool>> =
         vec![vec![false; problem.layout.samples()]; problem.layout.channels.len()];
+    // Distances of the outliers of each channel, for the report.
     let mut sizes: Vec<Vec<f64>> = vec![Vec::new(); flagged.len()];
     // Large outliers hide smaller ones, so the search is repeated.
     for _ in 0..3 {
@@ -109,6 +113,7 @@ fn remove_outliers(problem: &mut DiagnosisProblem) -> Vec<Disturbance> {
         let mut more = false;
         for (d, rest) in rest.iter().enumerate() {
             let reverses = reversal_samples(problem, d, REVERSAL);
+            // Distance from the local median, compared with the noise of the channel.
             let apart = deviation_from_neighbours(problem, rest);
             // 1.4826 times the median of absolute values is the standard deviation of normal noise.
             let spread = 1.4826 * median(apart.iter().map(|x| x.abs()).collect());
@@ -119,11 +124,13 @@ fn remove_outliers(problem: &mut DiagnosisProblem) -> Vec<Disturbance> {
             let new: Vec<usize> = (0..rest.len())
                 .filter(|i| apart[*i].abs() > bound && !reverses[*i])
                 .collect();
+            // Frequent deviations belong to the force, for example stick-slip.
             let is_rare = (new.len() as f64) < RARE * rest.len() as f64;
             let Some(values) = problem.measured.0[d].as_mut().filter(|_| is_rare) else {
                 continue;
             };
             for i in new {
+                // Move the sample to the median of its neighbours.
                 values[i] -= apart[i];
                 sizes[d].push(apart[i]);
                 flagged[d][i] = true;
@@ -135,6 +142,7 @@ fn remove_outliers(problem: &mut DiagnosisProblem) -> Vec<Disturbance> {
         }
     }
     let channels = flagged.iter().zip(&sizes).enumerate();
+    // Report channels with outliers.
     let told = channels.filter(|(_, (_, sizes))| !sizes.is_empty());
     told.map(|(d, (flagged, sizes))| {
         let count = flagged.iter().filter(|f| **f).count() as f64;
@@ -158,6 +166,7 @@ fn remove_outliers(problem: &mut DiagnosisProblem) -> Vec<Disturbance> {
 fn reversal_samples(problem: &DiagnosisProblem, channel: usize, samples: usize) -> Vec<bool> {
     let n = problem.layout.samples();
     let mut about = vec![false; n];
+    // The second friction column of a drive is the sign of its rate.
     let sign = problem.friction.get(3 * channel + 1);
     let Some(sign) = sign.and_then(|column| column.0[channel].as_ref()) else {
         return about;
@@ -179,6 +188,7 @@ fn deviation_from_neighbours(problem: &DiagnosisProblem, rest: &[f64]) -> Vec<f6
     for stretch in &problem.layout.segments {
         let part = &rest[start..start + stretch.samples];
         for i in 0..part.len() {
+            // The window is shifted at the ends of a segment.
             let low = i.saturating_sub(NEIGHBOURS / 2);
             let high = (low + NEIGHBOURS).min(part.len());
             apart.push(part[i] - median(part[low..high].to_vec()));
@@ -193,6 +203,7 @@ fn deviation_from_neighbours(problem: &DiagnosisProblem, rest: &[f64]) -> Vec<f6
 pub fn quantisation_step(values: &[f64], noise: f64) -> Option<f64> {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
+    // Values that differ by rounding only are equal.
     let largest = sorted.first()?.abs().max(sorted.last()?.abs());
     sorted.dedup_by(|a, b| (*a - *b).abs() <= 1e-9 * largest);
     // Quantised values repeat; many different values mean a fine resolution.
@@ -200,6 +211,7 @@ pub fn quantisation_step(values: &[f64], noise: f64) -> Option<f64> {
         return None;
     }
     let gaps = sorted.windows(2).map(|pair| pair[1] - pair[0]);
+    // The smallest difference is the step, if all others are multiples of it.
     let step = gaps.fold(f64::INFINITY, f64::min);
     let is_multiple = |gap: f64| (gap / step - (gap / step).round()).abs() < 1e-3;
     let all = sorted.windows(2).all(|pair| is_multiple(pair[1] - pair[0]));
@@ -213,6 +225,7 @@ impl DiagnosisProblem {
     pub(crate) fn find_reversal_samples(&mut self) {
         let of = |d: usize| {
             let jumps = reversal_samples(self, d, JUMP);
+            // Leave out reversals only if few samples are lost.
             let count = jumps.iter().filter(|jumps| **jumps).count() as f64;
             if count < MOST_JUMPS * jumps.len() as f64 {
                 jumps

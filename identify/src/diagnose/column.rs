@@ -10,6 +10,7 @@ pub struct ForceColumn(pub Vec<Option<Vec<f64>>>);
 impl ForceColumn {
     /// A column from all of its channels; those that are zero throughout are left out.
     pub fn new(channels: Vec<Vec<f64>>) -> Self {
+        // A channel of zeros needs no memory.
         let sparse = |values: Vec<f64>| values.iter().any(|x| *x != 0.0).then_some(values);
         Self(channels.into_iter().map(sparse).collect())
     }
@@ -43,6 +44,7 @@ impl ForceColumn {
         &'a self,
         other: &'a Self,
     ) -> impl Iterator<Item = (usize, &'a [f64], &'a [f64])> {
+        // Channels on which one of both is zero are left out.
         let pairs = self.0.iter().zip(&other.0).enumerate();
         pairs.filter_map(|(d, (a, b))| Some((d, a.as_deref()?, b.as_deref()?)))
     }

@@ -117,6 +117,7 @@ impl EffectSelector<'_> {
         for (d, rest) in rest.iter().enumerate() {
             // Force of all members of the set that are disturbances.
             let mut disturbed = vec![0.0; rest.len()];
+            // Factors of the effects follow those of the base.
             let mut at = self.base.len();
             for pick in picks {
                 for k in &pick.columns {
@@ -130,6 +131,7 @@ impl EffectSelector<'_> {
                     at += 1;
                 }
             }
+            // Split the mean square of the residual into the repeatable part and noise.
             let left = size(rest);
             let model = left * again[d];
             let force = problem.measured_force(d);
@@ -154,6 +156,7 @@ impl EffectSelector<'_> {
         if is_white(self.problem, channel, variance * (1.0 - again)) {
             return None;
         }
+        // Share of samples that are independent.
         let worth = effective_samples(rest) / rest.len().max(1) as f64;
         if worth > COLOURED {
             return None;

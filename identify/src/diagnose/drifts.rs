@@ -11,6 +11,7 @@ use super::problem::{
 /// `[channel]`.
 pub fn drift_candidates(problem: &DiagnosisProblem, units: &[String]) -> Vec<CandidateEffect> {
     let layout = &problem.layout;
+    // Segments of one recording share its parameters.
     let mut recordings: Vec<&str> = layout.segments.iter().map(|s| s.name.as_str()).collect();
     recordings.dedup();
     // Level and ramp of each recording.
@@ -31,6 +32,7 @@ pub fn drift_candidates(problem: &DiagnosisProblem, units: &[String]) -> Vec<Can
         let Some([rate, sign, one]) = problem.friction.get(3 * d..3 * d + 3) else {
             continue;
         };
+        // An offset drift scales the constant, a friction drift dry and viscous friction.
         for (kind, shapes) in [
             ("offset_drift", &[("F0", one)][..]),
             ("friction_drift", &[("Fc", sign), ("Fv", rate)]),
@@ -44,6 +46,7 @@ pub fn drift_candidates(problem: &DiagnosisProblem, units: &[String]) -> Vec<Can
             }
             // Every recording has parameters of its own.
             for ([level, ramp], name) in ramps.iter().zip(&recordings) {
+                // Parameters for the change over the recording, and for an offset also its level.
                 let changes = shapes.iter().map(|shape| ("change of ", ramp, shape));
                 let levels = shapes.iter().map(|shape| ("", level, shape));
                 for (lead, ramp, (symbol, shape)) in
@@ -54,6 +57,7 @@ pub fn drift_candidates(problem: &DiagnosisProblem, units: &[String]) -> Vec<Can
                     if column.0[d].iter().flatten().all(|x| *x == 0.0) {
                         continue;
                     }
+                    // Viscous friction has a unit of its own; the others have that of the force.
                     let unit = match *symbol {
                         "Fv" if units[d] == "N" => "N s/m",
                         "Fv" => "N m s/rad",
@@ -95,6 +99,7 @@ pub fn drift_candidates(problem: &DiagnosisProblem, units: &[String]) -> Vec<Can
 /// recording.
 fn recording_ramp(problem: &DiagnosisProblem, recording: &str) -> [Vec<f64>; 2] {
     let stretches = &problem.layout.segments;
+    // The ramp covers all segments of the recording.
     let of = stretches.iter().filter(|s| s.name == recording);
     let samples: usize = of.map(|s| s.samples).sum();
     let last = samples.saturating_sub(1).max(1) as f64;
@@ -102,6 +107,7 @@ fn recording_ramp(problem: &DiagnosisProblem, recording: &str) -> [Vec<f64>; 2] 
     let [mut level, mut ramp] = [(); 2].map(|()| Vec::with_capacity(problem.layout.samples()));
     for stretch in stretches {
         for _ in 0..stretch.samples {
+            // Outside of the recording both functions are zero.
             let is_in = stretch.name == recording;
             level.push(f64::from(u8::from(is_in)));
             ramp.push(if is_in { at / last - 0.5 } else { 0.0 });

@@ -26,6 +26,7 @@ impl GramFactor {
                 continue;
             }
             let m = kept.len();
+            // Row of the factor for this column: its products with the independent ones before it.
             let mut own = vec![0.0; m];
             for (j, (column, other)) in kept.iter().enumerate() {
                 let known = dot(&upper.column(j).as_slice()[..j], &own[..j]);

@@ -37,6 +37,7 @@ impl EffectSelector<'_> {
         which.push(self.measured);
         // Friction of every drive takes part in the fit, so that it does not appear as load.
         let (factors, _) = solve_gram(&self.pool.gram(&which, &self.weights, FitScope::All));
+        // Whether each column of the set belongs to the load.
         let of_picks = picks.iter().flat_map(|pick| {
             let candidate = self.candidate(pick);
             pick.columns.iter().map(|_| candidate.is_part_of_load)
@@ -45,6 +46,7 @@ impl EffectSelector<'_> {
         let is_part_of_load: Vec<bool> = (self.problem.base_is_part_of_load.iter().copied())
             .chain(of_picks)
             .collect();
+        // Columns with their factors; friction of the drives behind them is dropped.
         let parts = which[..n].iter().copied().zip(factors.iter().copied());
         let parts = parts.zip(is_part_of_load);
         self.sum_columns(
@@ -84,6 +86,7 @@ impl EffectSelector<'_> {
         load: &ForceColumn,
         which: LoadDependentQuery,
     ) -> HashMap<usize, SelectedEffect> {
+        // New columns enter the pool and stay there until they are released.
         let made = self.provider.load_dependent_columns(load, which);
         let picks = made.into_iter().map(|(candidate, choice)| {
             let pick = SelectedEffect {
@@ -110,6 +113,7 @@ impl EffectSelector<'_> {
         // Present estimates of the candidate.
         let mine = picks.iter().position(|pick| pick.candidate == candidate);
         let found = mine.map(|i| {
+            // Position of the candidate's factors behind those of the base and earlier picks.
             let before: usize = picks[..i].iter().map(|p| p.columns.len()).sum();
             let start = self.base.len() + before;
             factors.as_slice()[start..start + picks[i].columns.len()].to_vec()
@@ -119,6 +123,7 @@ impl EffectSelector<'_> {
             ColumnSource::Tilt(tilt) => {
                 // Forces per component of gravity, then along the directions in which gravity turns.
                 let angles = found.unwrap_or_else(|| vec![0.0; tilt.axes.len()]);
+                // Change of the forces with each component of gravity.
                 let along = tilt.components.each_ref().map(|component| {
                     let mut sum = component.fixed.clone();
                     sum.0.resize(self.weights.len(), None);
@@ -144,6 +149,7 @@ impl EffectSelector<'_> {
                 // The force that acts: the fitted force without the part that the fault itself explains.
                 let mut force = self.problem.fixed_forces.clone().unwrap_or_default();
                 force.0.resize(self.weights.len(), None);
+                // The column of the fault itself is not part of the force that acts.
                 let own = mine.map_or(&[][..], |i| &picks[i].columns);
                 for (k, factor) in self.columns(picks).iter().zip(factors.iter()) {
                     if !own.contains(k) {
@@ -162,6 +168,7 @@ impl EffectSelector<'_> {
             }
             // Constant: secant between no error and the estimated error.
             ColumnSource::Constant(constant) => {
+                // Without an estimate yet, the derivative is used.
                 let error = found.map_or(0.0, |values| values[0]);
                 // The derivatives are those of the base columns, whose factors come first.
                 let base = &factors.as_slice()[..self.base.len()];
@@ -190,7 +197,9 @@ impl EffectSelector<'_> {
         let which = LoadDependentQuery::One(candidate, value);
         // Columns for both definitions of the load; the better one is kept.
         let loads = [self.load(picks), self.load_with_friction(picks)];
+        // Columns for each definition of the load.
         let ways = loads.map(|load| self.load_friction_effects(&load, which).remove(&candidate));
+        // Squared residual of the set with these columns.
         let squares = |way: &SelectedEffect| {
             let mut set = picks.to_vec();
             set[member] = way.clone();
@@ -234,6 +243,7 @@ impl EffectSelector<'_> {
 
     /// Removes the columns that were added from an index on, except those of a set, which get new indices.
     fn drop_other_columns(&mut self, known: usize, picks: &mut [SelectedEffect]) {
+        // Span tests with removed columns are no longer valid.
         let added = self.pool.split_off(known);
         let is_known = |columns: &[usize]| columns.iter().all(|k| *k < known);
         (self.span_cache.get_mut()).retain(|(one, other), _| is_known(one) && is_known(other));

@@ -46,6 +46,7 @@ pub(crate) fn remove_lines(problem: &mut DiagnosisProblem, rest: &[Vec<f64>]) ->
     let unfit = excluded_samples(problem);
     let mut left = rest.to_vec();
     let mut frequencies: Vec<f64> = Vec::new();
+    // Subtract one line after the other, the most prominent first.
     let mut lowest = LOWEST;
     while frequencies.len() <= MOST_LINES {
         // The most prominent line of all channels.
@@ -60,6 +61,7 @@ pub(crate) fn remove_lines(problem: &mut DiagnosisProblem, rest: &[Vec<f64>]) ->
         // Subtract it from the residual of every channel.
         let mut without = left.clone();
         for (d, left) in without.iter_mut().enumerate() {
+            // Samples that were not measured stay as they are.
             let lost = problem
                 .layout
                 .left_out
@@ -67,6 +69,7 @@ pub(crate) fn remove_lines(problem: &mut DiagnosisProblem, rest: &[Vec<f64>]) ->
                 .map_or(&[][..], Vec::as_slice);
             subtract_sinusoid(problem, left, &unfit[d], lost, frequency);
         }
+        // Whether the line is most of the residual of a channel.
         let is_most = |(before, after): (&Vec<f64>, &Vec<f64>)| {
             dot(after, after) < (1.0 - MIN_RESIDUAL_SHARE) * dot(before, before)
         };
@@ -124,6 +127,7 @@ pub(crate) fn slow_lines(
     for (channel, own) in rest.iter().enumerate() {
         // Squares that are not a function of the state.
         let by_no_state = dot(own, own) * (1.0 - again[channel]);
+        // White noise contains no line.
         if is_white(problem, channel, by_no_state / own.len().max(1) as f64) {
             continue;
         }
@@ -142,6 +146,8 @@ pub(crate) fn slow_lines(
         else {
             continue;
         };
+        // A line in a channel with unexplained repeatable residual must explain more than half of the non-repeatable
+        // part.
         let explains_more = dot(&wave.residual, &wave.residual) < MAX_REMAINING_SHARE * by_no_state;
         if explains_more || !unexplained.contains(&channel) {
             found.push(SlowSpectralLine {
@@ -188,6 +194,7 @@ impl<'a> SinusoidFitter<'a> {
         let columns = problem.base.iter().chain(&problem.friction);
         let known = columns.map(|c| pool.add(c)).collect();
         let target = pool.add(ForceColumn(rest.iter().cloned().map(Some).collect()));
+        // Channels are weighted by their residual before the fit.
         let weight = |rest: &Vec<f64>| {
             let squares = dot(rest, rest) / rest.len().max(1) as f64;
             // A channel without residual gets no weight, since it contains no information on the noise of others.
@@ -226,6 +233,7 @@ impl<'a> SinusoidFitter<'a> {
         let (factors, _) = solve_gram(&self.pool.gram(&which, &self.weights, FitScope::All));
         which.pop();
         let mut left = self.pool.residual(self.target, &which, factors.as_slice());
+        // Squared residual relative to that before the fit, summed over the channels.
         let weighed = left.iter().zip(&self.weights);
         let squares = weighed.map(|(left, weight)| weight * dot(left, left)).sum();
         // Force of the sinusoid: its columns times their factors.
@@ -256,6 +264,7 @@ impl<'a> SinusoidFitter<'a> {
                 let [from, to] = [part, part + 1].map(|k| start + k * stretch.samples / parts);
                 let [before, after] =
                     [self.residual, &wave.residual].map(|r| dot(&r[from..to], &r[from..to]));
+                // Share of the squares that the sinusoid explains in this part.
                 if before > 0.0 {
                     let taken = 1.0 - after / before;
                     least = Some(least.map_or(taken, |least| least.min(taken)));
@@ -271,9 +280,11 @@ impl<'a> SinusoidFitter<'a> {
     fn find_sinusoid(&mut self, about: f64) -> Option<(f64, SinusoidFit)> {
         let lasts = self.problem.layout.segments.iter();
         let lasts: Vec<f64> = lasts.map(|s| s.samples as f64 * s.step).collect();
+        // Fewer periods than this could be a motion or a drift.
         if lasts.iter().any(|lasts| lasts * about < TURNS) {
             return None;
         }
+        // The starting frequency must already explain a part of every segment.
         let mut best = (about, self.fit_sinusoid(about));
         if self.least_explained_share(&best.1, 1) < MIN_SEGMENT_SHARE {
             return None;
@@ -298,6 +309,7 @@ impl<'a> SinusoidFitter<'a> {
 fn excluded_samples(problem: &DiagnosisProblem) -> Vec<Vec<bool>> {
     let mut unfit = problem.undecided_samples();
     for (unfit, lost) in unfit.iter_mut().zip(&problem.layout.left_out) {
+        // Samples that were not measured have no residual.
         for (unfit, lost) in unfit.iter_mut().zip(lost) {
             *unfit |= lost;
         }
@@ -319,6 +331,7 @@ fn remove_and_report(
             *value -= taken;
         }
     }
+    // Samples at which the lines were subtracted.
     let acts = taken.iter().filter(|x| **x != 0.0).count();
     // A sine of amplitude A has the mean square A^2 / 2.
     let amplitude = (2.0 * dot(taken, taken) / acts.max(1) as f64).sqrt();
@@ -348,6 +361,7 @@ fn strongest_frequency(problem: &DiagnosisProblem, rest: &[f64]) -> Option<f64> 
         }
     }
     let (_, part, step) = longest?;
+    // Power spectrum with a Hann window; index times the frequency step is the frequency.
     let power = hann_power(part);
     let highest = (1..power.len()).max_by(|a, b| power[*a].total_cmp(&power[*b]))?;
     Some(highest as f64 * 0.5 / step / (power.len() - 1) as f64)
@@ -365,6 +379,7 @@ fn most_prominent_line(
     for stretch in &problem.layout.segments {
         let power = hann_power(&rest[start..start + stretch.samples]);
         start += stretch.samples;
+        // A short segment has too few frequencies for a neighbourhood.
         if power.len() < 4 * NEIGHBOURHOOD {
             continue;
         }
@@ -379,6 +394,7 @@ fn most_prominent_line(
             let about = (k.saturating_sub(NEIGHBOURHOOD)..(k + NEIGHBOURHOOD + 1).min(power.len()))
                 .filter(|i| i.abs_diff(k) > LINE)
                 .map(|i| power[i]);
+            // The median of the neighbourhood is not affected by other lines.
             let level = median(about.collect());
             let above = power[k] / level.max(f64::MIN_POSITIVE);
             if level > 0.0 && above > MIN_LINE_RATIO && best.is_none_or(|(most, _)| above > most) {
@@ -398,7 +414,9 @@ fn refine_frequency(
 ) -> f64 {
     let longest = problem.layout.segments.iter();
     let longest = longest.map(|s| s.samples as f64 * s.step);
+    // Frequency resolution of the longest segment.
     let width = 1.0 / longest.fold(f64::MIN_POSITIVE, f64::max);
+    // Squares that a sinusoid explains in all channels together.
     let explained = |frequency: f64| -> f64 {
         let all = rest.iter().zip(unfit).map(|(rest, unfit)| {
             let mut left = rest.clone();
@@ -431,6 +449,7 @@ fn subtract_sinusoid(
     for stretch in &problem.layout.segments {
         let part = &mut rest[start..start + stretch.samples];
         let is_out = |out: &[bool], i: usize| out.get(start + i) == Some(&true);
+        // Sine and cosine at the samples of the segment.
         let waves: Vec<(f64, f64)> = (0..part.len())
             .map(|i| (TAU * frequency * stretch.step * i as f64).sin_cos())
             .collect();

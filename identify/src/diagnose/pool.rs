@@ -82,6 +82,7 @@ impl<'a> ColumnPool<'a> {
 
     /// Excludes further samples, `[channel][sample]`, from all products and residuals.
     pub(crate) fn exclude_samples(mut self, left_out: &[Vec<bool>]) -> Self {
+        // Unite the new exclusions with the samples that were not measured.
         let all = left_out.iter().enumerate().map(|(d, out)| {
             let lost = self.lost.get(d);
             let either = out.iter().enumerate().map(|(i, out)| {
@@ -178,6 +179,7 @@ impl<'a> ColumnPool<'a> {
 
     /// Whether a column acts on a channel.
     fn acts_on(&self, k: usize, channel: usize) -> bool {
+        // One bit per channel, 64 in a word.
         let word = self.acts[k].get(channel / 64);
         word.is_some_and(|word| word >> (channel % 64) & 1 == 1)
     }
@@ -325,6 +327,7 @@ impl<'a> ColumnPool<'a> {
         let mut gram = DMatrix::zeros(n, n);
         for i in 0..n {
             for j in 0..=i {
+                // The matrix is symmetric, so one half is computed.
                 let sum = self.scoped_product(which[i], which[j], weights, on)
                     + self.prior_term(which[i], which[j]);
                 gram[(i, j)] = sum;
@@ -352,6 +355,7 @@ impl<'a> ColumnPool<'a> {
         let n = which.len();
         let mut grams = vec![DMatrix::zeros(n, n); self.folds.len()];
         let mut products = self.of_folds.borrow_mut();
+        // Weights of the common channels of a pair.
         let mut common: Vec<f64> = Vec::new();
         for i in 0..n {
             for j in 0..=i {
@@ -408,6 +412,7 @@ impl<'a> ColumnPool<'a> {
         let mut rest: Vec<Vec<f64>> = (self.columns[of].0.iter())
             .map(|values| values.clone().unwrap_or_else(|| vec![0.0; samples]))
             .collect();
+        // Channels on which a column is zero are skipped.
         for (k, factor) in others.iter().zip(factors) {
             for (rest, values) in rest.iter_mut().zip(&self.columns[*k].0) {
                 if let Some(values) = values {
@@ -490,6 +495,7 @@ pub(crate) fn solve_gram(gram: &DMatrix<f64>) -> (DVector<f64>, f64) {
     let mut upper = DMatrix::<f64>::zeros(n + 1, n + 1);
     let mut kept = vec![false; n];
     for i in 0..=n {
+        // A column of zeros stays without a factor.
         if scale[i] == 0.0 {
             continue;
         }

@@ -30,21 +30,25 @@ impl ReadingFaultKind {
 /// all forces is an effect of the library, and a wrong scale of all is equivalent to other parameters.
 pub fn reading_fault_candidates(problem: &DiagnosisProblem) -> Vec<CandidateEffect> {
     let layout = &problem.layout;
+    // Only channels with a force signal can have a faulty one.
     let read: Vec<usize> = (0..layout.channels.len())
         .filter(|d| !problem.is_idle(*d))
         .collect();
     // With one channel, its fault is that of all channels.
     let has_others = read.len() > 1;
+    // With several channels, each may have its own delay and low-pass; each may have its own scale in any case.
     let each = read.into_iter().flat_map(|d| {
         let late = has_others.then_some((ReadingFaultKind::Delayed, Some(d)));
         let lagging = has_others.then_some((ReadingFaultKind::LowPassed, Some(d)));
         [late, lagging, Some((ReadingFaultKind::Scaled, Some(d)))]
     });
+    // A low-pass of all channels comes first.
     let all = [Some((ReadingFaultKind::LowPassed, None))];
     let readings = all.into_iter().chain(each).flatten();
     readings
         .map(|(fault, channel)| {
             let (kind, symbol, unit, sign) = fault.effect_description();
+            // A fault of all channels has the place "force".
             let place = channel.map_or("force", |d: usize| layout.channels[d].as_str());
             CandidateEffect {
                 effect: LocatedEffect {
@@ -79,9 +83,11 @@ impl EffectSelector<'_> {
         force: &ForceColumn,
         value: f64,
     ) -> ForceColumn {
+        // Each channel by itself; channels without the fault get no column.
         let channels = force.0.iter().enumerate();
         let of = |(d, values): (usize, &Option<Vec<f64>>)| {
             let values = values.as_ref()?;
+            // Channels that the fault does not concern.
             if reading.channel.is_some_and(|channel| channel != d) {
                 return None;
             }
@@ -89,10 +95,12 @@ impl EffectSelector<'_> {
             if reading.kind == ReadingFaultKind::Scaled {
                 return Some(values.clone());
             }
+            // Segment by segment, since neither a delay nor a low-pass crosses a gap.
             let mut changes = Vec::with_capacity(values.len());
             let mut start = 0;
             for stretch in &self.problem.layout.segments {
                 let part = &values[start..start + stretch.samples];
+                // Delay or time constant in samples.
                 let samples = value / stretch.step;
                 // For a small delay or time constant T both faults change the force by -T df/dt.
                 if samples.abs() < SLIGHT {
@@ -122,6 +130,7 @@ impl EffectSelector<'_> {
     /// Fits a set again with columns computed from its own fit. A delay and a low-pass are equivalent if both are
     /// small: the low-pass is chosen only if its residual is clearly smaller.
     pub(crate) fn refit_dependent_columns(&mut self, trial: &ScoredEffectSet) -> ScoredEffectSet {
+        // Delays and low-passes change their columns with their value; a wrong scale does not.
         let curved = |bench: &Self, pick: &SelectedEffect| match bench.candidate(pick).source {
             ColumnSource::ReadingFault(reading) if reading.kind != ReadingFaultKind::Scaled => {
                 Some(reading)
@@ -149,12 +158,14 @@ impl EffectSelector<'_> {
             other.is_some_and(|o| o.channel == reading.channel && o.kind != reading.kind)
                 && trial.picks.iter().all(|p| p.candidate != pick.candidate)
         };
+        // The set itself, and the same set with the other fault on this channel.
         let mut sets = vec![trial.picks.clone()];
         if let Some(other) = self.current_choices.iter().flatten().find(is_other) {
             let mut set = trial.picks.clone();
             set[at] = other.clone();
             sets.push(set);
         }
+        // Fit each set with columns at its own estimates.
         let mut tried: Vec<ScoredEffectSet> = Vec::new();
         for set in sets {
             let refreshed = self.refresh_columns(set);
@@ -170,9 +181,11 @@ impl EffectSelector<'_> {
             let (factors, _) = self.fit(&other.picks, FitScope::All);
             let rest = self.residual(&other.picks, &factors);
             let channels: Vec<usize> = (0..rest.len()).collect();
+            // Difference of the criterion: both sets have the same number of estimated values.
             let better =
                 self.effective_equations(&rest, &channels) * (best.squares / other.squares).ln();
             let has_signs = other.is_possible();
+            // A negative delay is impossible, so the low-pass is taken without a test then.
             if !best.is_possible() || has_signs && better > MIN_DISTINCTION {
                 best = other;
             }
@@ -196,6 +209,7 @@ fn central_differences(values: &[f64]) -> impl Iterator<Item = f64> {
 /// Output of a first-order low-pass with a time constant in samples, exact for an input that is linear between its
 /// samples. It starts in equilibrium.
 fn low_pass(values: &[f64], constant: f64) -> Vec<f64> {
+    // Share of a difference that remains after one sample.
     let keeps = (-constant.recip()).exp();
     let mut state = values[0];
     let mut before = values[0];
@@ -211,6 +225,7 @@ fn low_pass(values: &[f64], constant: f64) -> Vec<f64> {
 
 /// Cubic interpolation between the second and the third of four samples; `share` runs from 0 to 1 (J. L. Lagrange).
 fn interpolate_cubic(values: &[f64], share: f64) -> f64 {
+    // Lagrange's formula, arranged around the two inner samples.
     let [before, first, second, behind] = [values[0], values[1], values[2], values[3]];
     let (x, y) = (share, 1.0 - share);
     let inner = y * first + x * second;
@@ -230,7 +245,9 @@ fn interpolate_force(values: &[f64], rates: Option<&[f64]>, at: f64) -> f64 {
     )]
     let k = at.floor() as usize;
     let share = at - at.floor();
+    // The rate changes its sign between two samples.
     let turns_within = |rates: &[f64], i: usize| rates[i] * rates[i + 1] < 0.0;
+    // Three intervals around the place must be free of reversals for the cubic.
     let is_smooth = rates.is_none_or(|rates| {
         let near = k.saturating_sub(1)..(k + 2).min(last);
         near.into_iter().all(|i| !turns_within(rates, i))

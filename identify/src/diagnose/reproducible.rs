@@ -38,6 +38,7 @@ pub(crate) fn repeatable_shares(
     variables: &[(String, Vec<f64>)],
     rest: &[Vec<f64>],
 ) -> Vec<f64> {
+    // Take equally spaced samples.
     let n = layout.samples();
     // Many features need many operations, so fewer samples are used then.
     let count = feature_count(variables.len());
@@ -58,6 +59,7 @@ pub(crate) fn repeatable_shares(
             at(block.start)..at(block.end)
         })
         .collect();
+    // Residuals of all channels at the selected samples, as columns.
     let target = |r: &Vec<f64>| DVector::from_iterator(picked.len(), picked.iter().map(|i| r[*i]));
     let targets: Vec<DVector<f64>> = rest.iter().map(target).collect();
     let targets = DMatrix::from_columns(&targets);
@@ -91,6 +93,7 @@ fn errors_by_features(
 ) -> FoldErrors {
     let m = features.ncols();
     let rows = |of: &DMatrix<f64>, fold: &Range<usize>| of.rows_range(fold.clone()).into_owned();
+    // Products of the features with themselves and with the targets, fold by fold.
     let parts: Vec<[DMatrix<f64>; 2]> = (folds.iter())
         .map(|fold| {
             let own = rows(features, fold);
@@ -107,6 +110,7 @@ fn errors_by_features(
     let of_ridge = |ridge: &f64| {
         let mut left = vec![0.0; targets.ncols()];
         for (fold, [gram, right]) in folds.iter().zip(&parts) {
+            // Fit on all other folds.
             let mut others = &whole[0] - gram;
             for i in 0..m {
                 others[(i, i)] *= 1.0 + ridge;
@@ -142,6 +146,7 @@ fn errors_by_samples(
     let of_ridge = |ridge: &f64| {
         let mut left = vec![0.0; targets.ncols()];
         for fold in folds {
+            // Samples outside of the fold.
             let others: Vec<usize> = (0..n).filter(|i| !fold.contains(i)).collect();
             let mut own = products.select_rows(&others).select_columns(&others);
             for i in 0..others.len() {
@@ -177,6 +182,7 @@ fn state_features(variables: &[(String, Vec<f64>)], picked: &[usize]) -> Vec<Vec
     for (name, values) in variables {
         let values: Vec<f64> = picked.iter().map(|i| values[*i]).collect();
         let n = values.len() as f64;
+        // Scale each variable by its mean and standard deviation.
         let mean = values.iter().sum::<f64>() / n;
         let spread = (values.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / n).sqrt();
         if spread <= 0.0 || !spread.is_finite() {
@@ -190,6 +196,7 @@ fn state_features(variables: &[(String, Vec<f64>)], picked: &[usize]) -> Vec<Vec
                     .map(|x| (x / (share * spread)).tanh())
                     .collect()
             };
+            // Two widths: nearly a jump, and a smooth transition.
             signs.push(sign(0.02));
             signs.push(sign(0.2));
         }
@@ -210,6 +217,7 @@ fn state_features(variables: &[(String, Vec<f64>)], picked: &[usize]) -> Vec<Vec
     }
     let product =
         |a: &[f64], b: &[f64]| -> Vec<f64> { a.iter().zip(b).map(|(x, y)| x * y).collect() };
+    // Signs and shapes alone, a constant, the variables, and their products.
     let mut features: Vec<Vec<f64>> = signs.iter().cloned().chain(shapes).collect();
     features.push(vec![1.0; picked.len()]);
     features.extend(scaled.iter().cloned());
@@ -234,6 +242,7 @@ fn state_features(variables: &[(String, Vec<f64>)], picked: &[usize]) -> Vec<Vec
 
 /// Distance of a position beyond some of its quantiles, at both ends, in units of its standard deviation.
 fn hinges(values: &[f64], spread: f64) -> Vec<Vec<f64>> {
+    // Quantiles from the sorted values.
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
     let last = sorted.len() - 1;

@@ -195,6 +195,7 @@ impl EffectSelector<'_> {
         refused.clear();
         let chosen = self.first_supported_set(accepted, &mut additions, refused);
         // A set with other members must be much better than one that only grows.
+        // Sets with other members are tested only if their criterion is far below.
         let bound = chosen
             .as_ref()
             .map_or(f64::INFINITY, |next| next.trial.score - MUCH_BETTER);
@@ -262,6 +263,7 @@ impl EffectSelector<'_> {
         trials: &mut dyn Iterator<Item = &ScoredEffectSet>,
         refused: &mut Vec<RejectedCandidate>,
     ) -> Option<SupportedEffectSet> {
+        // Stop after a number of tests, since each needs fits on blocks.
         let mut tested = 0;
         for trial in trials {
             if tested == TESTED {
@@ -453,6 +455,7 @@ impl EffectSelector<'_> {
             fewer.remove(i);
             fewer
         }));
+        // Sorted list of the best pairs with their criterion.
         let mut best: Vec<(f64, ScoredEffectSet)> = Vec::new();
         for set in kept {
             let beyond = self.extension_bound(table, &set);
@@ -490,6 +493,7 @@ impl EffectSelector<'_> {
         let mut table = self.projected_gram(&picks);
         for i in 0..picks.len() {
             let mut others = picks.clone();
+            // Compare rivals in the presence of all other members.
             let own = others.remove(i);
             let now = self.fit_from_gram(&table, picks.clone());
             // The constants of the other members were chosen with this member, which may put similar effects at a
@@ -528,6 +532,7 @@ impl EffectSelector<'_> {
                 } else {
                     set
                 };
+                // Another kind must be closer on the grid than another place of the same kind.
                 let kind = |pick: &SelectedEffect| self.candidate(pick).effect.kind.clone();
                 let squares = self.fit_set(tuned.clone()).squares;
                 // Only rivals that are close on the grid are worth a fine search.
@@ -659,6 +664,7 @@ impl EffectSelector<'_> {
             } else {
                 SIMPLER_KIND_SHARE
             };
+            // The simpler kind must be supported and reach most of the gain.
             if own.is_sufficient() && own.gain > most_of * chosen.1.gain {
                 simpler.push((trial.clone(), own));
             }

@@ -111,6 +111,7 @@ impl EffectSelector<'_> {
     /// A set without a member. Columns that depend on the fit are computed again, and so are constants of other effects
     /// at the same place, since the member may have influenced them.
     fn refit_without(&mut self, picks: &[SelectedEffect], member: usize) -> Vec<SelectedEffect> {
+        // Effects at the place of the removed member are the ones that depend on it most.
         let place = &self.candidate(&picks[member]).effect.at;
         let rest = without_members(picks, &[member]);
         // Whether an effect is a curve with searched constants at the place of the member.
@@ -166,6 +167,7 @@ impl EffectSelector<'_> {
             let is_new = picks.iter().all(|p| p.candidate != one.candidate);
             is_new && one.rank == n_columns(&pair) && pair.iter().all(|p| self.is_in_span(p, one))
         })?;
+        // The joined effect takes the position of the first member.
         let mut set = others;
         set.insert(i, same);
         let trial = self.fit_set(set);
@@ -208,6 +210,7 @@ impl EffectSelector<'_> {
             }
             let mut set = others.clone();
             set.insert(i, one);
+            // Refine its constant before the comparison.
             let set = self.refine_around_member(set, i);
             let trial = self.fit_set(set);
             // Evidence for the pair compared with the single effect.
@@ -271,6 +274,7 @@ impl EffectSelector<'_> {
                 set[i] = rival.clone();
                 let trial = self.fit_from_gram(&table, set);
                 let score = criterion(self.problem, &trial, worth);
+                // A preferred cause gets an advantage.
                 let ahead = if self.is_preferred_reading(rival, &picks[i]) {
                     AS_GOOD
                 } else {

@@ -15,10 +15,12 @@ impl EffectSelector<'_> {
         mut picks: Vec<SelectedEffect>,
     ) -> Vec<SelectedEffect> {
         let problem = self.problem;
+        // The constants of one effect depend on those of the others, so there is a second round.
         for _ in 0..2 {
             let before = picks.clone();
             for i in 0..picks.len() {
                 let candidate = picks[i].candidate;
+                // Only effects with a grid of constants have a choice.
                 match &problem.candidates[candidate].source {
                     ColumnSource::Columns(choices) if choices.len() > 1 => {}
                     _ => continue,
@@ -26,6 +28,7 @@ impl EffectSelector<'_> {
                 let mut others = picks.clone();
                 let old = others.remove(i);
                 let beside = self.conditioning_set(&others);
+                // The best choice of the grid must explain more than the present one.
                 let Some((best, explained)) = self.best_choice(candidate, &beside) else {
                     continue;
                 };
@@ -54,6 +57,7 @@ impl EffectSelector<'_> {
         member: usize,
     ) -> Vec<SelectedEffect> {
         let channels = self.affected_channels(&picks[member..=member]);
+        // Members that act on at least one of the channels of the new one.
         let acts_there = |pick: &SelectedEffect| {
             let own = self.affected_channels(std::slice::from_ref(pick));
             own.iter().any(|channel| channels.contains(channel))
@@ -75,6 +79,7 @@ impl EffectSelector<'_> {
         let supply = self.provider;
         for i in which {
             let candidate = picks[i].candidate;
+            // Exactly one searched constant is refined.
             let [(name, value)] = picks[i].constants.as_slice() else {
                 continue;
             };
@@ -91,6 +96,7 @@ impl EffectSelector<'_> {
                 ],
                 _ => continue,
             };
+            // The grid limits the search: its ends and the neighbours of the present value.
             grid.sort_by(f64::total_cmp);
             // Search between the neighbours on the grid, but not far, and not beyond the ends of the grid.
             let below = grid.iter().copied().filter(|x| *x < value);
@@ -103,6 +109,7 @@ impl EffectSelector<'_> {
             let is_positive = grid.first().is_some_and(|first| *first > 0.0);
             if is_positive {
                 let is_costly = problem.candidates[candidate].source == ColumnSource::LoadDependent;
+                // Limits relative to the present value; wider for the coarse search of load-dependent effects.
                 let [under, over] = if is_costly {
                     [1.0 / COARSE_SEARCH_FACTOR, COARSE_SEARCH_FACTOR]
                 } else {
@@ -111,11 +118,13 @@ impl EffectSelector<'_> {
                 low = low.max(under * value).max(grid[0]);
                 high = high.min(over * value).min(grid[grid.len() - 1]);
             }
+            // At an end of the grid the search stays on one side.
             low = if low.is_finite() { low } else { value };
             high = if high.is_finite() { high } else { value };
             if high <= low {
                 continue;
             }
+            // The search runs on the logarithm of a positive constant.
             let scale = |x: f64| if is_positive { x.ln() } else { x };
             let unscale = |x: f64| if is_positive { x.exp() } else { x };
             let mut others = picks.clone();
@@ -127,6 +136,7 @@ impl EffectSelector<'_> {
             // What the effect explains in addition to the others with one value of the constant; `None` if it has no
             // columns there.
             let at = |x: f64| -> Option<(f64, Vec<ForceColumn>)> {
+                // Load-dependent columns need the load; others depend on the constant only.
                 let columns = match &load {
                     Some(load) => {
                         let which = LoadDependentQuery::One(candidate, Some(unscale(x)));
@@ -139,6 +149,7 @@ impl EffectSelector<'_> {
             let Some(best) = maximise(scale(low), scale(high), &at) else {
                 continue;
             };
+            // What the effect explains with its present constant.
             let now = self.explained_squares(&picks[i].columns, &beside);
             let (x, (explained, columns)) = best;
             // Only an improvement is kept, so that only its columns enter the pool.
@@ -169,7 +180,9 @@ fn maximise<T>(
     at: &dyn Fn(f64) -> Option<(f64, T)>,
 ) -> Option<(f64, (f64, T))> {
     let golden = 0.5 * (3.0 - 5.0_f64.sqrt());
+    // Tolerance of the position.
     let near = NEAR * (high - low);
+    // The first point divides the interval in the golden section.
     let mut best = low + golden * (high - low);
     let mut of_best = at(best)?;
     // The second and third best points with their values; parabolas need three points.
@@ -177,6 +190,7 @@ fn maximise<T>(
     let mut third = second;
     let (mut step, mut step_before) = (0.0_f64, 0.0_f64);
     for _ in 1..MAX_EVALUATIONS {
+        // Stop when the interval around the best point is small enough.
         let middle = 0.5 * (low + high);
         if (best - middle).abs() + 0.5 * (high - low) <= 2.0 * near {
             break;

@@ -22,6 +22,7 @@ impl EffectSelector<'_> {
         picks: &[SelectedEffect],
         rest: &[Vec<f64>],
     ) -> Vec<LocatedEffect> {
+        // Use every n-th sample if there are many.
         let every = self.pool.all_samples().len().div_ceil(MOST).max(1);
         // Orthonormal basis of the columns of model and set (Gram-Schmidt); dependent columns are skipped.
         let mut basis: Vec<DVector<f64>> = Vec::new();
@@ -55,10 +56,12 @@ impl EffectSelector<'_> {
                 .iter()
                 .map(|k| self.stacked_column(*k, every))
                 .collect();
+            // Share of the effect that the model and the set do not contain.
             let Some(share) = least_share(&basis, &columns) else {
                 continue;
             };
             let channels = self.affected_channels(&[pick]);
+            // Mean square of the drives' forces relative to the residual.
             let force: f64 = channels
                 .iter()
                 .map(|d| {
@@ -103,6 +106,7 @@ fn project_out(basis: &[DVector<f64>], column: &DVector<f64>) -> DVector<f64> {
 /// Least share of squares that remains after the projection, over all combinations of some columns. Combinations that
 /// are determined along any motion are skipped; `None` if all are.
 fn least_share(basis: &[DVector<f64>], columns: &[DVector<f64>]) -> Option<f64> {
+    // Scale the columns, so that units do not matter.
     let scaled: Vec<DVector<f64>> = (columns.iter())
         .filter(|column| column.norm() > 0.0)
         .map(|column| column / column.norm())
@@ -115,6 +119,7 @@ fn least_share(basis: &[DVector<f64>], columns: &[DVector<f64>]) -> Option<f64> 
     let svd = own.svd(true, false);
     let u = svd.u?;
     let largest = svd.singular_values.max();
+    // Independent directions of the columns.
     let kept = (0..u.ncols()).filter(|k| svd.singular_values[*k] > 1e-6 * largest);
     let left: Vec<DVector<f64>> = kept
         .map(|k| project_out(basis, &u.column(k).into_owned()))

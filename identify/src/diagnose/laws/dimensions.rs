@@ -32,6 +32,7 @@ impl LawUnit {
                 })
                 .collect()
         };
+        // Numerator and denominator.
         let (above, below) = (side(1), side(-1));
         let above = if above.is_empty() {
             "1".to_owned()
@@ -70,6 +71,7 @@ fn unit_of(variable: LawVariable, own_is_angle: bool, other_is_angle: bool) -> L
 impl LawProduct {
     /// Unit of its parameter, such that the product is a force or torque at the place.
     pub fn unit(&self, site: &LawSite, sites: &[LawSite]) -> String {
+        // Whether the other place is revolute.
         let other = self.other.is_some_and(|other| sites[other].is_angle);
         // Start from the unit of the force and divide by that of every factor.
         let unit = self

@@ -65,6 +65,7 @@ impl LawProduct {
 
     /// Number of its parameters: two if sine and cosine are estimated separately.
     pub(crate) fn parameters(&self) -> usize {
+        // Only waves have two columns, sine and cosine.
         let waves = self.factors.iter();
         let waves = waves.filter(|factor| matches!(factor.shape, LawShape::Wave { .. }));
         // Each wave doubles the number of columns.
@@ -78,6 +79,8 @@ impl LawProduct {
 
     /// Whether the library that comes with the program contains it, so that the diagnosis has rejected it already.
     pub(crate) fn is_in_library(&self, site: &LawSite) -> bool {
+        // Laws that the library contains as effects: stiffness, damping, inertia, dry and quadratic friction, Stribeck
+        // friction, periodic forces, Dahl friction, and load-dependent friction.
         match self.factors.as_slice() {
             [LawFactor { variable, shape }] => match (variable, shape) {
                 (LawVariable::Position | LawVariable::Rate | LawVariable::Acceleration, shape)
@@ -198,6 +201,7 @@ impl TravelExtent {
     /// Hinges that begin near either end.
     fn hinge_shapes(&self, power: i32) -> impl Iterator<Item = LawShape> {
         ENDS.into_iter().flat_map(move |part| {
+            // A hinge near the upper end acts upwards, one near the lower end downwards.
             let ends = [
                 (1.0, self.position_at(1.0 - part)),
                 (-1.0, self.position_at(part)),
@@ -229,6 +233,7 @@ impl TravelExtent {
 
     /// States with memory, for all lengths: friction curves of two kinds and a dragged spring.
     fn memory_shapes(&self) -> Vec<LawShape> {
+        // Dahl's and Bouc-Wen's model for all lengths.
         let curves = [1, 2].into_iter().flat_map(|curve| {
             LENGTHS.map(move |part| LawShape::Memory {
                 length: part * self.travel,
@@ -278,8 +283,10 @@ fn step(centre: f64, width: f64) -> LawShape {
 /// Factors that are tried for a place by itself, from its motion and its load, if it has one.
 pub(crate) fn own_factors(position: &[f64], rate: &[f64], load: Option<&[f64]>) -> FactorCatalog {
     use LawVariable::{Acceleration, Position, Rate};
+    // Ranges from which all constants are chosen.
     let extent = TravelExtent::new(position, rate);
     let scale = root_mean_square(rate);
+    // Friction or damping that acts in one direction only.
     let directions = [1.0, -1.0].map(|side| LawShape::Hinge {
         from: 0.0,
         side,
@@ -382,6 +389,7 @@ fn simple_positions() -> Vec<LawFactor> {
 /// Adds factors of the load: alone, with rates and with positions.
 fn add_loads(menu: &mut FactorCatalog, extent: &TravelExtent, load: &[f64]) {
     use LawVariable::{Load, Rate};
+    // Scales of the load.
     let largest = largest_magnitude(load);
     let scale = root_mean_square(load);
     // Powers of the load, with and without its sign.
@@ -439,14 +447,17 @@ pub(crate) fn factors_with_other(
     }));
     // A revolute joint may act once or twice per turn.
     if is_angle {
+        // Full and half turns.
         let turns = [1.0, 0.5].map(|part| LawShape::Wave {
             pitch: part * std::f64::consts::TAU,
         });
         places.extend(turns);
     }
+    // Waves over the travel of the other place.
     let waves = [0.5, 1.0, 1.6, 2.3, 3.2].map(|times| LawShape::Wave {
         pitch: travel / times,
     });
+    // Smooth signs of a rate.
     let steps = |fastest: f64| {
         [0.02, 0.15, 0.5].map(|part| LawShape::Step {
             centre: 0.0,
@@ -477,6 +488,7 @@ pub(crate) fn factors_with_other(
     for n in [1, 3] {
         alone_rates.extend([true, false].map(|is_odd| half_power(n, is_odd, scale)));
     }
+    // Factors of the own motion, by which those of the other place are multiplied.
     let own = || {
         let mut all = factors_of(Rate, own_rates.iter().copied());
         all.extend(factors_of(Position, [LawShape::LINEAR]));

@@ -280,6 +280,7 @@ impl LawProjection {
         site: usize,
         product: &LawProduct,
     ) -> Self {
+        // The residual is projected again together with the basis.
         let mut more = self.clone();
         let n = self.samples;
         let channels = samples.channels(site);
@@ -301,6 +302,7 @@ impl LawProjection {
         let channels = samples.channels(site);
         // Rows of the stacked vectors that belong to these channels.
         let rows: Vec<usize> = channels.iter().flat_map(|d| d * n..(d + 1) * n).collect();
+        // The basis is transposed, so that it multiplies columns from the left.
         let k = self.basis.ncols();
         SiteProjection {
             site,
@@ -387,6 +389,7 @@ impl SiteProjection {
         };
         let mut at = 0;
         let of_group = |count: &usize| {
+            // Indices of the one or two columns of the group.
             let (i, j) = (at, at + 1);
             at += count;
             let own = product(i, i);

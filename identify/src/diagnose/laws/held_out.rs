@@ -50,6 +50,7 @@ impl ValidatedLaw {
     /// Difference of the squared residual to that of another law, and the standard deviation of this difference over
     /// the blocks.
     pub(crate) fn excess_over(&self, other: &Self) -> (f64, f64) {
+        // Differences block by block, since both laws have the same noise there.
         let differences: Vec<f64> = self
             .block_squares
             .iter()
@@ -77,6 +78,7 @@ impl BlockValidation {
         let fit = layout.fit_samples();
         // Blocks of samples become ranges among the selected samples.
         let at = |sample: usize| samples.picked.partition_point(|i| *i < sample);
+        // Blocks of all recordings; those behind the fit are validation blocks.
         let all = layout.blocks(BLOCKS);
         let is_check = all.iter().map(|block| block.start >= fit).collect();
         let blocks: Vec<Range<usize>> = all.iter().map(|b| at(b.start)..at(b.end)).collect();
@@ -88,6 +90,7 @@ impl BlockValidation {
         // Columns of base and effects on each channel, then the residual as the last one.
         let columns: Vec<Vec<Vec<f64>>> = (0..deviations.len())
             .map(|d| {
+                // Excluded samples are zero, so that they do not count.
                 let mut all: Vec<Vec<f64>> = (bench.columns(picks).iter())
                     .map(|k| match bench.pool.column(*k).0[d].clone() {
                         Some(mut values) => {
@@ -132,10 +135,12 @@ impl BlockValidation {
         terms: &[LawProduct],
     ) -> ValidatedLaw {
         let channels = samples.channels(site);
+        // Columns of the law on the channels on which it has an effect.
         let own: Vec<Vec<f64>> = (terms.iter())
             .flat_map(|term| samples.columns(site, term))
             .collect();
         let k = samples.picked.len();
+        // Number of known columns, without the residual.
         let n = self.grams.first().map_or(0, DMatrix::nrows) - 1;
         let m = own.len();
         // Inner products of one block in the order: base and effects, law, residual.
@@ -148,6 +153,7 @@ impl BlockValidation {
                     whole[(place(i), place(j))] = gram[(i, j)];
                 }
             }
+            // Add the products of the law's columns.
             for (a, column) in own.iter().enumerate() {
                 for (part, d) in channels.iter().enumerate() {
                     let values = &column[part * k..(part + 1) * k];
@@ -173,6 +179,7 @@ impl BlockValidation {
         // Sums over blocks replace further passes over the samples.
         let grams: Vec<DMatrix<f64>> = self.blocks.iter().zip(&self.grams).map(of_block).collect();
         let zero = || DMatrix::zeros(n + m + 1, n + m + 1);
+        // Sums over all blocks, and over those of the fit.
         let whole = grams.iter().fold(zero(), |sum, gram| sum + gram);
         let of_fit = grams
             .iter()
@@ -197,6 +204,7 @@ impl BlockValidation {
                 others.push(factors.as_slice()[n..n + m].to_vec());
                 factors
             };
+            // Squared residual of the block with these factors.
             left.push(factors.dot(&(gram * &factors)).max(0.0));
         }
         let factors = fitted(&whole);
@@ -226,6 +234,7 @@ impl BlockValidation {
         let k = samples.picked.len();
         let (mut squares, mut worth) = (0.0, 0.0);
         for (part, d) in samples.channels(site).iter().enumerate() {
+            // Base, effects and residual on this channel.
             let known = &self.columns[*d];
             let n = known.len() - 1;
             // Subtract the known columns and the law from the residual, with the factors from all blocks.
