@@ -215,7 +215,7 @@ mod tests {
     use super::*;
     use crate::test_noise::TestNoise;
 
-    /// Products channel by channel are those of the whole matrix.
+    /// Products channel by channel equal those of the complete matrix.
     #[test]
     fn products_are_those_of_the_whole_matrix() {
         let mut noise = TestNoise::new(5);

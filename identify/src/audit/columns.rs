@@ -446,7 +446,7 @@ mod tests {
         );
     }
 
-    /// Two stretches with a second between them: each is prepared on its own, so no rate shows the jump.
+    /// Two segments with a second between them: each is prepared on its own, so no rate shows the jump.
     #[test]
     fn nothing_is_filtered_across_a_gap() {
         let broken = recording(

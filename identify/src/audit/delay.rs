@@ -95,11 +95,13 @@ impl ForceDelays {
         let mut starts = vec![vec![0.0; channels]];
         starts.push(vec![audit.coarse_shift(&all, &now.residuals)?; channels]);
         if channels > 1 {
+            // One shift for each channel by itself.
             let each = all
                 .iter()
                 .map(|c| audit.coarse_shift(&[*c], &now.residuals));
             starts.push(each.map(Option::unwrap_or_default).collect());
         }
+        // Equal starting points need one fit only.
         starts.dedup_by(|a, b| a.iter().zip(b).all(|(a, b)| (*a - *b).abs() < 0.5 * step));
         // A distant starting point must be clearly better than the one at zero.
         let best = |groups: usize| {
@@ -144,6 +146,7 @@ impl DelayAudit<'_> {
         let channels = self.forces.len();
         let mut forces = DVector::zeros(self.used_rows.len());
         let mut counts = self.used_rows.clone();
+        // Interpolate the recorded forces linearly at the shifted times.
         let last = self.recording_time.len() - 1;
         for (c, shift) in shifts {
             let mut above = 1;
@@ -185,6 +188,7 @@ impl DelayAudit<'_> {
     fn coarse_shift(&self, channels: &[usize], left: &[f64]) -> Option<f64> {
         let n = self.forces.len();
         let step = self.step()?;
+        // Each channel counts relative to its residual.
         let weight = |c: usize| {
             let size = self.forces[c].iter().map(|f| f * f).sum::<f64>().sqrt();
             (left[c] * size).max(f64::MIN_POSITIVE.sqrt()).recip()
@@ -202,6 +206,7 @@ impl DelayAudit<'_> {
         // The regressor does not change with the shift, so one factorisation serves all shifts.
         let transposed = weighted.transpose();
         let mut normal = &transposed * &weighted;
+        // A small ridge keeps dependent columns solvable.
         for i in 0..normal.ncols() {
             normal[(i, i)] += 1e-9;
         }
@@ -214,6 +219,7 @@ impl DelayAudit<'_> {
             let size = forces.norm_squared();
             (size > 0.0).then(|| 1.0 - right.dot(&normal.solve(&right)) / size)
         };
+        // Start with about COARSE strides on either side.
         let most = (self.max_delay / step).floor();
         let mut stride = (most / COARSE as f64).ceil().max(1.0);
         let mut best = (0.0, error(0.0)?);
@@ -244,6 +250,7 @@ impl DelayAudit<'_> {
         let channels = self.forces.len();
         let step = self.step()?;
         let mut shifts: Vec<f64> = start.iter().map(|s| (s / step).round() * step).collect();
+        // One delay for all starts from the mean of the shifts.
         if delays == 1 {
             let mean = shifts.iter().sum::<f64>() / channels as f64;
             shifts = vec![(mean / step).round() * step; channels];
@@ -329,6 +336,7 @@ impl DelayAudit<'_> {
         last: usize,
     ) -> Option<Vec<f64>> {
         let samples = columns.samples();
+        // Normal equations of each block; their sum minus one block leaves this block out.
         let blocks: Vec<(DMatrix<f64>, DVector<f64>)> = (0..samples)
             .step_by(samples.div_ceil(BLOCKS))
             .map(|from| {

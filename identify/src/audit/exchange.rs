@@ -36,6 +36,7 @@ impl ForceAudit {
         if rows == 0 || rows < 2 * regressor.columns() {
             return None;
         }
+        // All rows have equal weight; the forces are not needed for the factor.
         let alike = DVector::from_element(rows, 1.0);
         let none = DVector::zeros(rows);
         let (normal, _) = regressor.normal_equations(&alike, &none, 0..regressor.samples());
@@ -70,6 +71,7 @@ impl ForceAudit {
             }
             changed
         };
+        // Try all exchanges of two channels and all changes of one sign, and take the best.
         let swaps = (0..n).flat_map(|a| (a + 1..n).map(move |b| WiringFault::Swapped(a, b)));
         swaps
             .chain((0..n).map(WiringFault::Reversed))
@@ -132,7 +134,7 @@ mod tests {
         assert_eq!(found, WiringFault::Swapped(0, 1));
         assert!(before > 0.2 && after < 0.02, "{before} {after}");
         let turned = interleaved([&forces[0], &forces[1]], -1.0);
-        // With two channels the one cannot be told from the other: all parameters may change their signs.
+        // With two channels it is not known which is reversed: all parameters may change their signs.
         let (found, [before, after]) = explained.find_wiring_fault(&turned).unwrap();
         assert!(matches!(found, WiringFault::Reversed(_)));
         assert!(before > 0.2 && after < 0.02, "{before} {after}");

@@ -59,6 +59,7 @@ impl SignalRecording {
             return Vec::new();
         }
         let time = &time[..n];
+        // Positions that move and are finite.
         let position = |name: &String| {
             let q = self.column(name).ok()?.get(..n)?;
             let moves = q.iter().any(|x| x.total_cmp(&q[0]).is_ne());
@@ -96,6 +97,7 @@ impl CubicResidual {
         let (mut errors, mut rates) = (Vec::new(), Vec::new());
         for i in SIDE..q.len() - SIDE {
             let about = (i - SIDE..=i + SIDE).filter(|k| *k != i);
+            // Relative to the sample, so that the value at zero is the error.
             let points = about.map(|k| (time[k] - time[i], q[k] - q[i]));
             let [value, rate] = fit_cubic(points, 0.0);
             errors.push(-value);
@@ -110,6 +112,7 @@ impl CubicResidual {
 /// fit fails.
 fn fit_cubic(points: impl Iterator<Item = (f64, f64)>, step: f64) -> [f64; 2] {
     let points: Vec<(f64, f64)> = points.collect();
+    // Scale the times to -1..1.
     let scale = points
         .iter()
         .fold(f64::MIN_POSITIVE, |m, (t, _)| m.max(t.abs()));
@@ -144,6 +147,7 @@ fn timing_jitter(all: &[CubicResidual]) -> Option<f64> {
     }
     let mut told: Vec<Vec<Option<f64>>> = Vec::new();
     for one in all {
+        // Compare errors at slow and fast motion.
         let fastest = one.rates.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
         let pairs = one.errors.iter().zip(&one.rates);
         // Median error at samples whose relative rate is wanted.
@@ -193,6 +197,7 @@ fn backlash_width(time: &[f64], q: &[f64]) -> Option<f64> {
     let jumps: Vec<f64> = (JUMP_NEIGHBOURS..q.len() - JUMP_NEIGHBOURS)
         .map(jump)
         .collect();
+    // Robust standard deviation of the jump estimates.
     let noise = 1.4826 * median(jumps.iter().map(|x| x.abs()).collect());
     let mut found: Vec<f64> = Vec::new();
     for (i, own) in jumps.iter().enumerate() {
@@ -203,6 +208,7 @@ fn backlash_width(time: &[f64], q: &[f64]) -> Option<f64> {
             found.push(*own);
         }
     }
+    // Size of a typical jump, compared with encoder steps and travel.
     let middle = median(found.iter().map(|x| x.abs()).collect());
     let low = q.iter().copied().fold(f64::INFINITY, f64::min);
     let travel = q.iter().copied().fold(f64::NEG_INFINITY, f64::max) - low;
@@ -210,6 +216,7 @@ fn backlash_width(time: &[f64], q: &[f64]) -> Option<f64> {
         return None;
     }
     let is_alike = |x: &&f64| (x.abs() - middle).abs() < SPREAD * middle;
+    // Neighbouring jumps in opposite directions.
     let alternate = found
         .windows(2)
         .filter(|pair| pair[0] * pair[1] < 0.0)

@@ -44,6 +44,7 @@ pub fn robust_fit(
         for channel in 0..channels {
             let rows = || (channel..rest.len()).step_by(channels);
             let counted = || rows().filter(|i| counts[*i]);
+            // The scale is limited by rounding relative to the largest force.
             let largest = counted().fold(0.0_f64, |most, i| most.max(measured[i].abs()));
             // A channel of zeros contains no information.
             if largest == 0.0 {
@@ -57,6 +58,7 @@ pub fn robust_fit(
             };
             let scale = scale.max(ROUNDING * largest);
             for i in counted() {
+                // Huber's weight: 1 within the bound, bound / |residual| beyond.
                 let within = (BOUND * scale / rest[i].abs().max(scale * 1e-9)).min(1.0);
                 weights[i] = within / (scale * scale);
             }

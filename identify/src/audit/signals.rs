@@ -348,7 +348,7 @@ mod tests {
             let force = |t: f64| (20.0 * (7.0 * t).cos() / step).round() * step;
             assert_eq!(says(|t| (3.0 * t).sin(), force), none, "{step}");
         }
-        // At rest a force may stay where it is.
+        // At standstill a force may be constant.
         assert_eq!(
             says(
                 |t| if t < 1.0 { 0.3 } else { t },

@@ -311,7 +311,7 @@ mod tests {
         }
     }
 
-    /// A load that is known says the scales of both channels, though the load itself is seen with them alone.
+    /// A known load determines the scales of both channels.
     #[test]
     fn a_known_load_tells_scales() {
         let mut noise = TestNoise::new(5);

@@ -481,7 +481,7 @@ mod tests {
             assert!((single.values[0] - 0.6).abs() < 5.0 * single.covariance[(0, 0)].sqrt());
             assert!(pair.determined[1] && single.determined[0]);
             assert!(single.validation_gain > 0.5 * single.gain && single.rivals.is_empty());
-            // Each by itself gains as much as it does beside the other: their columns have little in common.
+            // Each alone gains as much as in addition to the other: their columns have little in common.
             let alone_gain = single_change_gains(&runs(seed, &[(5, 1.0), (6, 0.6)]), &possible());
             assert!(alone_gain[0] < 0.1 * alone_gain[2] && alone_gain[2] < 1.5 * single.gain);
             let one = fit_single_change(&runs(seed, &[(6, 0.6)]), &possible(), 2);

@@ -129,7 +129,7 @@ mod tests {
         }
     }
 
-    /// Neither chance, nor deviations that are too small, nor a single value make a change.
+    /// Neither chance, nor standard deviations that are too small, nor a single value make a change.
     #[test]
     fn nothing_is_found_where_nothing_stays_changed() {
         let found = (0..200).filter(|seed| !change_points(&series(*seed, &[], 1.0), 30).is_empty());

@@ -90,7 +90,7 @@ impl AttachedBody {
 mod tests {
     use super::*;
 
-    /// Ten columns that tell the ten parameters apart.
+    /// Ten columns that distinguish the ten parameters.
     fn told() -> [ForceColumn; 10] {
         std::array::from_fn(|k| {
             let mut values = vec![0.0; 10];
@@ -143,7 +143,7 @@ mod tests {
         }
     }
 
-    /// Columns are what forces change by: differences of the whole force agree with them.
+    /// Columns are derivatives of the forces: differences of the complete force agree with them.
     #[test]
     fn columns_are_derivatives() {
         let body = AttachedBody {

@@ -124,7 +124,7 @@ fn remove_outliers(problem: &mut DiagnosisProblem) -> Vec<Disturbance> {
             let new: Vec<usize> = (0..rest.len())
                 .filter(|i| apart[*i].abs() > bound && !reverses[*i])
                 .collect();
-            // Frequent deviations belong to the force, for example stick-slip.
+            // Frequent large distances belong to the force, for example stick-slip.
             let is_rare = (new.len() as f64) < RARE * rest.len() as f64;
             let Some(values) = problem.measured.0[d].as_mut().filter(|_| is_rare) else {
                 continue;

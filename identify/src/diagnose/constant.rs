@@ -38,7 +38,7 @@ impl ConstantCorrection {
 mod tests {
     use super::*;
 
-    /// The square of a number, of which the base column and a held force have one part each.
+    /// The square of a number, of which the base column and the force of a fixed parameter each have a part.
     #[test]
     fn the_column_times_the_error_is_the_change() {
         let one = |value: f64| ForceColumn(vec![Some(vec![value])]);

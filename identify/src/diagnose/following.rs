@@ -119,9 +119,9 @@ impl EffectSelector<'_> {
             factors.as_slice()[start..start + picks[i].columns.len()].to_vec()
         });
         let columns: Vec<ForceColumn> = match &self.problem.candidates[candidate].source {
-            // Tilt: derivatives with respect to gravity, combined along the directions in which it turns.
+            // Tilt: derivatives with respect to gravity, combined along the directions in which it rotates.
             ColumnSource::Tilt(tilt) => {
-                // Forces per component of gravity, then along the directions in which gravity turns.
+                // Forces per component of gravity, then along the directions in which gravity rotates.
                 let angles = found.unwrap_or_else(|| vec![0.0; tilt.axes.len()]);
                 // Change of the forces with each component of gravity.
                 let along = tilt.components.each_ref().map(|component| {

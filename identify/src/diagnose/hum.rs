@@ -481,7 +481,7 @@ mod tests {
     use crate::diagnose::problem::{SampleLayout, SampleSegment};
     use crate::test_noise::TestNoise;
 
-    /// Two stretches of 300 samples at 44 Hz, with what is left of a force.
+    /// Two segments of 300 samples at 44 Hz, with the residual of a force.
     fn problem(rest: &[f64]) -> DiagnosisProblem {
         let stretch = |name: &str, is_check: bool| SampleSegment {
             name: name.into(),
@@ -531,7 +531,7 @@ mod tests {
         }
     }
 
-    /// What comes again with the state may be a hum too, if that explains more than any state can.
+    /// A repeatable residual may be a hum too, if the hum explains more than any function of the state.
     #[test]
     fn a_hum_that_nearly_comes_again_is_told_and_a_law_is_not() {
         let mut noise = TestNoise::new(3);
@@ -591,7 +591,7 @@ mod tests {
         }
     }
 
-    /// A third of a stretch was not measured, and a column of the base has nearly the frequency of the hum.
+    /// A third of a segment was not measured, and a column of the base has nearly the frequency of the hum.
     #[test]
     fn a_hum_is_told_by_its_size_beside_the_model_and_lost_samples() {
         let mut noise = TestNoise::new(4);

@@ -6,8 +6,8 @@
 //!    for.
 //! 2. `pool`, `factored`, `beside`, `bench` - inner products of all columns, so that a set of effects is fitted in
 //!    microseconds; `tuning` finds constants, `following` computes columns that depend on the fit, `readings` those of
-//!    faulty force signals, `tilt` turns gravity, `body` places an additional mass, `constant` corrects a number of the
-//!    model.
+//!    faulty force signals, `tilt` rotates gravity, `body` places an additional mass, `constant` corrects a number of
+//!    the model.
 //! 3. `search` - forward search over sets, with exchanges; `evidence` decides on time that was not fitted; `settle`
 //!    makes the last set as small and simple as possible.
 //! 4. `aliases` - effects that this recording cannot distinguish; `reproducible` - the repeatable residual that no

@@ -463,7 +463,7 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
 
 #[allow(
     clippy::inline_always,
-    reason = "what is inlined has the vectors of its caller"
+    reason = "inlined code uses the vector instructions of its caller"
 )]
 /// Inner product with [`LANES`] partial sums; see [`dot`].
 #[inline(always)]
@@ -596,7 +596,7 @@ mod tests {
         let weighed = dot(&residual[0], &residual[0]) + 4.0 * dot(&residual[1], &residual[1]);
         assert!((weighed - rest).abs() < 1e-9 * rest);
     }
-    /// What stands in the place of a force that was not measured moves nothing.
+    /// Values in place of a force that was not measured have no influence.
     #[test]
     fn forces_that_lack_have_no_say() {
         let wave = |k: f64| -> Vec<f64> { (0..50).map(|i| (k * f64::from(i)).sin()).collect() };

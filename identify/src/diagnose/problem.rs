@@ -290,7 +290,7 @@ impl DiagnosisProblem {
 mod tests {
     use super::*;
 
-    /// Of a single block no spread over blocks can be had.
+    /// A single block has no spread, so short segments have several.
     #[test]
     fn a_short_stretch_has_several_blocks() {
         let stretch = |samples| SampleSegment {

@@ -270,8 +270,7 @@ mod tests {
     use super::*;
     use crate::diagnose::problem::{NoColumnProvider, SampleLayout, SampleSegment};
 
-    /// Where one in nine samples is kept nothing jumps any more, so that a force is smooth where its drive turns round,
-    /// too.
+    /// With every ninth sample kept, friction jumps are smoothed, so a force is smooth where its drive reverses too.
     #[test]
     fn a_late_force_of_few_samples_is_smooth_where_the_drive_turns_round() {
         let (step, delay) = (0.036, 0.0041);
@@ -314,7 +313,7 @@ mod tests {
         }
     }
 
-    /// Between samples a force is straight, but for a jump at the instant at which the drive turns round.
+    /// Between samples a force is linear, except for a jump at the instant of the reversal.
     #[test]
     fn a_late_force_jumps_where_the_drive_turns_round() {
         let rate = |t: f64| t - 20.3;
@@ -328,7 +327,7 @@ mod tests {
         }
     }
 
-    /// Six samples of a wave are enough to say what it is between them.
+    /// Six samples per wave are enough to interpolate it.
     #[test]
     fn a_smooth_force_is_followed_between_its_samples() {
         let values: Vec<f64> = (0..40).map(|i| f64::from(i).sin()).collect();

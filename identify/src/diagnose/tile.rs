@@ -40,7 +40,7 @@ impl WithSimd for ProductTile<'_> {
 
     #[allow(
         clippy::inline_always,
-        reason = "what is inlined has the vectors of its caller"
+        reason = "inlined code uses the vector instructions of its caller"
     )]
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Self::Output {

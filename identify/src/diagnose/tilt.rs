@@ -75,7 +75,8 @@ mod tests {
 
     use super::*;
 
-    /// Directions times angles are the whole change, by nalgebra's rotations; small angles agree with none.
+    /// Directions times angles are the complete change, compared with nalgebra's rotations; small angles agree with
+    /// zero.
     #[test]
     fn directions_add_up_to_gravity_that_turned() {
         let gravity = [1.0, -9.0, 3.0];

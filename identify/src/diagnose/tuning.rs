@@ -244,8 +244,8 @@ mod tests {
 
     use super::*;
 
-    /// Curves with one top, of which some are flat, bent or at an end: the place is found, and more seldom asked for
-    /// than by golden sections alone.
+    /// Curves with one maximum, some of them flat, with a kink or with the maximum at an end: it is found with fewer
+    /// evaluations than by golden section search.
     #[test]
     fn largest_values_are_found() {
         type Curve = fn(f64) -> f64;

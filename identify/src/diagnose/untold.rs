@@ -137,8 +137,8 @@ fn least_share(basis: &[DVector<f64>], columns: &[DVector<f64>]) -> Option<f64> 
 mod tests {
     use super::*;
 
-    /// Beside sine and cosine a sum of both says nothing, the same with a little of another wave says that little, and
-    /// another wave says all.
+    /// In addition to sine and cosine, a sum of both contains nothing new; with a small part of another wave it
+    /// contains that part; another wave is new completely.
     #[test]
     fn what_is_left_of_columns_is_their_own() {
         let wave = |k: f64, phase: f64| {

@@ -269,7 +269,7 @@ mod tests {
     use crate::LeastSquares;
     use crate::test_noise::TestNoise;
 
-    /// As many rows as parameters leave residuals of rounding, from which nothing can be said.
+    /// With as many rows as parameters, residuals are rounding and contain no information.
     #[test]
     fn without_a_row_to_spare_there_is_no_deviation() {
         let (w, y) = ([1.0, 0.0, 1.0, 1.0], [1.0, 3.0]);
@@ -281,8 +281,9 @@ mod tests {
         assert!(found.unwrap().std.iter().all(|std| std.is_nan()));
     }
 
-    /// The classical deviation is exact for independent residuals, however few: `(y - W p) / std` then follows Student's
-    /// distribution, whose 2-sigma coverage for two degrees of freedom is 81.6 %, for eight 91.9 % (any table of t).
+    /// The classical deviation is exact for independent residuals, however few: `(y - W p) / std` then follows
+    /// Student's distribution, whose 2-sigma coverage for two degrees of freedom is 81.6 %, for eight 91.9 % (any table
+    /// of t).
     #[test]
     fn few_samples_cover_as_students_distribution_says() {
         for (samples, expected) in [(4, 0.816), (10, 0.919)] {
@@ -337,7 +338,7 @@ mod tests {
         }
     }
 
-    /// How often `|estimate - truth| <= 2 std` holds, by the honest and by the classical formula.
+    /// How often `|estimate - truth| <= 2 std` is true, by the autocorrelated and by the classical formula.
     fn coverage(correlation: f64, channels: usize) -> ([f64; 3], [f64; 3]) {
         let (trials, samples) = (400, 1500);
         let truth = [4.0, -2.0, 1.0];

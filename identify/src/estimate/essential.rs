@@ -300,8 +300,8 @@ mod tests {
         }
     }
 
-    /// Seven columns, of which two have no effect on the force and one repeats another; AR(1) noise. How often is the right
-    /// set found? A test that takes samples for independent would keep both null columns nearly always.
+    /// Seven columns, of which two have no effect on the force and one repeats another; AR(1) noise. How often is the
+    /// right set found? A test that takes samples for independent would keep both null columns nearly always.
     #[test]
     fn what_has_no_effect_is_left_out_also_under_autocorrelated_noise() {
         let truth = [4.0, -2.0, 0.0, 1.5, 0.0, 3.0, 0.0];
@@ -355,7 +355,8 @@ mod tests {
         assert!(right >= trials * 85 / 100, "{right} of {trials}");
     }
 
-    /// What the rows hardly tell stays at what is known of it, also where another column takes part of its place.
+    /// A parameter that the rows hardly determine stays at its prior value, even if another column could replace it in
+    /// part.
     #[test]
     fn what_is_not_supported_stays_where_it_is_held() {
         let truth = [4.0, 8.0, -3.0];
@@ -383,7 +384,7 @@ mod tests {
         for j in [0, 2] {
             assert!((found.values[j] - truth[j]).abs() < 5.0 * found.std[j]);
         }
-        // What is well told moves away from where it would be held.
+        // A well determined parameter moves away from its fixed value.
         let found = select_essential(
             &triangle,
             &solution,

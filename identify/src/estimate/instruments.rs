@@ -177,8 +177,8 @@ mod tests {
 
     type Rows = (Vec<f64>, Vec<f64>);
 
-    /// A spring and a constant force on a coordinate whose encoder is noisy; the force follows the noisy coordinate through
-    /// a controller, so that both errors are the same. Instruments: the coordinate that was asked for.
+    /// A spring and a constant force on a coordinate whose encoder is noisy. The force follows the noisy coordinate
+    /// through a controller, so that both errors are the same. Instruments: the reference coordinate.
     fn rows(seed: u64, samples: i32) -> Rows {
         let mut noise = TestNoise::new(seed);
         let (mut rows, mut y) = (Vec::new(), Vec::new());

@@ -346,7 +346,8 @@ mod tests {
         near(halves.solve().unwrap().values[3], dense[3], 1e-11);
     }
 
-    /// Rows of three channels, of which the later ones do not see the first columns: by rows, by channels and by columns.
+    /// Rows of three channels, of which the later ones do not see the first columns: by rows, by channels and by
+    /// columns.
     #[test]
     fn channels_and_columns_reduce_to_the_same_triangle() {
         let mut noise = TestNoise::new(6);
@@ -430,7 +431,7 @@ mod tests {
         for i in 0..200 {
             let t = f64::from(i);
             let (a, b) = ((0.1 * t).sin(), (0.23 * t).cos());
-            // Columns: a, b, 2 a - or so they say - and nothing at all.
+            // Columns: a, b, 2 a, and zeros.
             regression
                 .add_rows(&[a, b, 2.0 * a, 0.0], &[7.0 * a + 5.0 * b])
                 .unwrap();

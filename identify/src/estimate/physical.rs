@@ -374,7 +374,7 @@ mod tests {
         assert!(best <= objective(&case.nominal) && best <= objective(&case.truth));
     }
 
-    /// What the recording does not say stays at its nominal value, and is known to do so.
+    /// A parameter that the recording does not determine stays at its nominal value, and is marked so.
     #[test]
     fn without_information_the_nominal_values_stay() {
         let mut case = case(7, 1e-4);
@@ -396,14 +396,14 @@ mod tests {
             assert!(found.from_recording[j] < 1e-9);
         }
         assert!(found.from_recording[..10].iter().all(|share| *share > 0.5));
-        // Fourteen combinations of ten numbers tell each of them.
+        // Fourteen combinations of ten numbers determine each of them.
         assert_eq!(
             found.individually_determined,
             [[true; 10], [false; 10]].concat()
         );
     }
 
-    /// Of `x + y` and `z` only the last has a value of its own, whatever nominal values say beside.
+    /// Of `x + y` and `z` only the last is determined individually, whatever the nominal values are.
     #[test]
     fn what_is_told_in_sums_only_is_not_told_alone() {
         let rows = DMatrix::from_row_slice(
@@ -416,7 +416,7 @@ mod tests {
             individually_determined(&DMatrix::zeros(2, 2)),
             [false, false]
         );
-        // Fourteen combinations of twenty numbers tell none of them.
+        // Fourteen combinations of twenty numbers determine none of them.
         assert_eq!(find(&case(3, 0.05)).individually_determined, [false; 20]);
     }
 

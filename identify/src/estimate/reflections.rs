@@ -36,7 +36,7 @@ struct HouseholderFold<'a> {
 impl WithSimd for HouseholderFold<'_> {
     type Output = ();
 
-    #[allow(clippy::inline_always, reason = "the trait's manual asks for it")]
+    #[allow(clippy::inline_always, reason = "the trait's manual requires it")]
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
         let HouseholderBlock {

@@ -338,7 +338,7 @@ mod tests {
         );
     }
 
-    /// How often the truth is within two deviations, of 200.
+    /// How often the true value is within two standard deviations, of 200.
     fn coverage(options: &EstimateOptions, memory: f64, spoilt: f64) -> f64 {
         let mut noise = TestNoise::new(77);
         let mut inside = 0;

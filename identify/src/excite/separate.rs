@@ -213,7 +213,7 @@ mod tests {
         DMatrix::from_fn(rows, columns, |_, _| noise.normal())
     }
 
-    /// What is left of forces by a solution of the normal equations, which shares nothing with the projections.
+    /// Residual of forces by a solution of the normal equations, which shares no code with the projections.
     fn left(of: &DMatrix<f64>, columns: &[&DMatrix<f64>]) -> f64 {
         let all: Vec<_> = columns.iter().flat_map(|m| m.column_iter()).collect();
         let w = DMatrix::from_columns(&all);

@@ -48,7 +48,7 @@ pub enum ParameterStatus {
 impl ParameterStatus {
     #[allow(
         clippy::trivially_copy_pass_by_ref,
-        reason = "serde asks with a reference"
+        reason = "serde passes a reference"
     )]
     /// Whether it is the default, which is omitted in JSON.
     fn is_identified(&self) -> bool {
@@ -160,7 +160,7 @@ pub fn fit_parameters(
     assert_eq!(
         infos.len(),
         deviations.std.len(),
-        "one deviation per column"
+        "one standard deviation per column"
     );
     let finite = |value: f64| value.is_finite().then_some(value);
     infos

@@ -272,7 +272,7 @@ impl ErrorAccumulator {
     }
 }
 
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "as serde asks")]
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde requires it")]
 fn is_zero(count: &usize) -> bool {
     *count == 0
 }

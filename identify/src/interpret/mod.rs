@@ -311,7 +311,7 @@ fn find_undetermined(
     }
     // The null space from the smallest singular values.
     let svd = matrix.svd(false, true);
-    let v_t = svd.v_t.expect("right singular vectors are asked for");
+    let v_t = svd.v_t.expect("right singular vectors were requested");
     let mut order: Vec<usize> = (0..n).collect();
     order.sort_by(|a, b| svd.singular_values[*a].total_cmp(&svd.singular_values[*b]));
     let n_null = order

@@ -316,7 +316,7 @@ mod tests {
         let found = sorted(solve(&double, 2).unwrap());
         let root = 2.0_f64.sqrt();
         assert_eq!(found, [[2.0, -root], [2.0, root]]);
-        // x^2 + 1 = 0 has no real solution; x = 1 and x = 2 contradict each other; x y = 1 leaves a curve.
+        // x^2 + 1 = 0 has no real solution; x = 1 and x = 2 contradict each other; x y = 1 is a curve.
         let complex = system(1, &[&[(1.0, &[(0, 2)]), (1.0, &[])]]);
         assert_eq!(sorted(solve(&complex, 1).unwrap()), Vec::<Vec<f64>>::new());
         let contradiction = system(

@@ -44,7 +44,7 @@ impl<'a> LawSamples<'a> {
     ) -> Self {
         let layout = &bench.problem.layout;
         let n = layout.samples();
-        // Equally spaced samples of all recordings, whatever their segment.
+        // Equally spaced samples over all recordings.
         let picked: Vec<usize> = (0..n).step_by(n.div_ceil(most).max(1)).collect();
         let some = |values: &[f64]| -> Vec<f64> { picked.iter().map(|i| values[*i]).collect() };
         let track = |(site, load): (&LawSite, &Option<Vec<f64>>)| {
@@ -250,7 +250,7 @@ impl LawProjection {
             .collect();
         for column in columns {
             let mut left = column.clone();
-            // Twice, since rounding leaves a part of each direction after the first time.
+            // Twice, since the first pass has rounding errors.
             for _ in 0..2 {
                 for direction in &basis {
                     let share = direction.dot(&left);
@@ -371,7 +371,7 @@ impl SiteProjection {
                 }
             }
         }
-        // The rest of the last batch.
+        // Score the last batch.
         batch.score_batch(self, 1, &mut scored);
         scored
     }
