@@ -79,7 +79,7 @@ impl SignalRecording {
         Some(RecordingNote::warning(format!(
             "`t` in {} runs {runs}: positions change by {} times the integral of the recorded {}. So the run takes {} s \
              and not {} s, {should} by {} %. Rates from positions have the same relative error, accelerations twice that. \
-             Provide the true times as `t`; steps of {} s may be counted samples.",
+             Provide the true times as `t`; the steps of {} s may come from a sample counter.",
             self.file(),
             with_digits(middle, 4),
             backquoted_list(&names),

@@ -180,8 +180,8 @@ impl SignalRecording {
         });
         Some(RecordingNote::warning(message!(
             "The force of `{name}` in {} stays at {} except for noise for {}, first in {} {}{}: the drive or its \
-             measurement seems to be saturated. The true force is unknown there. Record a motion with smaller forces, or leave these \
-             times out ({}).",
+             measurement seems to be saturated. The true force is unknown there. Record a motion with smaller \
+             forces, or leave these times out ({}).",
             self.file(),
             with_digits(level, 5),
             count_of(count, "sample", "samples"),
@@ -244,8 +244,8 @@ impl SignalRecording {
             .unwrap_or_default();
         Some(RecordingNote::warning(message!(
             "The force of `{name}` in {} stays exactly at {} for {} while the mechanism moves, first in {} {}{other}: \
-             the drive or its measurement seems to be saturated. The true force is unknown there. Record a motion with smaller forces, \
-             or leave these times out ({}).",
+             the drive or its measurement seems to be saturated. The true force is unknown there. Record a motion with smaller \
+             forces, or leave these times out ({}).",
             self.file(),
             format_recorded(limit),
             count_of(count, "sample", "samples"),

@@ -70,7 +70,7 @@ impl fmt::Display for LeastSquaresError {
             Self::NotFinite { row, column: Some(column) } => write!(
                 f,
                 "column {column} of the regressor is not finite in row {row}; \
-                 is the mechanism out of reach or singular there?"
+                 check whether the mechanism is out of reach or singular there"
             ),
             Self::NotFinite { row, column: None } => write!(f, "the measured value of row {row} is not finite"),
             Self::NoRows => f.write_str("there are no samples to identify from"),

@@ -110,7 +110,7 @@ impl fmt::Display for FiguresError {
             Self::NotFinite { channel, sample } => write!(
                 f,
                 "the measured or the model force of `{channel}` is not finite in sample {sample}; \
-                 is the mechanism out of reach or singular there?"
+                 check whether the mechanism is out of reach or singular there"
             ),
             Self::NoSamples => f.write_str("there are no samples to compare"),
         }
