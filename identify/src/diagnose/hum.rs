@@ -146,7 +146,7 @@ pub(crate) fn slow_lines(
         else {
             continue;
         };
-        // A line in a channel with unexplained repeatable residual must explain more than half of the non-repeatable
+        // In a channel with unexplained repeatable residual, a line must leave less than half of the non-repeatable
         // part.
         let explains_more = dot(&wave.residual, &wave.residual) < MAX_REMAINING_SHARE * by_no_state;
         if explains_more || !unexplained.contains(&channel) {
