@@ -98,17 +98,17 @@ impl SelectionEvidence {
     /// method.
     pub fn insufficiency_reason(&self, has_check: bool) -> Option<&'static str> {
         if self.above_noise <= BELOW_NOISE {
-            Some("only noise is left to explain")
+            Some("what is left is rounding")
         } else if self.gain <= 0.0 || !self.is_steady() {
             Some(if has_check {
-                "not confirmed on the validation run"
+                "not supported by the check"
             } else {
-                "not confirmed by cross-validation"
+                "not supported by cross-validation"
             })
         } else if self.gain < self.least_gain {
             Some("too small to matter")
         } else if self.bic <= 0.0 {
-            Some("the gain is too small for its number of parameters")
+            Some("not worth its parameters")
         } else {
             None
         }

@@ -87,11 +87,12 @@ const FRICTION: [&str; 2] = ["viscous_friction", "coulomb_friction"];
 /// A proposed law that explains at least this share of the residual may replace effects that it makes unnecessary.
 const MIN_LAW_SHARE: f64 = 0.5;
 
-/// Reason for rejecting an effect whose estimate has a sign that is physically impossible.
-const WRONG_SIGN: &str = "its value would have the wrong sign";
+/// Reason for rejecting an effect whose estimate has a sign that is physically impossible. Reasons are values of the
+/// JSON, which stay; printers spell them out.
+const WRONG_SIGN: &str = "sign";
 
 /// Reason for rejecting an effect that is less useful than another one.
-const EXPLAINED_BETTER: &str = "another candidate explains more";
+const EXPLAINED_BETTER: &str = "another explains more";
 
 /// Reason for rejecting an effect that only cancels another one.
 const CANCELS: &str = "it would only cancel another effect at its place";
@@ -653,13 +654,13 @@ impl EffectSelector<'_> {
                 } else if trial.cancelling.contains(&picks.len()) {
                     CANCELS
                 } else if gain < LEAST_GAIN {
-                    "explains almost none of the error"
+                    "explains nothing that is left"
                 } else {
                     EXPLAINED_BETTER
                 };
                 (gain, Some(why.to_owned()))
             } else {
-                (0.0, Some("the model already has it".to_owned()))
+                (0.0, Some("the model says it already".to_owned()))
             };
             considered.push(CandidateOutcome {
                 effect: candidate.effect.clone(),

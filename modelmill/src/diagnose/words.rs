@@ -93,13 +93,21 @@ pub fn floor_label(noise_floor: f64) -> &'static str {
     }
 }
 
-/// Why a candidate was rejected, as a sentence for people; `reason` is the text of the search, and `has_effects` says whether
+/// Why a candidate was rejected, as a sentence for people; `reason` is the word of the search, and `has_effects` says whether
 /// the diagnosis found any effect. A reason without a sentence of its own is returned unchanged.
 pub fn refusal(reason: &str, has_effects: bool) -> &str {
     match reason {
-        "explains almost none of the error" if has_effects => {
+        "sign" => "its value would have the wrong sign",
+        "explains nothing that is left" if has_effects => {
             "redundant: the effects found already explain it"
         }
+        "explains nothing that is left" => "explains almost none of the error",
+        "another explains more" => "another candidate explains more",
+        "what is left is rounding" => "only noise is left to explain",
+        "not supported by the check" => "not confirmed on the validation run",
+        "not supported by cross-validation" => "not confirmed by cross-validation",
+        "not worth its parameters" => "the gain is too small for its number of parameters",
+        "the model says it already" => "the model already has it",
         "no finite value somewhere along the recordings" => {
             "its formula has no finite value at some samples"
         }
