@@ -169,7 +169,7 @@ fn faults_of_sensors_are_named_and_treated() {
         row[3] = row[3].clamp(-450.0, 450.0) + 1e-6 * random();
     }
     let (_, says) = identified(&write("clipped.csv", &clipped), &[]);
-    assert!(says.contains("stays at 450 but for noise"), "{says}");
+    assert!(says.contains("stays at 450 except for noise"), "{says}");
 }
 
 /// Measured and predicted force through one low-pass on data that the fit has not seen, %: at most 1.15 times what an expert's
