@@ -92,7 +92,7 @@ impl LoopProjection {
                 row
             })
             .collect();
-        let solution = linear::solve(graph, &loop_p, &rhs, "the loops for the passive rates")?;
+        let solution = linear::solve(graph, &loop_p, &rhs, "the passive rates")?;
         let transmission: Vec<Vec<ExprId>> = solution
             .values
             .iter()
@@ -214,12 +214,7 @@ impl LoopProjection {
             .map(|a| (0..n_drives).map(|d| self.drive_jacobian[d][*a]).collect())
             .collect();
         let rhs: Vec<Vec<ExprId>> = self.freedoms.iter().map(|a| vec![projected[*a]]).collect();
-        let solution = linear::solve(
-            graph,
-            &transposed,
-            &rhs,
-            "the drives' Jacobian for the drives' forces",
-        )?;
+        let solution = linear::solve(graph, &transposed, &rhs, "the drives' forces")?;
         Ok(solution.values.into_iter().map(|row| row[0]).collect())
     }
 
@@ -264,7 +259,7 @@ impl LoopProjection {
                 graph.sum(&terms)
             })
             .collect();
-        let what = "the loops for their forces";
+        let what = "the forces of the loops";
         let transposed: Vec<Vec<ExprId>> = (0..n)
             .map(|p| jacobian.iter().map(|row| row[p]).collect())
             .collect();
@@ -349,7 +344,12 @@ impl LoopProjection {
             .iter()
             .map(|row| self.freedoms.iter().map(|a| row[*a]).collect())
             .collect();
-        let solution = linear::solve(graph, &square, &identity, "the drives' Jacobian")?;
+        let solution = linear::solve(
+            graph,
+            &square,
+            &identity,
+            "the inverse of the drives' Jacobian",
+        )?;
         self.determinants.extend(solution.determinants);
         Ok(())
     }

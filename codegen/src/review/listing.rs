@@ -1,4 +1,6 @@
-//! A straight-line program as numbered equations: what is used once is put in place, what is shared gets a name.
+//! A straight-line program as numbered equations. Intermediate values used more than once get names; the others are
+//! inline.
+//! A `StraightLineProgram` and names for known quantities go in, `ProgramListing` comes out.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -10,19 +12,21 @@ use crate::expr::Rational;
 use crate::expr::print::{FormulaFunction, FormulaSymbol, PrintedFormula, atom};
 use crate::lower::{ProgramOp, ProgramStage, StraightLineProgram};
 
-/// Equations of a program.
+/// Equations of a program by stage, in the order of computation.
 pub(super) struct ProgramListing {
-    /// What is computed once per geometry.
+    /// Equations that are evaluated once per geometry.
     pub(super) fixed: Vec<PageEquation>,
-    /// What is computed at every state, outputs at the end.
+    /// Equations that are evaluated at every state, outputs at the end.
     pub(super) state: Vec<PageEquation>,
 }
 
-/// Formulas with more leaves get lines of their own.
+/// Formulas with more leaves than this get a line of their own, even if they are used once.
 const MOST_LEAVES: usize = 16;
 
-/// Lists a program. `names` are those of values that mean something, `reserved` those that are taken,
-/// `outputs` those of the outputs, `prefix` begins every tag.
+/// Lists a program.
+///
+/// `names` are the symbols of known quantities by value index, `reserved` are names that may not be used, `outputs` are
+/// the symbols of the outputs in order, and `prefix` begins every tag.
 pub(super) fn list_program(
     program: &StraightLineProgram,
     mechanism: &Mechanism,
@@ -43,16 +47,21 @@ pub(super) fn list_program(
             state: Vec::new(),
         },
     };
+    // Names of quantities and outputs are taken before any name is generated.
     lister.taken.extend(names.values().map(|m| m.symbol.text()));
     lister.taken.extend(outputs.iter().map(FormulaSymbol::text));
     let is_output = |i: usize| program.outputs.iter().any(|o| o.index() == i);
+    // Values in order: each becomes a formula, and an equation if it gets a name.
     for (i, op) in program.ops.iter().enumerate() {
+        // Unused values keep a place, so that indices stay aligned.
         if uses[i].count == 0 {
             lister.formulas.push(PrintedFormula::integer(0));
             continue;
         }
         let formula = lister.formula(op);
         let simple = count_leaves(&formula) < 2;
+        // Whether the value gets a name, and which: known quantity, sine or cosine, shared, long, or used by a later
+        // stage.
         let wanted = match op {
             ProgramOp::Number(_) | ProgramOp::Input(_) | ProgramOp::Neg(_) => None,
             _ if names.contains_key(&i) => Some(names[&i].symbol.clone()),
@@ -74,6 +83,7 @@ pub(super) fn list_program(
             _ => None,
         };
         match wanted {
+            // The named quantity may be the negative of this value; then the equation and its uses change sign.
             Some(symbol) => {
                 let negative = names.get(&i).is_some_and(|m| m.negative);
                 let turned = |f: PrintedFormula| if negative { f.negate() } else { f };
@@ -83,12 +93,14 @@ pub(super) fn list_program(
             None => lister.formulas.push(formula),
         }
     }
+    // Outputs that are not yet the left side of an equation get one.
     for (symbol, value) in outputs.iter().zip(&program.outputs) {
         let formula = lister.formulas[value.index()].clone();
         if formula != PrintedFormula::Symbol(symbol.clone()) {
             lister.add_equation(ProgramStage::State, symbol.clone(), formula);
         }
     }
+    // Numbers run through both stages.
     let ProgramListing { fixed, state } = &mut lister.listing;
     for (i, equation) in fixed.iter_mut().chain(state).enumerate() {
         equation.tag = format!("{prefix}{}", i + 1);
@@ -96,14 +108,16 @@ pub(super) fn list_program(
     lister.listing
 }
 
+/// How a value is used.
 #[derive(Clone, Copy, Default)]
 struct ValueUses {
+    /// Number of uses by needed operations and by outputs.
     count: usize,
-    /// Whether something that is computed at every state uses it.
+    /// Whether an operation that is evaluated at every state uses it.
     by_state: bool,
 }
 
-/// How often each value is used by what is needed.
+/// Uses per value, counted backwards from the outputs; unneeded operations count for nothing.
 fn count_uses(program: &StraightLineProgram) -> Vec<ValueUses> {
     let mut uses = vec![ValueUses::default(); program.ops.len()];
     for output in &program.outputs {
@@ -123,19 +137,24 @@ fn count_uses(program: &StraightLineProgram) -> Vec<ValueUses> {
     uses
 }
 
+/// State of the listing while values are visited in order.
 struct ListingBuilder<'a> {
+    /// For the names of inputs.
     mechanism: &'a Mechanism,
+    /// Names that may not be generated again.
     taken: BTreeSet<String>,
-    /// Per operation what stands for its value.
+    /// Per value the formula or the symbol by which later equations refer to it.
     formulas: Vec<PrintedFormula>,
-    /// Names of angles whose sine or cosine was taken.
+    /// Names of angles whose sine or cosine has been named, by value index.
     angles: BTreeMap<usize, String>,
-    /// Numbers given to nameless values of either stage.
+    /// Counters of generated names: `k1`, `k2`, ... and `x1`, `x2`, ...
     next: [usize; 2],
+    /// The equations so far; tags are set at the end.
     listing: ProgramListing,
 }
 
 impl ListingBuilder<'_> {
+    /// Appends `left = right` to the equations of the stage.
     fn add_equation(&mut self, stage: ProgramStage, left: FormulaSymbol, right: PrintedFormula) {
         let equation = PageEquation {
             left: PrintedFormula::Symbol(left),
@@ -164,7 +183,7 @@ impl ListingBuilder<'_> {
         }
     }
 
-    /// `s_theta1`, `c_theta1`, ...
+    /// A symbol for a sine or cosine: `s_theta1`, `c_theta1`, ... An angle that is no sum of names is numbered.
     fn trigonometric_symbol(&mut self, op: &ProgramOp, angle: usize) -> FormulaSymbol {
         let letter = if matches!(op, ProgramOp::Sin(_)) {
             "s"
@@ -183,6 +202,7 @@ impl ListingBuilder<'_> {
         FormulaSymbol::new(name)
     }
 
+    /// The formula of an operation, with the formulas of its operands in place.
     fn formula(&self, op: &ProgramOp) -> PrintedFormula {
         let at = |v: &crate::ValueId| self.formulas[v.index()].clone();
         match op {
@@ -206,7 +226,7 @@ impl ListingBuilder<'_> {
     }
 }
 
-/// How many names and numbers a formula has.
+/// Number of names, numbers and function calls in a formula: a measure of its length.
 fn count_leaves(formula: &PrintedFormula) -> usize {
     match formula {
         PrintedFormula::Number(_) | PrintedFormula::Symbol(_) | PrintedFormula::Indexed(..) => 1,
@@ -224,7 +244,7 @@ fn count_leaves(formula: &PrintedFormula) -> usize {
     }
 }
 
-/// The names of an angle's summands in a row; `None` if it is no sum of names.
+/// The names of an angle's summands, joined by `_`; `None` if the angle is no sum of names with integer factors.
 fn angle_name(formula: &PrintedFormula) -> Option<String> {
     match formula {
         PrintedFormula::Symbol(symbol) => Some(symbol.text()),

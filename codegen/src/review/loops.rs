@@ -1,4 +1,5 @@
-//! Loops and drives: closure equations, how they are solved, and what the drives see.
+//! The sections of loops and drives: closure equations, how they are solved, drive lengths and the Jacobian of the
+//! drives.
 
 use modelmill_spec::{DriveKind, Mechanism, PlaceLoad};
 
@@ -12,6 +13,7 @@ use crate::{Derivation, PassivePosition};
 /// Expressions with more nodes than this are shown in a program rather than in one line.
 const LONGEST: usize = 70;
 
+/// Names of coordinates as a list: `a, b and c`.
 fn coordinate_names(mechanism: &Mechanism, coordinates: &[usize]) -> TextLine {
     let mut line = TextLine::new();
     for (i, c) in coordinates.iter().enumerate() {
@@ -29,11 +31,12 @@ fn coordinate_names(mechanism: &Mechanism, coordinates: &[usize]) -> TextLine {
     line
 }
 
+/// The formula of an expression, or `None` if it is too long for a line.
 fn short_formula(graph: &Graph, mechanism: &Mechanism, id: ExprId) -> Option<PrintedFormula> {
     (tree_size(graph, id, LONGEST) < LONGEST).then(|| formula(graph, mechanism, id))
 }
 
-/// Closure equations and the way from the active to the passive coordinates.
+/// Adds couplings, closure equations, and the solution for the passive coordinates.
 pub(super) fn loops(page: &mut PageDocument, derivation: &Derivation) {
     let Derivation {
         mechanism,
@@ -42,12 +45,14 @@ pub(super) fn loops(page: &mut PageDocument, derivation: &Derivation) {
         equations,
         ..
     } = derivation;
+    // Couplings have a section of their own, which a mechanism without loops has as well.
     let projection = &equations.projection;
     list_couplings(page, derivation);
     if mechanism.loops.is_empty() {
         return;
     }
     page.heading("Loops");
+    // The tag counts all closure equations, so that a missing number shows that a long one was left out.
     let mut tag = 0;
     for (l, closure) in mechanism.loops.iter().zip(&projection.loops.closures) {
         let [a, b] = l.joins.map(|p| code(&*mechanism.points[p.0].name));
@@ -80,6 +85,7 @@ pub(super) fn loops(page: &mut PageDocument, derivation: &Derivation) {
             .collect();
         page.equations("closure equations", lines);
     }
+    // How the passive coordinates are computed: not at all, in closed form, or iteratively.
     match &programs.passive_position {
         PassivePosition::None => {}
         PassivePosition::Closed => list_closed_form(page, derivation),
@@ -87,12 +93,13 @@ pub(super) fn loops(page: &mut PageDocument, derivation: &Derivation) {
             let mut line = vec![text("The passive coordinates ")];
             line.extend(coordinate_names(mechanism, &projection.loops.passive));
             line.push(text(
-                " follow by Newton's method on the closure equations, started from the nominal pose or the pose before, \
-                 which keeps to the assembly mode of the model file.",
+                " are computed by Newton's method on the closure equations, started from the nominal pose or the previous pose. \
+                 This keeps the assembly mode of the model file.",
             ));
             page.paragraph(line);
         }
     }
+    // Determinants of the linear equations of the rates and of the drives' Jacobian.
     let determinants: Vec<PageEquation> = projection
         .determinants
         .iter()
@@ -109,15 +116,15 @@ pub(super) fn loops(page: &mut PageDocument, derivation: &Derivation) {
     let mut says = "Their rates and accelerations follow from the differentiated closure equations, which are linear in them."
         .to_owned();
     if determinants.is_empty() {
-        says.push_str(" A pose where their matrix is singular is reported as such.");
+        says.push_str(" A pose where their matrix is singular is reported.");
     } else {
-        says.push_str(" The mechanism is singular, and the model says so, where a determinant of theirs or of the drives' Jacobian vanishes:");
+        says.push_str(" The pose is singular, and is reported, where a determinant of these equations or of the drives' Jacobian is zero:");
     }
     page.paragraph([text(says)]);
     page.equations("determinants", determinants);
 }
 
-/// What follows other coordinates.
+/// The section of couplings: coordinates that are given functions of others.
 fn list_couplings(page: &mut PageDocument, derivation: &Derivation) {
     let Derivation {
         mechanism,
@@ -143,12 +150,13 @@ fn list_couplings(page: &mut PageDocument, derivation: &Derivation) {
     }
     page.heading("Couplings");
     page.paragraph([text(
-        "These coordinates follow others, and their rates and accelerations do alike. Forces on them act on what they \
-         follow, times the factor.",
+        "These coordinates are determined by others, and so are their rates and accelerations. A force on one of them acts \
+         on the coordinates that determine it, times the factor.",
     )]);
     page.equations("couplings", lines);
 }
 
+/// The solution in closed form, step by step; a step solves for one or two passive coordinates.
 fn list_closed_form(page: &mut PageDocument, derivation: &Derivation) {
     let Derivation {
         mechanism,
@@ -159,11 +167,13 @@ fn list_closed_form(page: &mut PageDocument, derivation: &Derivation) {
     let Some(plan) = closing.plan() else {
         return;
     };
+    // Relations between angles of parallelograms and the like are gathered and shown at the end.
     let mut related = Vec::new();
     let is_follower = |i: &usize| {
         let mut couplings = mechanism.couplings.iter();
         couplings.any(|coupling| coupling.coordinate.0 == *i)
     };
+    // Steps of couplings only are shown in their own section.
     for step in &plan.steps {
         if step.unknown.iter().all(is_follower) {
             continue;
@@ -184,11 +194,13 @@ fn list_closed_form(page: &mut PageDocument, derivation: &Derivation) {
             continue;
         }
         let mut line = coordinate_names(mechanism, &step.unknown);
+        // How many unknowns of the step are values and not angles states its kind.
         line.push(text(match step.solved.values.len() {
-            0 => " follow in closed form as the intersection of two circles",
-            1 => " follow in closed form as the intersection of a circle and a line",
-            _ => " follow from two linear equations",
+            0 => " are determined in closed form as the intersection of two circles",
+            1 => " are determined in closed form as the intersection of a circle and a line",
+            _ => " are determined by two linear equations",
         }));
+        // The sign of a square root chooses the assembly mode; it is that of the nominal pose.
         if let Some(root) = step.solved.root {
             let sign = if nominal_value(graph, mechanism, root.witness).is_none_or(|x| x >= 0.0) {
                 "positive"
@@ -196,7 +208,7 @@ fn list_closed_form(page: &mut PageDocument, derivation: &Derivation) {
                 "negative"
             };
             line.push(text(format!(
-                "; the nominal pose chooses the {sign} root. Where the radicand is negative the pose is out of reach"
+                "; the nominal pose selects the {sign} root. Where the radicand is negative, the pose cannot be reached"
             )));
         }
         line.push(text("."));
@@ -204,13 +216,14 @@ fn list_closed_form(page: &mut PageDocument, derivation: &Derivation) {
     }
     if !related.is_empty() {
         page.paragraph([text(
-            "Around the nominal pose these passive angles are tied to others outright, which closes their loops identically:",
+            "Around the nominal pose these relations between angles close their loops identically:",
         )]);
         page.equations("relations", related);
     }
 }
 
-/// Drives with their coordinates and Jacobian.
+/// The section of drives: where each acts; for linear drives also length and derivatives by the independent
+/// coordinates.
 pub(super) fn drives(page: &mut PageDocument, derivation: &Derivation) {
     let Derivation {
         mechanism,
@@ -224,6 +237,7 @@ pub(super) fn drives(page: &mut PageDocument, derivation: &Derivation) {
     let rows = mechanism
         .drives
         .iter()
+        // A joint drive acts on a coordinate, a linear drive between two points.
         .map(|drive| {
             let acts = match drive.kind {
                 DriveKind::Joint(i) => {
@@ -258,11 +272,13 @@ pub(super) fn drives(page: &mut PageDocument, derivation: &Derivation) {
             rows,
         },
     );
+    // Only linear drives are listed: their lengths are new quantities.
     let mut lines = Vec::new();
     for (d, drive) in mechanism.drives.iter().enumerate() {
         if matches!(drive.kind, DriveKind::Joint(_)) {
             continue;
         }
+        // Entries that are zero or too long for a line are left out.
         let mut line = |left: String, id: ExprId| {
             if id == Graph::ZERO {
                 return None;
@@ -290,8 +306,9 @@ pub(super) fn drives(page: &mut PageDocument, derivation: &Derivation) {
     }
     if any_linear {
         page.paragraph([text(
-            "Lengths of the linear drives, and their derivatives by the independent coordinates, the Jacobian J; what is not listed is zero. \
-             By virtual power J' f equals the generalised forces of the independent coordinates.",
+            "Lengths of the linear drives and their derivatives with respect to the independent coordinates, the Jacobian J. \
+             Entries not listed are zero, or too long for this list; the programs below show those. \
+             By the principle of virtual power, J' f is the generalised force of the independent coordinates.",
         )]);
         page.blocks.push(PageBlock::Equations(lines));
     }

@@ -45,14 +45,14 @@ pub enum PageFormat {
     Latex,
     /// One self-contained HTML file with MathML.
     Html,
-    /// [`Equations`] as JSON; needs the feature `json`.
+    /// [`ReducedEquations`] as JSON; needs the feature `json`.
     #[cfg(any(test, feature = "json"))]
     Json,
 }
 
-/// The page of a model.
+/// The page of a model in one notation.
 ///
-/// `numeric` is the rank of eq. (9) on the file's values, if the caller has found it.
+/// `numeric` is the rank of eq. (9) on the file's values, if the caller has computed it.
 pub fn page(derivation: &Derivation, format: PageFormat, numeric: Option<&NumericRank>) -> String {
     let document = || compose_page(derivation, numeric);
     match format {
@@ -67,14 +67,14 @@ pub fn page(derivation: &Derivation, format: PageFormat, numeric: Option<&Numeri
     }
 }
 
-/// The mechanism at its nominal pose.
+/// The mechanism at its nominal pose, as an inline SVG.
 fn mechanism_picture(mechanism: &Mechanism) -> String {
     let nominal: Vec<f64> = mechanism.coordinates.iter().map(|c| c.nominal).collect();
     let scene = MechanismScene::new(mechanism, &nominal);
     inline_svg(&[&scene], &scene.best_view(), &DrawingStyle::default())
 }
 
-/// The derivation, step by step.
+/// The page in the order of the derivation: given quantities, kinematics, effects, base parameters, programs.
 fn compose_page(derivation: &Derivation, numeric: Option<&NumericRank>) -> PageDocument {
     let mechanism = &derivation.mechanism;
     let title = mechanism.title.clone();

@@ -1,4 +1,4 @@
-//! What the model is, and the tables of its constants, parameters and coordinates.
+//! The first sections of the page: a summary, and the tables of constants, parameters and coordinates.
 
 use modelmill_spec::Mechanism;
 
@@ -6,10 +6,11 @@ use super::document::{InlineSpan, PageDocument, PageTable, cell, code, name, num
 use crate::Derivation;
 use crate::expr::print::{PrintedFormula, exact_formula};
 
-/// The first paragraph.
+/// The first paragraph: counts of bodies, coordinates, loops, drives, effects, products and base parameters.
 pub(super) fn summary(page: &mut PageDocument, derivation: &Derivation) {
     let mechanism = &derivation.mechanism;
     let reduction = &derivation.reduction;
+    // Counts with their noun in singular or plural.
     let count = |n: usize, one: &str, many: &str| match n {
         0 => format!("no {many}"),
         1 => format!("1 {one}"),
@@ -37,7 +38,7 @@ pub(super) fn summary(page: &mut PageDocument, derivation: &Derivation) {
     ]);
 }
 
-/// Constants, gravity, parameters, coordinates.
+/// The sections of constants with gravity, dynamic parameters and coordinates.
 pub(super) fn quantities(page: &mut PageDocument, mechanism: &Mechanism) {
     if !mechanism.constants.is_empty() {
         page.heading("Constants");
@@ -57,6 +58,7 @@ pub(super) fn quantities(page: &mut PageDocument, mechanism: &Mechanism) {
         .collect();
     let head = vec!["symbol", "value", "unit", "meaning"];
     page.table("constants", PageTable { head, rows });
+    // Gravity is a vector of expressions in the model's constants.
     let gravity = mechanism
         .gravity
         .each_ref()
@@ -93,6 +95,7 @@ pub(super) fn quantities(page: &mut PageDocument, mechanism: &Mechanism) {
     let head = vec!["symbol", "nominal", "unit", "meaning"];
     page.table("parameters", PageTable { head, rows });
     page.heading("Coordinates");
+    // A coordinate with a coupling is a given function of others.
     let follows = |i: usize| {
         let mut couplings = mechanism.couplings.iter();
         couplings.any(|coupling| coupling.coordinate.0 == i)
@@ -109,15 +112,16 @@ pub(super) fn quantities(page: &mut PageDocument, mechanism: &Mechanism) {
                 "length"
             };
             let role = if follows(i) {
-                "passive, follows others"
+                "passive, coupled to others"
             } else if c.passive {
-                "passive, follows from the loops"
+                "passive, determined by loop closure"
             } else {
                 "independent"
             };
             vec![
                 cell(name(&c.name)),
                 cell(text(kind)),
+                // Six decimals without trailing zeros.
                 cell(text(
                     format!("{:.6}", c.nominal)
                         .trim_end_matches('0')

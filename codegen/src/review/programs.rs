@@ -1,4 +1,4 @@
-//! The programs as equations with named intermediate values, and what they cost.
+//! The sections of operation counts and of the programs as equations with named intermediate values.
 
 use std::collections::BTreeSet;
 
@@ -14,14 +14,15 @@ use crate::lower::{OperationCount, ProgramStage, StraightLineProgram};
 use crate::reduce::base::base_parameter_name as base_name;
 use crate::{Derivation, PassivePosition};
 
-/// Operation counts, then the programs.
+/// Adds the table of operation counts, then a folded listing per program.
 pub(super) fn programs(page: &mut PageDocument, derivation: &Derivation) {
     let programs = &derivation.programs;
     page.heading("Operations");
     page.paragraph([text(
-        "Operations of the programs per state, and those that are done once for a geometry and its parameters. \
-         Changes of sign are free.",
+        "Operations of the programs per state, and operations done once per geometry and set of parameters. \
+         Sign changes are not counted.",
     )]);
+    // Two rows per program: per state, and once per geometry.
     let mut rows = Vec::new();
     for (what, program) in [
         ("passive coordinates", &programs.passive),
@@ -69,7 +70,7 @@ pub(super) fn programs(page: &mut PageDocument, derivation: &Derivation) {
     page.heading("Programs");
     let listings = listings(derivation);
     page.paragraph([text(
-        "The programs step by step. What is used once is put in place; what is shared has a name.",
+        "The programs step by step. Intermediate results used more than once have names; the others are written inline.",
     )]);
     add_legend(page, &listings);
     for (title, _, _, listing) in listings {
@@ -77,7 +78,7 @@ pub(super) fn programs(page: &mut PageDocument, derivation: &Derivation) {
     }
 }
 
-/// A title, the names of the outputs, the program, and its equations.
+/// A listing with its title, the symbols of the outputs and the program that it shows.
 pub(super) type ListedProgram<'a> = (
     String,
     Vec<FormulaSymbol>,
@@ -85,7 +86,8 @@ pub(super) type ListedProgram<'a> = (
     ProgramListing,
 );
 
-/// The programs that are shown.
+/// The programs that the page lists: passive coordinates, drives, regressor. Those that the model does not need are
+/// left out.
 pub(super) fn listings(derivation: &Derivation) -> Vec<ListedProgram<'_>> {
     let Derivation {
         mechanism,
@@ -95,11 +97,13 @@ pub(super) fn listings(derivation: &Derivation) -> Vec<ListedProgram<'_>> {
     } = derivation;
     let meanings = NamedQuantities::new(derivation);
     let taken = reserved_names(mechanism);
+    // Names of quantities apply within a program; symbols of outputs take precedence.
     let list = |program: &StraightLineProgram, outputs: &[FormulaSymbol], prefix: &str| {
         let mut names = meanings.name_values(program);
         names.retain(|_, meaning| !outputs.contains(&meaning.symbol));
+        // Outputs that are motions of coordinates or drives get their symbol where they are computed.
         for (value, symbol) in program.outputs.iter().zip(outputs) {
-            // An output with a meaning is called by it from the start.
+            // Later equations of the program then refer to the output by its symbol.
             if is_motion(derivation, symbol) && !is_trivial(program, value.index()) {
                 let meaning = QuantityName {
                     symbol: symbol.clone(),
@@ -111,6 +115,7 @@ pub(super) fn listings(derivation: &Derivation) -> Vec<ListedProgram<'_>> {
         listing::list_program(program, mechanism, &names, &taken, outputs, prefix)
     };
     let mut listings = Vec::new();
+    // Passive coordinates with rates and accelerations exist as a program only if loops close in closed form.
     let (active, passive) = derivation.coordinates();
     if !passive.is_empty() && matches!(programs.passive_position, PassivePosition::Closed) {
         let outputs: Vec<FormulaSymbol> = (0..3)
@@ -127,6 +132,7 @@ pub(super) fn listings(derivation: &Derivation) -> Vec<ListedProgram<'_>> {
             "P",
         ));
     }
+    // Lengths and their rates, then the Jacobian row by row.
     let is_linear = |d: &ModelDrive| matches!(d.kind, DriveKind::Linear { .. });
     if mechanism.drives.iter().any(is_linear) {
         let mut outputs: Vec<FormulaSymbol> = Vec::new();
@@ -145,6 +151,7 @@ pub(super) fn listings(derivation: &Derivation) -> Vec<ListedProgram<'_>> {
         }
         listings.push(("Drives and their Jacobian", outputs, &programs.drives, "D"));
     }
+    // The regressor, row by row.
     let rank = reduction.retained.len();
     let outputs: Vec<FormulaSymbol> = (0..mechanism.drives.len())
         .flat_map(|d| (0..rank).map(move |k| FormulaSymbol::new(format!("H_{}_{}", d + 1, k + 1))))
@@ -169,37 +176,41 @@ pub(super) fn listings(derivation: &Derivation) -> Vec<ListedProgram<'_>> {
         .collect()
 }
 
-/// What the letters stand for; the first column is how their names begin.
+/// Legend of symbols; the first field lists the beginnings of names that a text explains.
 const LETTERS: [(&[&str], &str); 10] = [
     (&["c", "s"], "cosine and sine of the angle in the index"),
     (
         &["omega"],
-        "angular velocity of a frame along its own axes, and with a dot its angular acceleration",
+        "angular velocity of a frame in its own axes; with a dot, its angular acceleration",
     ),
     (
         &["a"],
-        "acceleration of the origin of a frame, gravity taken off, along its own axes or those of the frame named second",
+        "acceleration of the frame's origin minus gravity, in its own axes (or, with two indices, in the axes of the second frame)",
     ),
     (
         &["U"],
-        "matrix that takes a place in a frame to its acceleration relative to the origin",
+        "matrix that maps a point of a frame to its acceleration relative to the frame's origin",
     ),
     (
         &["r"],
-        "place of a point or a frame's origin; with two names, the way from the first to the second; along the base frame's axes",
+        "position of a point or a frame's origin, in the base frame's axes; with two names, the vector from the first to the second",
     ),
     (&["e", "l"], "vector along a linear drive, and its length"),
-    (&["J"], "derivative of a drive's length by a coordinate"),
+    (
+        &["J"],
+        "derivative of a drive's length with respect to a coordinate",
+    ),
     (
         &["Delta"],
         "determinant of a small linear system, and its inverse",
     ),
-    (&["k"], "computed once for a geometry"),
+    (&["k"], "value computed once per geometry"),
     (&["x"], "any other intermediate value"),
 ];
 
-/// Explains the letters that the listings use.
+/// Adds a legend of the symbols that the listings use.
 fn add_legend(page: &mut PageDocument, listings: &[ListedProgram<'_>]) {
+    // The beginning of a name: the part before the first underscore, without digits.
     let mut used = BTreeSet::new();
     for (_, _, _, listing) in listings {
         for equation in listing.fixed.iter().chain(&listing.state) {
@@ -226,7 +237,7 @@ fn add_legend(page: &mut PageDocument, listings: &[ListedProgram<'_>]) {
     page.table("letters", PageTable { head, rows });
 }
 
-/// Whether a name is that of a coordinate's or drive's motion rather than of an entry of H_min.
+/// Whether a symbol is a coordinate, drive length or Jacobian entry, and not an entry of H_min.
 fn is_motion(derivation: &Derivation, symbol: &FormulaSymbol) -> bool {
     derivation
         .mechanism
@@ -237,6 +248,7 @@ fn is_motion(derivation: &Derivation, symbol: &FormulaSymbol) -> bool {
         || symbol.name.starts_with("J_")
 }
 
+/// Whether a value is a number, an input or a change of sign, which needs no equation.
 fn is_trivial(program: &StraightLineProgram, i: usize) -> bool {
     use crate::lower::ProgramOp;
     matches!(
@@ -245,6 +257,7 @@ fn is_trivial(program: &StraightLineProgram, i: usize) -> bool {
     )
 }
 
+/// Adds a folded block with the equations of both stages.
 fn add_folded_listing(page: &mut PageDocument, title: &str, listing: ProgramListing) {
     let ProgramListing { fixed, state } = listing;
     let mut blocks: Vec<PageBlock> = Vec::new();

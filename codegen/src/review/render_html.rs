@@ -1,4 +1,5 @@
-//! A page as one self-contained HTML file in the style of all pages: MathML for the formulas, parted so that lines can end.
+//! A page as one self-contained HTML file in the style of all pages: MathML for the formulas, in segments so that lines
+//! can break.
 //!
 //! Decision: a browser breaks no line inside a formula. So each segment up to the next sign of a sum is a formula
 //! of its own, also inside parentheses, and fractions and roots that are too wide are written on the line. No math
@@ -12,9 +13,10 @@ use modelmill_draw::page;
 use super::document::{InlineSpan, PageBlock, PageDocument, PageEquation, TextLine};
 use crate::expr::print::PrintedFormula;
 
-/// `picture` is an SVG of the mechanism.
+/// The page as HTML. `picture` is an SVG of the mechanism.
 pub(super) fn render(document: &PageDocument, picture: &str) -> String {
     let mut out = page::begin(&document.title);
+    // Links to all sections come first.
     let headings: Vec<&String> = document
         .blocks
         .iter()
@@ -33,6 +35,7 @@ pub(super) fn render(document: &PageDocument, picture: &str) -> String {
     out
 }
 
+/// The anchor of a heading: letters and digits in lower case, `-` for all others.
 fn anchor(text: &str) -> String {
     text.chars()
         .map(|c| {
@@ -45,6 +48,7 @@ fn anchor(text: &str) -> String {
         .collect()
 }
 
+/// Blocks in order; folded ones recursively.
 fn blocks(out: &mut String, blocks: &[PageBlock]) {
     for block in blocks {
         match block {
@@ -83,6 +87,7 @@ fn blocks(out: &mut String, blocks: &[PageBlock]) {
     }
 }
 
+/// One equation: left side, right side in segments, unit and tag.
 fn write_equation(out: &mut String, equation: &PageEquation) {
     _ = write!(
         out,
@@ -100,7 +105,7 @@ fn write_equation(out: &mut String, equation: &PageEquation) {
     );
 }
 
-/// A unit with its exponents raised.
+/// A unit with raised exponents; `^` ends at the first character that is no digit or minus.
 fn unit(text: &str) -> String {
     let mut out = String::new();
     let mut raised = false;
@@ -125,17 +130,19 @@ fn unit(text: &str) -> String {
     out
 }
 
+/// Content as a formula of its own.
 fn math(content: &str) -> String {
     format!("<math>{content}</math>")
 }
 
-/// Stretches of a formula are formulas of their own, so that the browser can break a long sum between them.
+/// Each segment of a formula is a formula of its own, so that the browser can break a long sum between them.
 fn mathml_segments(formula: &PrintedFormula) -> String {
     let stretches = formula.mathml_segments();
     let stretches: Vec<String> = stretches.iter().map(|one| math(one)).collect();
     stretches.join(" ")
 }
 
+/// Spans of a line; plain numbers are prose with a minus sign, not formulas.
 fn inlines(line: &TextLine) -> String {
     line.iter()
         .map(|inline| match inline {

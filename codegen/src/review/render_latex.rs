@@ -12,6 +12,7 @@ use crate::expr::print::PrintedFormula;
 /// Length of the plain text of a line of an equation, beyond which it is broken.
 const LINE: usize = 75;
 
+/// The page as a LaTeX document.
 pub(super) fn render(document: &PageDocument) -> String {
     let mut out = String::from(
         "\\documentclass[a4paper,10pt]{article}\n\
@@ -35,6 +36,7 @@ pub(super) fn render(document: &PageDocument) -> String {
     out
 }
 
+/// Blocks in order; a folded one becomes a paragraph with a title, because paper cannot fold.
 fn blocks(out: &mut String, blocks: &[PageBlock]) {
     for block in blocks {
         match block {
@@ -56,6 +58,7 @@ fn blocks(out: &mut String, blocks: &[PageBlock]) {
     }
 }
 
+/// A table that may break across pages, with its head repeated.
 fn write_table(out: &mut String, table: &PageTable) {
     // The last column of a wide table holds prose and may break.
     let n = table.head.len();
@@ -78,7 +81,7 @@ fn write_table(out: &mut String, table: &PageTable) {
     out.push_str("\\end{longtable}\n\n");
 }
 
-/// An equation in display style, long sums broken; `end` stands after its last line.
+/// An equation in display style, long sums in several lines; `end` follows its last line.
 pub(super) fn align_equation(equation: &PageEquation, end: &str) -> String {
     let unit = equation
         .unit
@@ -95,7 +98,7 @@ pub(super) fn align_equation(equation: &PageEquation, end: &str) -> String {
     )
 }
 
-/// The lines of a sum.
+/// The terms of a sum in LaTeX, grouped into lines of similar length.
 fn break_sum(formula: &PrintedFormula) -> Vec<String> {
     let mut lines: Vec<(usize, Vec<PrintedFormula>)> = Vec::new();
     for term in line_terms(formula) {
@@ -133,6 +136,7 @@ pub(super) fn unit(text: &str) -> String {
     format!("\\mathrm{{{}}}", text.replace(' ', "\\,"))
 }
 
+/// Spans of a line with LaTeX escapes.
 fn inlines(line: &TextLine) -> String {
     line.iter()
         .map(|inline| match inline {

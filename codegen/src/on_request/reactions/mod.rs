@@ -261,7 +261,7 @@ fn loop_closure_forces(
     let gaps = closing_gaps(graph, mechanism, equations, cuts);
     if gaps.len() != projection.loops.passive.len() {
         return Err(DeriveError::Singular {
-            what: "the loops for their forces".to_owned(),
+            what: "the forces of the loops".to_owned(),
         });
     }
     let solution = projection.multipliers(graph, &gaps, &left)?;
