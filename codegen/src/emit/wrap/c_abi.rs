@@ -1,3 +1,4 @@
+//! Output: manifest, `src/lib.rs` with the `extern "C"` functions, the emitted module, and the header.
 //! A crate that makes a C library of a model: a static library, a shared one, and the header for both.
 
 use proc_macro2::TokenStream;
@@ -9,7 +10,7 @@ use super::{LanguageBinding, source_file};
 use crate::emit::language::c99::RESERVED;
 use crate::emit::language::{EmissionRequest, EmittedFile};
 
-/// What a function returns, with its name in the header after the prefix, and its meaning.
+/// Status codes in the order of their values: name in the header after the prefix, and meaning.
 pub(super) const STATUS: [(&str, &str); 9] = [
     ("OK", "all is well"),
     (
@@ -34,8 +35,8 @@ pub(super) const STATUS: [(&str, &str); 9] = [
     ),
 ];
 
-/// The files of the crate, without reactions and self-test. It needs `modelmill-runtime` in the folder `modelmill-runtime`
-/// beside its manifest.
+/// The files of the crate, without reactions and self-test. The caller copies `modelmill-runtime` into the folder of
+/// that name next to the manifest.
 pub(in crate::emit) fn emit_c(from: &EmissionRequest<'_>) -> Vec<EmittedFile> {
     let face = LanguageBinding::new(from, &RESERVED);
     let doc = "The model for C: see the header in `include`. All `unsafe` code is here, and all of it reads and writes what the \
@@ -51,6 +52,7 @@ pub(in crate::emit) fn emit_c(from: &EmissionRequest<'_>) -> Vec<EmittedFile> {
     ]
 }
 
+/// `Cargo.toml` of the crate. A panic aborts, because unwinding must not reach C.
 fn manifest(face: &LanguageBinding<'_>) -> EmittedFile {
     let name = &face.name;
     let package = name.trim_start_matches('_');
@@ -90,7 +92,8 @@ codegen-units = 1
     }
 }
 
-/// 64-bit words that surely hold a prepared model: every fixed value, and what errors and passive coordinates take.
+/// Number of 64-bit words that is at least the size of a prepared model: fixed values, passive coordinates, constants,
+/// base parameters. The emitted crate checks it at compile time.
 pub(super) fn storage_words(face: &LanguageBinding<'_>) -> usize {
     let programs = &face.derivation.programs;
     let mut all = vec![
@@ -105,13 +108,15 @@ pub(super) fn storage_words(face: &LanguageBinding<'_>) -> usize {
     if let Some(d) = face.dynamics {
         all.extend([&d.mass_matrix, &d.coriolis, &d.gravity, &d.effects, &d.bias]);
     }
+    // A program stores at most its fixed values.
     let fixed: usize = all.iter().map(|p| p.ops.len().min(fixed_values(p))).sum();
-    // Inverse dynamics and equation of motion may hold the model once more each.
+    // The model itself, and once more in the inverse dynamics and in the equation of motion.
     let parts = 2 + usize::from(face.dynamics.is_some());
     let geometry = 2 * face.constants().len();
     parts * (fixed + face.n_passive() + geometry + face.n_base() + 16)
 }
 
+/// Number of values of a program that do not depend on the state.
 fn fixed_values(program: &crate::StraightLineProgram) -> usize {
     let fixed = program.stages.iter();
     fixed
@@ -119,6 +124,7 @@ fn fixed_values(program: &crate::StraightLineProgram) -> usize {
         .count()
 }
 
+/// The items of `src/lib.rs`: structs, conversions of pointers, and the exported functions.
 #[allow(clippy::too_many_lines, reason = "one text from top to bottom")]
 fn items(face: &LanguageBinding<'_>) -> TokenStream {
     let function = |name: &str| format_ident!("{}_{name}", face.name);
@@ -126,6 +132,7 @@ fn items(face: &LanguageBinding<'_>) -> TokenStream {
     let (n_base, n_drives) = (face.n_base(), face.n_drives());
     let (constants, parameters) = (face.constants(), face.parameters());
     let (n_constants, n_parameters) = (constants.len(), parameters.len());
+    // Conversions between the arrays of C and the structs of the module.
     let records = [
         LanguageBinding::record_functions("geometry", "Geometry", &constants),
         LanguageBinding::record_functions("parameters", "Parameters", &parameters),
@@ -133,6 +140,7 @@ fn items(face: &LanguageBinding<'_>) -> TokenStream {
     let parts = face.state_parts();
     let names: Vec<_> = parts.iter().map(|(name, _)| name).collect();
     let state_arguments = quote! { #(#names: *const f64),* };
+    // Arguments of functions of many states: one pointer per part of the state, to columns of `n` numbers.
     let many = {
         let sizes = parts.iter().map(|(_, n)| n);
         quote! {
@@ -142,11 +150,13 @@ fn items(face: &LanguageBinding<'_>) -> TokenStream {
             let states = model::States { #(#names: unsafe { columns::<#sizes>(#names, n) }),* };
         }
     };
+    // Every function first checks that the structure is prepared.
     let prepared = quote! {
         let Some(prepared) = (unsafe { prepared_model(dynamics) }) else {
             return NOT_PREPARED;
         };
     };
+    // Functions of one state; those that follow the loops have a second form with a guess.
     let singles: Vec<TokenStream> = wrapped_functions(face)
         .iter()
         .flat_map(|one| {
@@ -156,6 +166,7 @@ fn items(face: &LanguageBinding<'_>) -> TokenStream {
         .flatten()
         .collect();
     let n_entries = n_drives * n_base;
+    // Loops without closed form also export the solution for the passive coordinates.
     let passive_position = face.newton.then(|| {
         let [position, near] = ["passive_position", "passive_position_near"].map(function);
         let (n, n_active) = (face.n_passive(), face.n_active());
@@ -179,6 +190,7 @@ fn items(face: &LanguageBinding<'_>) -> TokenStream {
             }
         }
     });
+    // Forces and regressor of many states, which the runtime computes in vectors.
     let [forces_many, regressor_many] = [
         (function("inverse_dynamics_many"), quote! {
             prepared.dynamics.forces_of_many(&states, &mut unsafe { columns_mut::<#n_drives>(outputs, n) })
@@ -211,6 +223,7 @@ fn items(face: &LanguageBinding<'_>) -> TokenStream {
             }
         }
     });
+    // Names of the exported functions for preparation.
     let [
         default_geometry,
         nominal_parameters,
@@ -223,12 +236,14 @@ fn items(face: &LanguageBinding<'_>) -> TokenStream {
         "prepare",
     ]
     .map(function);
+    // The equation of motion is prepared only if it is part of the module.
     let equation_field = face
         .dynamics
         .map(|_| quote! { equation: model::Dynamics<f64>, });
     let equation_init = face
         .dynamics
         .map(|_| quote! { equation: model::Dynamics::new(&geometry, base), });
+    // Status codes as constants of the crate.
     let status_constants = STATUS.iter().enumerate().map(|(k, (name, _))| {
         let (name, k) = (format_ident!("{name}"), i32::try_from(k).unwrap_or(0));
         quote! { const #name: i32 = #k; }
@@ -395,7 +410,8 @@ fn items(face: &LanguageBinding<'_>) -> TokenStream {
     }
 }
 
-/// A function of one state; one that is `near` takes passive coordinates of a pose near by.
+/// The exported function of one state. With `near`, it takes the passive coordinates of a nearby pose and replaces
+/// them.
 fn single_state_function(
     face: &LanguageBinding<'_>,
     one: &WrappedFunction,
@@ -408,6 +424,7 @@ fn single_state_function(
         format_ident!("{}", one.owner),
         format_ident!("{}{suffix}", one.method),
     );
+    // Arguments: the state, forces if they are read, and passive coordinates.
     let state = face.state_parts();
     let given = one
         .takes_forces
@@ -417,6 +434,7 @@ fn single_state_function(
     let fields = state.iter().map(|(name, _)| name);
     let forces = one.takes_forces.then(|| quote! { , forces });
     let n_passive = face.n_passive();
+    // The three places where passive coordinates occur: argument, conversion of the pointer, and call.
     let (passive_argument, passive_array, passive) = if near {
         (
             quote! { passive: *mut f64, },
@@ -430,9 +448,11 @@ fn single_state_function(
     } else {
         Default::default()
     };
+    // Results are written one array after the other, each at its offset.
     let mut at = 0;
     let writes = one.parts.iter().map(|part| {
         let value = one.part_tokens(part);
+        // The type of an array, with the innermost dimension last.
         let kind = part
             .shape
             .iter()

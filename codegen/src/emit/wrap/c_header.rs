@@ -1,4 +1,4 @@
-//! The header of a C library: what the model has, and what is to be had of it.
+//! The header of a C library: names and sizes of the model, and the functions of the library.
 
 use std::fmt::Write as _;
 
@@ -9,6 +9,7 @@ use super::c_abi::{STATUS, storage_words};
 use super::functions::{ArrayDimension, WrappedFunction, wrapped_functions};
 use crate::emit::identifier::field_identifier;
 
+/// The text of the header. Its declarations match the exported functions of `c_abi`.
 #[allow(clippy::too_many_lines, reason = "one text from top to bottom")]
 pub(super) fn header(face: &LanguageBinding<'_>) -> String {
     let name = &face.name;
@@ -24,6 +25,7 @@ pub(super) fn header(face: &LanguageBinding<'_>) -> String {
         count("CONSTANTS", face.constants().len()),
         count("PARAMETERS", face.parameters().len()),
     ];
+    // C has no arrays of length zero.
     let room = |count: &ArrayDimension| match count.n {
         0 => "1".to_owned(),
         _ => format!("{upper}_N_{}", count.name),
@@ -55,6 +57,7 @@ pub(super) fn header(face: &LanguageBinding<'_>) -> String {
         room(&parameters),
         room(&base),
     );
+    // Sizes, then status codes, then names of positions in the arrays.
     for count in [active, passive, drives, base, constants, parameters] {
         _ = writeln!(text, "#define {upper}_N_{} {}", count.name, count.n);
     }
@@ -62,6 +65,7 @@ pub(super) fn header(face: &LanguageBinding<'_>) -> String {
     for (k, (status, meaning)) in STATUS.iter().enumerate() {
         _ = writeln!(text, "#define {upper}_{status} {k} /* {meaning} */");
     }
+    // Names of positions, so that callers need not count.
     let (of_active, of_passive) = face.derivation.coordinates();
     let coordinates = |places: &[usize]| -> Vec<&str> {
         let named = places
@@ -82,17 +86,19 @@ pub(super) fn header(face: &LanguageBinding<'_>) -> String {
         }
         _ = writeln!(text, "\n/* {what}, in order. */");
         for (k, place) in names.iter().enumerate() {
+            // Keywords of Rust are spelled as in the emitted module, without the raw prefix.
             let place = field_identifier(place).to_string();
             let place = place.trim_start_matches("r#");
             _ = writeln!(text, "#define {upper}_{prefix}_{place} {k}");
         }
     }
+    // Base parameters as a comment: name, expression, unit.
     text.push_str("\n/* Base parameters, in order:\n");
     for base in face.derivation.base_parameters() {
         let line = format!("{} = {} ({})", base.name, base.expression, base.unit);
         _ = writeln!(text, " * {}", comment(&line));
     }
-    // An array of nothing is no C.
+    // C has no arrays of length zero, so an empty one is declared as a pointer.
     let array = |what: &str, count: &ArrayDimension| match count.n {
         0 => format!("*{what}"),
         _ => format!("{what}[{upper}_N_{}]", count.name),
@@ -125,6 +131,7 @@ int32_t {name}_prepare({name}_dynamics *dynamics, const double *geometry, const 
         array("geometry", &constants),
         array("parameters", &parameters)
     );
+    // One declaration per function of one state, and one with a guess where loops are followed.
     let functions = wrapped_functions(face);
     if functions.iter().any(|one| one.follows) {
         text.push_str(
@@ -154,6 +161,7 @@ int32_t {name}_prepare({name}_dynamics *dynamics, const double *geometry, const 
             );
         }
     }
+    // Functions of many states take one pointer per part of the state.
     let states = face
         .state_parts()
         .iter()
@@ -179,7 +187,7 @@ int32_t {name}_regressor_many(const {name}_dynamics *dynamics, size_t n, {states
     text
 }
 
-/// How a function of one state is declared.
+/// The declaration of a function of one state.
 fn declaration(face: &LanguageBinding<'_>, one: &WrappedFunction, near: bool) -> String {
     let name = &face.name;
     let upper = name.to_uppercase();
@@ -193,6 +201,7 @@ fn declaration(face: &LanguageBinding<'_>, one: &WrappedFunction, near: bool) ->
     if near {
         arguments.push(format!("double passive[{upper}_N_PASSIVE]"));
     }
+    // The length of the result as a product or sum of named sizes.
     let sizes = one.parts.iter().map(|part| {
         let counts = part
             .shape
@@ -201,6 +210,7 @@ fn declaration(face: &LanguageBinding<'_>, one: &WrappedFunction, near: bool) ->
         counts.collect::<Vec<String>>().join(" * ")
     });
     let sizes = sizes.collect::<Vec<String>>().join(" + ");
+    // Several arrays are returned one after the other in one argument.
     let result = match one.parts.as_slice() {
         [part] => part.name,
         _ => "motion",

@@ -1,6 +1,7 @@
-//! Crates that bring a model to other languages: the emitted module, a face for the language, and a manifest.
+//! Crates that make a model available to other languages: the emitted module, an interface for the language, and a
+//! manifest.
 //!
-//! The face is the only code with `unsafe`; the module beside it is the one that [`super::emit`] makes.
+//! The interface is the only code with `unsafe`; the module next to it is the one that [`super::emit`] writes.
 //!
 //! Decision: such a crate carries the source of the runtime, so that its folder can be moved anywhere. C passes
 //! constants and parameters as arrays with named places, because names of a model file may be keywords there. The
@@ -24,20 +25,22 @@ use crate::emit::tree::uses_load;
 use crate::programs::PassivePosition;
 use crate::{Derivation, DynamicsPrograms};
 
-/// What faces of all languages need to know of a model.
+/// What the interfaces of all languages read of a model.
 pub(super) struct LanguageBinding<'a> {
+    /// The model.
     pub(super) derivation: &'a Derivation,
-    /// The equation of motion, if that is wanted.
+    /// The equation of motion, if it is requested.
     pub(super) dynamics: Option<&'a DynamicsPrograms>,
     /// Name of the library and prefix of its functions.
     pub(super) name: String,
+    /// Whether the forces of the drives are an input, because an effect depends on them.
     pub(super) load: bool,
-    /// Whether passive coordinates are found by Newton's method.
+    /// Whether the passive coordinates are solved for by Newton's method.
     pub(super) newton: bool,
 }
 
 impl<'a> LanguageBinding<'a> {
-    /// Names that are `reserved` in the other language get `_model` behind them.
+    /// The model with its library name; a name in `reserved` gets the suffix `_model`.
     pub(super) fn new(source: &EmissionRequest<'a>, reserved: &[&str]) -> Self {
         let derivation = source.derivation;
         let module = module_identifier(&derivation.mechanism.name).to_string();
@@ -57,33 +60,39 @@ impl<'a> LanguageBinding<'a> {
         }
     }
 
+    /// Number of independent coordinates.
     pub(super) fn n_active(&self) -> usize {
         self.derivation.coordinates().0.len()
     }
 
+    /// Number of passive coordinates.
     pub(super) fn n_passive(&self) -> usize {
         self.derivation.coordinates().1.len()
     }
 
+    /// Number of drives.
     pub(super) fn n_drives(&self) -> usize {
         self.derivation.mechanism.drives.len()
     }
 
+    /// Number of base parameters.
     pub(super) fn n_base(&self) -> usize {
         self.derivation.reduction.retained.len()
     }
 
+    /// Names of the constants, in the order of the file.
     pub(super) fn constants(&self) -> Vec<&str> {
         let constants = &self.derivation.mechanism.constants;
         constants.iter().map(|c| c.name.as_str()).collect()
     }
 
+    /// Names of the dynamic parameters, in the order of the file.
     pub(super) fn parameters(&self) -> Vec<&str> {
         let parameters = &self.derivation.mechanism.parameters;
         parameters.iter().map(|p| p.name.as_str()).collect()
     }
 
-    /// The parts of a state, in order, with how many numbers each has.
+    /// The arrays of a state, in order, with their lengths.
     pub(super) fn state_parts(&self) -> Vec<(Ident, usize)> {
         let n = self.n_active();
         let mut parts = vec![("q", n), ("qd", n), ("qdd", n)];
@@ -96,7 +105,7 @@ impl<'a> LanguageBinding<'a> {
             .collect()
     }
 
-    /// The emitted module as a file.
+    /// The emitted module as a file, with the equation of motion if it is requested.
     pub(super) fn emitted_module(&self) -> EmittedFile {
         let mut emitted = emit(self.derivation);
         if let Some(dynamics) = self.dynamics {
@@ -108,7 +117,8 @@ impl<'a> LanguageBinding<'a> {
         }
     }
 
-    /// A function that makes `Geometry` or `Parameters` of an array, and its inverse.
+    /// A function that converts an array to `Geometry` or `Parameters`, and one that returns the default values as an
+    /// array.
     pub(super) fn record_functions(function: &str, record: &str, names: &[&str]) -> TokenStream {
         let (from, to) = (
             format_ident!("{function}"),
@@ -117,6 +127,7 @@ impl<'a> LanguageBinding<'a> {
         let record = format_ident!("{record}");
         let n = names.len();
         let fields: Vec<Ident> = names.iter().map(|name| field_identifier(name)).collect();
+        // Position k of the array belongs to field k.
         let places = 0..n;
         quote! {
             fn #from(values: &[f64; #n]) -> model::#record<f64> {
@@ -135,7 +146,7 @@ impl<'a> LanguageBinding<'a> {
     }
 }
 
-/// Source of a file that begins with a comment for its reader.
+/// A source file that begins with a documentation comment.
 pub(super) fn source_file(path: &str, doc: &str, items: &TokenStream) -> EmittedFile {
     let doc = doc_lines(doc, true);
     EmittedFile {

@@ -1,3 +1,4 @@
+//! Output: manifest, `pyproject.toml`, `src/lib.rs` with the functions, and the emitted module.
 //! A crate that makes a Python module of a model, with PyO3: functions of numpy arrays, one state or many.
 
 use proc_macro2::{Ident, TokenStream};
@@ -8,7 +9,7 @@ use super::{LanguageBinding, source_file};
 use crate::emit::language::rust::doc_lines;
 use crate::emit::language::{EmissionRequest, EmittedFile};
 
-/// Names that a module of Python cannot have, or must leave to the module whose arrays it takes.
+/// Names that a Python module cannot have: keywords, and `numpy`, which it would hide from its callers.
 const RESERVED: &[&str] = &[
     "False", "None", "True", "and", "as", "assert", "async", "await", "break", "class", "continue",
     "def", "del", "elif", "else", "except", "finally", "for", "from", "global", "if", "import",
@@ -16,12 +17,13 @@ const RESERVED: &[&str] = &[
     "while", "with", "yield",
 ];
 
-/// The files of the crate, without reactions and self-test. It needs `modelmill-runtime` in the folder `modelmill-runtime`
-/// beside its manifest.
+/// The files of the crate, without reactions and self-test. The caller copies `modelmill-runtime` into the folder of
+/// that name next to the manifest.
 #[allow(clippy::too_many_lines, reason = "one text from top to bottom")]
 pub(in crate::emit) fn emit_python(from: &EmissionRequest<'_>) -> Vec<EmittedFile> {
     let face = LanguageBinding::new(from, RESERVED);
     let name = &face.name;
+    // A package name may not begin with an underscore.
     let package = name.trim_start_matches('_');
     let cargo = format!(
         "# Written by modelmill. `maturin build --release` makes a wheel of it; without maturin, `cargo build --release` makes
@@ -71,10 +73,12 @@ module-name = \"{name}\"
     ]
 }
 
+/// The items of `src/lib.rs`: conversions of arrays, the functions, and the module.
 #[allow(clippy::too_many_lines, reason = "one text from top to bottom")]
 fn items(face: &LanguageBinding<'_>) -> TokenStream {
     let module = &face.name;
     let mechanism = &face.derivation.mechanism;
+    // The documentation of the module, which `help` prints.
     let title = format!(
         "{}.\n\nInverse dynamics tau = H_min(q, q', q'') p_min. Arrays of one state have one number per coordinate; arrays \
          of n states have shape (coordinates, n) and are read as they lie in memory, and so are results: forces (drives, n), \
@@ -89,6 +93,7 @@ fn items(face: &LanguageBinding<'_>) -> TokenStream {
         LanguageBinding::record_functions("geometry", "Geometry", &constants),
         LanguageBinding::record_functions("parameters", "Parameters", &parameters),
     ];
+    // Arguments of a state, and their conversion to columns.
     let parts = face.state_parts();
     let names: Vec<_> = parts.iter().map(|(name, _)| name).collect();
     let arguments = quote! { #(#names: PyReadonlyArrayDyn<'py, f64>),* };
@@ -97,7 +102,8 @@ fn items(face: &LanguageBinding<'_>) -> TokenStream {
         #arrays
         let states = model::States { #(#names),* };
     };
-    // The two that vectors compute for many states at once are written out below.
+    // Forces and regressor have a vector form for many states, which the text below calls.
+    // Everything else is computed state by state.
     let of_blocks = ["inverse_dynamics", "regressor"];
     let singles = wrapped_functions(face);
     let singles = singles.iter().filter(|one| !of_blocks.contains(&one.name));
@@ -108,6 +114,7 @@ fn items(face: &LanguageBinding<'_>) -> TokenStream {
     let singles: Vec<TokenStream> = singles
         .map(|one| single_state_function(face, one))
         .collect();
+    // Documentation of the three functions that are written out.
     let doc_forces = "Forces of the drives, N or N m, for base parameters `p`. `parallel` uses all cores; `geometry` names known \
                       quantities that differ from the model file's.";
     let doc_regressor = "H_min: one row per drive, one column per base parameter. `parallel` and `geometry` as in `inverse_dynamics`.";
@@ -318,7 +325,7 @@ fn items(face: &LanguageBinding<'_>) -> TokenStream {
     }
 }
 
-/// What a function is called in Python.
+/// The name of a function in Python; `forward` alone would be unclear in a module.
 fn python_name(one: &WrappedFunction) -> &'static str {
     match one.name {
         "forward" => "forward_dynamics",
@@ -326,7 +333,7 @@ fn python_name(one: &WrappedFunction) -> &'static str {
     }
 }
 
-/// Arrays of the given names as columns of `n` states, with their shapes in `many`.
+/// Statements that bind arrays to columns of `n` states and their common shape to `many`.
 fn arrays(parts: &[(Ident, usize)]) -> TokenStream {
     let (names, sizes): (Vec<_>, Vec<usize>) = parts.iter().map(|(name, n)| (name, *n)).unzip();
     let texts: Vec<String> = names.iter().map(ToString::to_string).collect();
@@ -337,13 +344,14 @@ fn arrays(parts: &[(Ident, usize)]) -> TokenStream {
     }
 }
 
-/// A function that looks at one state after the other.
+/// A function that is evaluated state by state.
 fn single_state_function(face: &LanguageBinding<'_>, one: &WrappedFunction) -> TokenStream {
     let (name, method) = (
         format_ident!("{}", python_name(one)),
         format_ident!("{}", one.method),
     );
     let state = face.state_parts();
+    // Accelerations are no argument of a function that does not read them.
     let is_given = |part: &&(Ident, usize)| one.reads_accelerations || part.0 != "qdd";
     let forces = one
         .takes_forces
@@ -356,6 +364,7 @@ fn single_state_function(face: &LanguageBinding<'_>, one: &WrappedFunction) -> T
         .collect();
     let names: Vec<_> = given.iter().map(|(name, _)| name).collect();
     let arrays = arrays(&given);
+    // Parts of the state that are no argument are zero.
     let fields = state.iter().map(|(name, n)| {
         if given.iter().any(|(given, _)| given == name) {
             quote! { #name: #name.map(|values| values[sample]) }
@@ -363,9 +372,11 @@ fn single_state_function(face: &LanguageBinding<'_>, one: &WrappedFunction) -> T
             quote! { #name: [0.0; #n] }
         }
     });
+    // Forces of the drives of one state.
     let forces = one
         .takes_forces
         .then(|| quote! { , &forces.map(|values| values[sample]) });
+    // Functions of the equation of motion take base parameters; those of the model do not.
     let (p_argument, p_name, owner) = if one.owner == "model" {
         let model = quote! { model::Model::new(&geometry_of(geometry)?) };
         (None, None, model)
@@ -374,6 +385,7 @@ fn single_state_function(face: &LanguageBinding<'_>, one: &WrappedFunction) -> T
         let argument = quote! { p: PyReadonlyArray1<'py, f64>, };
         (Some(argument), Some(quote! { p, }), owner)
     };
+    // A matrix is flattened row by row.
     let values = one.parts.iter().map(|part| {
         let value = one.part_tokens(part);
         match part.shape.len() {
@@ -383,6 +395,7 @@ fn single_state_function(face: &LanguageBinding<'_>, one: &WrappedFunction) -> T
     });
     let entries = one.n_results();
     let mut at = 0;
+    // Each array of the result is a range of the computed values.
     let results = one.parts.iter().map(|part| {
         let (from, shape) = (at, part.shape.iter().map(|count| count.n));
         at += part.n_entries();
@@ -390,6 +403,7 @@ fn single_state_function(face: &LanguageBinding<'_>, one: &WrappedFunction) -> T
     });
     let results: Vec<TokenStream> = results.collect();
     let one_array = quote! { Bound<'py, PyArrayDyn<f64>> };
+    // One array is returned as it is, several as a tuple.
     let (results, kind) = match results.as_slice() {
         [result] => (result.clone(), one_array),
         several => {
@@ -397,6 +411,7 @@ fn single_state_function(face: &LanguageBinding<'_>, one: &WrappedFunction) -> T
             (quote! { (#(#several),*) }, quote! { (#(#kinds),*) })
         }
     };
+    // Shapes for the documentation.
     let shapes = one.parts.iter().map(|part| {
         let counts = part.shape.iter().map(|count| count.n.to_string());
         format!("({}, n)", counts.collect::<Vec<String>>().join(", "))

@@ -1,4 +1,4 @@
-//! The header: what the model has, and what is to be had of it.
+//! The C header: names and sizes of the model, and the functions of the source.
 
 use std::fmt::Write as _;
 
@@ -6,7 +6,7 @@ use super::statements::{CSyntax, comment};
 use super::{CFunction, TranslationUnit};
 use crate::emit::language::syntax::LanguageSyntax;
 
-/// What functions return, with its name after the prefix, and its meaning.
+/// Status codes in the order of their values: name after the prefix, and meaning.
 const STATUS: [(&str, &str); 6] = [
     ("OK", "all is well"),
     (
@@ -25,6 +25,7 @@ const STATUS: [(&str, &str); 6] = [
     ),
 ];
 
+/// The text of the header.
 #[allow(clippy::too_many_lines, reason = "one text from top to bottom")]
 pub(super) fn header(unit: &TranslationUnit<'_>) -> String {
     let TranslationUnit { name, upper, .. } = unit;
@@ -63,6 +64,7 @@ extern \"C\" {{
 ",
         unit.state_arguments()
     );
+    // Sizes, then status codes, then names of positions in the arrays.
     for (what, n) in [
         ("ACTIVE", unit.n_active()),
         ("PASSIVE", unit.n_passive()),
@@ -77,6 +79,7 @@ extern \"C\" {{
     }
     let (active, passive) = derivation.coordinates();
     let coordinate = |i: &usize| mechanism.coordinates[*i].name.as_str();
+    // One constant per name: its position in the array.
     let mut places = |what: &str, prefix: &str, names: Vec<&str>| {
         if names.is_empty() {
             return;
@@ -112,6 +115,7 @@ extern \"C\" {{
         );
     }
     text.push_str(" */\n");
+    // A struct of named quantities with their units as comments.
     let mut record = |what: &str, name: &str, fields: Vec<(&str, &str)>| {
         _ = writeln!(text, "\n/* {what} */\ntypedef struct {{");
         if fields.is_empty() {
@@ -152,6 +156,7 @@ extern \"C\" {{
         unit.n_base().max(1),
         unit.once.kept.len().max(1)
     );
+    // Loops without closed form store their scale and the solution at the nominal pose.
     if unit.newton {
         _ = writeln!(
             text,
@@ -181,6 +186,7 @@ int {name}_passive_position(const {name}_dynamics *dynamics, const double *q, do
 int {name}_passive_position_near(const {name}_dynamics *dynamics, const double *q, double *passive);"
         );
     }
+    // Each public function with its documentation and its operations per state.
     for function in unit.functions.iter().filter(|f| f.is_public) {
         _ = writeln!(
             text,
@@ -194,6 +200,7 @@ int {name}_passive_position_near(const {name}_dynamics *dynamics, const double *
             _ = writeln!(text, "{};", signature(unit, function, "dynamics", true));
         }
     }
+    // The equation of motion, if it is requested.
     if unit.source.dynamics.is_some() {
         text.push_str("\n/* c + g + e alone. */\n");
         for near in bias_variants(unit) {
@@ -205,6 +212,7 @@ int {name}_passive_position_near(const {name}_dynamics *dynamics, const double *
             forward_dynamics_declaration(unit)
         );
     }
+    // The outputs of the reactions are listed, because some components may be missing.
     if let (Some((function, once)), Some(reactions)) = (&unit.reactions, unit.source.reactions) {
         text.push_str(
             "\n/* What the joints transmit to the side away from the base: in order, with what is not determined left out.\n",
@@ -246,7 +254,7 @@ int {name}_self_test(const {name}_geometry *geometry);"
     text
 }
 
-/// What each output of the reactions is.
+/// The meaning of each output of the reactions, with its axis.
 fn source_names(reactions: &crate::ReactionPrograms) -> Vec<String> {
     let mut names = vec![String::new(); reactions.program.outputs.len()];
     let mut name = |what: &str, of: &str, places: &[Option<usize>; 3]| {
@@ -266,7 +274,7 @@ fn source_names(reactions: &crate::ReactionPrograms) -> Vec<String> {
     names
 }
 
-/// How a function is declared.
+/// The declaration of a function of one state.
 pub(super) fn signature(
     unit: &TranslationUnit<'_>,
     function: &CFunction<'_>,
@@ -276,6 +284,7 @@ pub(super) fn signature(
     declaration(unit, function.name, owner, near, function.result)
 }
 
+/// A declaration with the arguments that all functions of a state share; `near` adds the passive coordinates.
 fn declaration(
     unit: &TranslationUnit<'_>,
     what: &str,
@@ -295,7 +304,7 @@ fn declaration(
     )
 }
 
-/// Whether the bias forces come from the nominal pose, and from a pose near by.
+/// Which forms the function `bias` has: without guess, and with a guess if its program follows the loops.
 pub(super) fn bias_variants(unit: &TranslationUnit<'_>) -> &'static [bool] {
     let follows = |f: &CFunction<'_>| f.name == "bias_and_drives" && f.follows;
     if unit.functions.iter().any(follows) {
@@ -305,12 +314,12 @@ pub(super) fn bias_variants(unit: &TranslationUnit<'_>) -> &'static [bool] {
     }
 }
 
-/// How the bias forces are declared.
+/// The declaration of `bias`.
 pub(super) fn bias_declaration(unit: &TranslationUnit<'_>, near: bool) -> String {
     declaration(unit, "bias", "dynamics", near, "bias")
 }
 
-/// How forward dynamics are declared.
+/// The declaration of `forward`.
 pub(super) fn forward_dynamics_declaration(unit: &TranslationUnit<'_>) -> String {
     let name = &unit.name;
     format!(

@@ -14,7 +14,7 @@ use crate::emit::tree::{NameScope, PrecomputedValues, StatementRoutine, reads_pa
 use crate::lower::StraightLineProgram;
 use crate::programs::PassivePosition;
 
-/// Names whose headers the C library has itself, and `main`.
+/// Names of standard headers, which `#include` would find instead, and `main`.
 pub(in crate::emit) const RESERVED: [&str; 30] = [
     "assert",
     "complex",
@@ -48,7 +48,7 @@ pub(in crate::emit) const RESERVED: [&str; 30] = [
     "main",
 ];
 
-/// The header and the source.
+/// The header and the source, named after the model.
 pub(in crate::emit) fn emit_sources(source: &EmissionRequest<'_>) -> Vec<EmittedFile> {
     let unit = TranslationUnit::new(source);
     let file = |suffix: &str, text: String| EmittedFile {
@@ -61,35 +61,45 @@ pub(in crate::emit) fn emit_sources(source: &EmissionRequest<'_>) -> Vec<Emitted
     ]
 }
 
-/// What is printed.
+/// All that header and source are printed from.
 struct TranslationUnit<'a> {
+    /// The request, with the derivation.
     source: &'a EmissionRequest<'a>,
+    /// Names of all values.
     scope: NameScope,
-    /// Prefix of everything, and its capitals.
+    /// Prefix of functions and structs.
     name: String,
+    /// Prefix of constants.
     upper: String,
+    /// Whether the forces of the drives are an input.
     load: bool,
+    /// Whether the passive coordinates are solved for by Newton's method.
     newton: bool,
-    /// Programs of the geometry and the base parameters, and what they compute once.
+    /// Programs that read geometry and base parameters.
     functions: Vec<CFunction<'a>>,
+    /// Their common precomputed values.
     once: PrecomputedValues,
-    /// The reactions, and what they compute once.
+    /// The program of the reactions with its own precomputed values.
     reactions: Option<(CFunction<'a>, PrecomputedValues)>,
-    /// H for all products, for the self-test.
+    /// The regressor H for all products, for the self-test, with its own precomputed values.
     columns: Option<(CFunction<'a>, PrecomputedValues)>,
 }
 
-/// A program with its statements.
+/// A program with the C function that it becomes.
 struct CFunction<'a> {
+    /// The program; its operations are counted for the header.
     program: &'a StraightLineProgram,
+    /// Name without prefix.
     name: &'static str,
+    /// Documentation without a full stop; empty for functions that are not public.
     doc: String,
-    /// What its results are called in declarations.
+    /// Name of the result in the declaration.
     result: &'static str,
+    /// Its statements.
     routine: StatementRoutine,
-    /// Whether it reads passive coordinates that are found first.
+    /// Whether it reads passive coordinates that Newton's method has to solve for.
     follows: bool,
-    /// Whether it may be called from outside.
+    /// Whether the header declares it.
     is_public: bool,
 }
 
@@ -110,6 +120,7 @@ impl<'a> TranslationUnit<'a> {
         let programs = &derivation.programs;
         let (active, passive) = derivation.coordinates();
         let of_coordinate = |i: &usize| mechanism.coordinates[*i].name.clone();
+        // A public function from a program, with names for its outputs.
         let function =
             |program: &'a StraightLineProgram, name, doc: String, result, outputs: Vec<String>| {
                 let routine = StatementRoutine::new(program, &scope, &outputs);
@@ -124,12 +135,14 @@ impl<'a> TranslationUnit<'a> {
                     is_public: true,
                 }
             };
+        // Names such as `l_left` and `l_left_d`, one per drive.
         let each = |letter: &str, suffix: &str| -> Vec<String> {
             let drives = mechanism.drives.iter();
             drives
                 .map(|d| format!("{letter}_{}{suffix}", d.name))
                 .collect()
         };
+        // Lengths, rates, then the Jacobian row by row: the order of the program's outputs.
         let mut of_motion = each("l", "");
         of_motion.extend(each("l", "_d"));
         for drive in &mechanism.drives {
@@ -163,6 +176,7 @@ impl<'a> TranslationUnit<'a> {
                 of_motion,
             ),
         ];
+        // Only mechanisms with loops have passive coordinates.
         if !passive.is_empty() {
             let names = ["", "_d", "_dd"].iter();
             let names = names.flat_map(|suffix| passive.iter().map(move |p| (p, suffix)));
@@ -210,6 +224,7 @@ impl<'a> TranslationUnit<'a> {
                 functions.push(function(program, name, doc, result, Vec::new()));
             }
         }
+        // Loops without closed form add residual and scales, which are internal.
         let newton = match &programs.passive_position {
             PassivePosition::Newton(loops) => {
                 for (program, name) in [(&loops.residual, "gaps"), (&loops.scales, "scales")] {
@@ -221,6 +236,7 @@ impl<'a> TranslationUnit<'a> {
             }
             _ => false,
         };
+        // A program with precomputed values of its own.
         let alone = |mut function: CFunction<'a>| {
             let mut once = PrecomputedValues::new(&scope);
             once.absorb(&mut function.routine);
@@ -246,6 +262,7 @@ impl<'a> TranslationUnit<'a> {
             function.is_public = false;
             alone(function)
         });
+        // All other programs share theirs.
         let mut once = PrecomputedValues::new(&scope);
         for function in &mut functions {
             once.absorb(&mut function.routine);
@@ -265,29 +282,33 @@ impl<'a> TranslationUnit<'a> {
         }
     }
 
-    /// A template with the names of this unit.
+    /// A template with its placeholders replaced by the prefixes of this unit.
     fn expand_template(&self, template: &str) -> String {
         let text = template.replace("NAME_", &format!("{}_", self.name));
         text.replace("UPPER_", &format!("{}_", self.upper))
     }
 
+    /// Number of independent coordinates.
     fn n_active(&self) -> usize {
         self.source.derivation.coordinates().0.len()
     }
 
+    /// Number of passive coordinates.
     fn n_passive(&self) -> usize {
         self.source.derivation.coordinates().1.len()
     }
 
+    /// Number of drives.
     fn n_drives(&self) -> usize {
         self.source.derivation.mechanism.drives.len()
     }
 
+    /// Number of base parameters.
     fn n_base(&self) -> usize {
         self.source.derivation.reduction.retained.len()
     }
 
-    /// The parts of a state, with how many numbers each has.
+    /// The arrays of a state, in order, with their lengths.
     fn state_parts(&self) -> Vec<(&'static str, usize)> {
         let n = self.n_active();
         let mut parts = vec![("q", n), ("qd", n), ("qdd", n)];
@@ -297,14 +318,14 @@ impl<'a> TranslationUnit<'a> {
         parts
     }
 
-    /// Declarations of a state.
+    /// The arrays of a state as parameters of a function.
     fn state_parameters(&self) -> String {
         let parts = self.state_parts().into_iter();
         let parts = parts.map(|(name, _)| format!("const double *{name}"));
         parts.collect::<Vec<String>>().join(", ")
     }
 
-    /// The names of a state as arguments.
+    /// The arrays of a state as arguments of a call.
     fn state_arguments(&self) -> String {
         let parts = self.state_parts().into_iter().map(|(name, _)| name);
         parts.collect::<Vec<&str>>().join(", ")

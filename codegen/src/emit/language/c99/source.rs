@@ -1,4 +1,4 @@
-//! The source: programs as functions, and what calls them.
+//! The C source: programs as static functions, and the public functions that call them.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -11,11 +11,12 @@ use crate::emit::tree::{BaseParameterCode, CodeExpression, PrecomputedValues, in
 use crate::expr::Atom;
 use crate::lower::{OperationCount, ProgramStage};
 
-/// Operations of a function.
+/// Operations per state of a function.
 pub(super) fn operation_count(function: &CFunction<'_>) -> OperationCount {
     function.program.count_operations(ProgramStage::State)
 }
 
+/// The text of the source file. Helpers that no statement calls are left out, so that no compiler warns of them.
 pub(super) fn source(unit: &TranslationUnit<'_>) -> String {
     let name = &unit.name;
     let mut text = format!(
@@ -46,6 +47,7 @@ pub(super) fn source(unit: &TranslationUnit<'_>) -> String {
     }
     write_records(unit, &mut text);
     write_base_parameters(unit, &mut text);
+    // Programs first, then preparation and inputs, then the public functions that use them.
     for function in &unit.functions {
         write_program(unit, function, &unit.once, "dynamics", &mut text);
     }
@@ -72,7 +74,7 @@ pub(super) fn source(unit: &TranslationUnit<'_>) -> String {
     text
 }
 
-/// Whether any statement calls a function.
+/// Whether any statement calls a function whose name is that of the unit followed by `what`.
 fn has_call(unit: &TranslationUnit<'_>, what: &str) -> bool {
     let c = unit.syntax();
     let mut lines = Vec::new();
@@ -91,6 +93,7 @@ fn has_call(unit: &TranslationUnit<'_>, what: &str) -> bool {
 }
 
 impl TranslationUnit<'_> {
+    /// The syntax of C with the names of this unit.
     pub(super) fn syntax(&self) -> CSyntax<'_> {
         CSyntax {
             name: &self.name,
@@ -99,7 +102,7 @@ impl TranslationUnit<'_> {
     }
 }
 
-/// Default values of geometry and parameters.
+/// The functions that fill geometry and parameters with the values of the model file.
 fn write_records(unit: &TranslationUnit<'_>, text: &mut String) {
     let (name, c) = (&unit.name, unit.syntax());
     let mechanism = &unit.source.derivation.mechanism;
@@ -111,6 +114,7 @@ fn write_records(unit: &TranslationUnit<'_>, text: &mut String) {
         .parameters
         .iter()
         .map(|x| (x.name.as_str(), x.nominal));
+    // A struct without fields has one that is not used, because C allows no empty struct.
     let mut record = |function: &str, of: &str, values: Vec<(&str, f64)>| {
         _ = writeln!(text, "\nvoid {name}_{function}({name}_{of} *{of})\n{{");
         for (field, value) in &values {
@@ -125,7 +129,7 @@ fn write_records(unit: &TranslationUnit<'_>, text: &mut String) {
     record("nominal_parameters", "parameters", parameters.collect());
 }
 
-/// Base parameters as eq. (16) gives them.
+/// The function that computes base parameters from physical parameters, eq. (16).
 fn write_base_parameters(unit: &TranslationUnit<'_>, text: &mut String) {
     let (name, c) = (&unit.name, unit.syntax());
     let derivation = unit.source.derivation;
@@ -141,12 +145,14 @@ fn write_base_parameters(unit: &TranslationUnit<'_>, text: &mut String) {
     );
     let mut lines = Vec::new();
     parameter_bindings(unit, &read, "geometry->", "parameters->", "", &mut lines);
+    // Unread arguments are marked, so that compilers do not warn.
     if !read.iter().any(|atom| matches!(atom, Atom::Constant(_))) {
         lines.push("(void)geometry;".to_owned());
     }
     if !read.iter().any(|atom| matches!(atom, Atom::Parameter(_))) {
         lines.push("(void)parameters;".to_owned());
     }
+    // A denominator that is zero at this geometry is reported by its text.
     for divisor in &divisors {
         lines.push(format!(
             "if (!(fabs({}) > SINGULAR_SHARE * {})) return {}_SPECIAL; /* {} vanishes */",
@@ -170,7 +176,8 @@ fn write_base_parameters(unit: &TranslationUnit<'_>, text: &mut String) {
     text.push_str("}\n");
 }
 
-/// Names for what is read of geometry, parameters and base parameters.
+/// Declarations of the constants, parameters and base parameters that are read. `geometry`, `parameters` and `base` are
+/// the expressions in front of a field or an index.
 pub(super) fn parameter_bindings(
     unit: &TranslationUnit<'_>,
     read: &BTreeSet<Atom>,
@@ -198,13 +205,14 @@ pub(super) fn parameter_bindings(
     }
 }
 
+/// Appends the lines of a function body, indented.
 pub(super) fn write_body(lines: &[String], text: &mut String) {
     for line in lines {
         _ = writeln!(text, "    {line}");
     }
 }
 
-/// A program.
+/// A program as a static function from `inputs` to `outputs`. `owner` is the struct with the precomputed values.
 pub(super) fn write_program(
     unit: &TranslationUnit<'_>,
     function: &CFunction<'_>,
@@ -220,6 +228,7 @@ pub(super) fn write_program(
         function.name
     );
     let mut lines = Vec::new();
+    // Reactions contain a prepared model; its geometry is one level deeper.
     let within = if owner == "reactions" {
         "dynamics."
     } else {
@@ -233,11 +242,13 @@ pub(super) fn write_program(
         "self->base",
         &mut lines,
     );
+    // Precomputed values that this program reads.
     for (k, kept) in once.kept.iter().enumerate() {
         if routine.kept.contains(kept) {
             lines.push(format!("const double {} = self->once[{k}];", c.name(kept)));
         }
     }
+    // Loop programs take a pose, all others a state.
     let derivation = unit.source.derivation;
     let inputs = if function.name == "gaps" || function.name == "scales" {
         let (active, passive) = derivation.coordinates();
@@ -257,6 +268,7 @@ pub(super) fn write_program(
             ));
         }
     }
+    // A program may read none of its arguments.
     for unused in ["self", "inputs", "outputs"] {
         lines.push(format!("(void){unused};"));
     }
@@ -269,7 +281,7 @@ pub(super) fn write_program(
     text.push_str("}\n");
 }
 
-/// Statements of what is computed once, into `self->once`.
+/// Statements that compute the precomputed values and store them in `self->once`.
 pub(super) fn once_lines(
     unit: &TranslationUnit<'_>,
     once: &PrecomputedValues,
@@ -287,7 +299,7 @@ pub(super) fn once_lines(
     lines
 }
 
-/// What depends on geometry and base parameters alone.
+/// The function `prepare`: computes what depends only on geometry and base parameters, and checks both.
 fn write_preparation(unit: &TranslationUnit<'_>, text: &mut String) {
     let TranslationUnit { name, upper, .. } = unit;
     let c = unit.syntax();
@@ -307,6 +319,7 @@ fn write_preparation(unit: &TranslationUnit<'_>, text: &mut String) {
         lines.push("(void)base;".to_owned());
         lines.push("self->base[0] = 0.0;".to_owned());
     }
+    // Inputs that are NaN or too large are reported by every later call.
     for constant in constants {
         lines.push(format!(
             "if (!{name}_all_fine(&geometry->{}, 1)) self->input = {upper}_NOT_FINITE;",
@@ -324,7 +337,7 @@ fn write_preparation(unit: &TranslationUnit<'_>, text: &mut String) {
     text.push_str("}\n");
 }
 
-/// The inputs of programs from a state.
+/// The function that copies a state into the inputs of programs and checks it.
 fn write_state_inputs(unit: &TranslationUnit<'_>, text: &mut String) {
     let TranslationUnit { name, upper, .. } = unit;
     let mut lines = Vec::new();
@@ -347,7 +360,7 @@ fn write_state_inputs(unit: &TranslationUnit<'_>, text: &mut String) {
     text.push_str("}\n");
 }
 
-/// A function that may be called from outside, and its fellow with a guess.
+/// A public function, and a second one with a guess if it follows the loops.
 fn write_public_function(
     unit: &TranslationUnit<'_>,
     function: &CFunction<'_>,
@@ -373,13 +386,14 @@ fn write_public_function(
     } else {
         "dynamics->input"
     };
-    // Results are written only when all is well.
+    // A program that can fail writes to a local array first, so that results change only if the status is OK.
     let can_fail = function.routine.can_fail();
     let ways: &[bool] = if function.follows {
         &[false, true]
     } else {
         &[false]
     };
+    // The statements of both forms differ in how the passive coordinates are found.
     for near in ways {
         let mut lines = vec![
             format!("double inputs[{}];", n_inputs.max(1)),
@@ -436,7 +450,7 @@ fn write_public_function(
     }
 }
 
-/// The bias forces alone, without what forward dynamics need beside them.
+/// The function `bias`: the bias forces without the Jacobian of the drives, which is in the same program.
 fn write_bias(unit: &TranslationUnit<'_>, text: &mut String) {
     let TranslationUnit { name, upper, .. } = unit;
     let arguments = unit.state_arguments();
@@ -462,7 +476,7 @@ fn write_bias(unit: &TranslationUnit<'_>, text: &mut String) {
     }
 }
 
-/// Accelerations from forces: a linear system with the mass matrix.
+/// The function `forward`: solves `M q'' = J' f - bias` for the accelerations.
 fn write_forward_dynamics(unit: &TranslationUnit<'_>, text: &mut String) {
     let TranslationUnit { name, upper, .. } = unit;
     let arguments = unit.state_arguments();
@@ -497,7 +511,7 @@ fn write_forward_dynamics(unit: &TranslationUnit<'_>, text: &mut String) {
     );
 }
 
-/// What the reactions compute once.
+/// The function `prepare_reactions`: base parameters, the prepared model, and the precomputed values of the reactions.
 fn write_reaction_preparation(
     unit: &TranslationUnit<'_>,
     function: &CFunction<'_>,
@@ -516,6 +530,7 @@ int {name}_prepare_reactions({name}_reactions *reactions, const {name}_geometry 
     double base[{}];",
         unit.n_base().max(1)
     );
+    // Precomputed values first, because they do not depend on the base parameters.
     let mut lines = once_lines(unit, once, "geometry->", "parameters->", "base");
     lines.push(format!(
         "if ({name}_base_parameters(geometry, parameters, base) != {upper}_OK)\n        return self->dynamics.input = {upper}_SPECIAL;"
@@ -535,7 +550,7 @@ int {name}_prepare_reactions({name}_reactions *reactions, const {name}_geometry 
     text.push_str("}\n");
 }
 
-/// An expression of a program without a state.
+/// The expression of a program's single result.
 pub(super) fn single_value(unit: &TranslationUnit<'_>, result: &CodeExpression) -> String {
     unit.syntax().operand_text(result)
 }

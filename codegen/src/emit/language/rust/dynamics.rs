@@ -1,4 +1,5 @@
-//! The equation of motion as a struct of its own: mass matrix, velocity terms, gravity, effects, forward dynamics.
+//! The struct `Dynamics` of an emitted module, the equation of motion: mass matrix, velocity terms, gravity, effects,
+//! forward dynamics.
 
 use proc_macro2::TokenStream;
 use quote::quote;
@@ -12,7 +13,7 @@ use crate::Derivation;
 use crate::emit::tree::{NameScope, reads_passive};
 use crate::on_request::dynamics::DynamicsPrograms;
 
-/// The struct `Dynamics`.
+/// The struct `Dynamics` for one geometry and one set of base parameters.
 pub(super) fn dynamics(
     derivation: &Derivation,
     scope: &NameScope,
@@ -23,6 +24,7 @@ pub(super) fn dynamics(
         .iter()
         .map(|i| derivation.mechanism.coordinates[*i].name.as_str());
     let names: Vec<&str> = names.collect();
+    // Names of outputs: one per coordinate, with a letter in front.
     let of_each = |letter: &str| -> Vec<String> {
         names
             .iter()
@@ -32,11 +34,13 @@ pub(super) fn dynamics(
     let entries = names
         .iter()
         .flat_map(|a| names.iter().map(move |b| format!("M_{a}_{b}")));
+    // The program of the bias also returns the Jacobian, which forward dynamics needs.
     let mut with_jacobian = of_each("b");
     for drive in &derivation.mechanism.drives {
         with_jacobian.extend(names.iter().map(|a| format!("J_{}_{a}", drive.name)));
     }
     let vector = quote! { [T; N_ACTIVE] };
+    // Name and struct, program, documentation, names of outputs, and type of each method.
     let functions = [
         (
             ["mass_matrix", "MassMatrix"],
@@ -86,7 +90,7 @@ pub(super) fn dynamics(
             inputs: ProgramStateInputs::Motion,
             outputs,
             output: Some(output),
-            // The Jacobian stands behind the bias in its program.
+            // The Jacobian follows the bias in the outputs of the program; the method returns only the bias.
             results: (name == "bias").then(|| ResultConversion {
                 from_type: quote! { Linearisation<T, N_ACTIVE, N_DRIVES> },
                 conversion: quote! { found.values },
@@ -113,7 +117,8 @@ pub(super) fn dynamics(
     .tokens()
 }
 
-/// Accelerations from forces: a linear system with the mass matrix.
+/// The method `forward`: solves the equation of motion for the accelerations. It has a form with a guess if loops are
+/// followed.
 fn forward_dynamics(derivation: &Derivation, dynamics: &DynamicsPrograms) -> TokenStream {
     let doc = quote! {
         /// Forward dynamics: accelerations of the independent coordinates under given forces of the drives.
@@ -125,6 +130,7 @@ fn forward_dynamics(derivation: &Derivation, dynamics: &DynamicsPrograms) -> Tok
     };
     let [matrix_reads, bias_reads] =
         [&dynamics.mass_matrix, &dynamics.bias].map(|program| reads_passive(derivation, program));
+    // Without passive coordinates to solve for, both programs read the state directly.
     if !matrix_reads && !bias_reads {
         return quote! {
             #doc
@@ -135,6 +141,7 @@ fn forward_dynamics(derivation: &Derivation, dynamics: &DynamicsPrograms) -> Tok
             }
         };
     }
+    // Each of the two programs may or may not read passive coordinates.
     let inputs = |reads: bool| {
         if reads {
             quote! { inputs_with_passive(state, passive) }

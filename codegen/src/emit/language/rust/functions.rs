@@ -1,4 +1,5 @@
-//! The functions of an emitted model: regressor, motion of drives and passive coordinates, inverse dynamics.
+//! The structs `Model` and `InverseDynamics` of an emitted module: regressor, motion of drives and passive coordinates,
+//! forces.
 
 use proc_macro2::TokenStream;
 use quote::quote;
@@ -12,7 +13,7 @@ use crate::Derivation;
 use crate::emit::tree::{NameScope, reads_passive};
 use crate::programs::PassivePosition;
 
-/// The struct `Model` with everything that needs no parameters.
+/// The struct `Model`: all programs that need only the geometry.
 pub(super) fn model(derivation: &Derivation, scope: &NameScope) -> TokenStream {
     let programs = &derivation.programs;
     let mechanism = &derivation.mechanism;
@@ -31,12 +32,14 @@ pub(super) fn model(derivation: &Derivation, scope: &NameScope) -> TokenStream {
         output: Some(quote! { [[T; N_BASE]; N_DRIVES] }),
         results: None,
     };
+    // Names of the outputs: `l_left`, `l_left_d`, one per drive.
     let of_drives = |letter: &str, suffix: &str| -> Vec<String> {
         let drives = mechanism.drives.iter();
         drives
             .map(|d| format!("{letter}_{}{suffix}", d.name))
             .collect()
     };
+    // Lengths, rates, then the Jacobian row by row: the order of the program's outputs.
     let mut of_motion = of_drives("l", "");
     of_motion.extend(of_drives("l", "_d"));
     for drive in &mechanism.drives {
@@ -57,6 +60,7 @@ pub(super) fn model(derivation: &Derivation, scope: &NameScope) -> TokenStream {
         results: None,
     };
     let mut functions = vec![regressor, drives];
+    // Only mechanisms with loops have passive coordinates.
     if !passive.is_empty() {
         let motion = ["", "_d", "_dd"].iter();
         let motion = motion.flat_map(|suffix| passive.iter().map(move |p| (p, suffix)));
@@ -73,6 +77,7 @@ pub(super) fn model(derivation: &Derivation, scope: &NameScope) -> TokenStream {
             results: None,
         });
     }
+    // Loops without closed form add programs, fields and methods.
     let newton = newton(derivation, scope);
     let followed = reads_passive(derivation, &programs.regressor);
     let (newton_items, more) = match newton {
@@ -96,6 +101,7 @@ pub(super) fn model(derivation: &Derivation, scope: &NameScope) -> TokenStream {
         more,
     };
     let owner = owner.tokens();
+    // The function for many states differs by whether each state follows the one before.
     let of_many = if followed {
         quote! { ::modelmill_runtime::regressor_of_many!(followed); }
     } else {
@@ -113,7 +119,7 @@ pub(super) fn model(derivation: &Derivation, scope: &NameScope) -> TokenStream {
     }
 }
 
-/// The struct `InverseDynamics`.
+/// The struct `InverseDynamics`: the forces of the drives for one set of base parameters.
 pub(super) fn inverse_dynamics(derivation: &Derivation, scope: &NameScope) -> TokenStream {
     let program = &derivation.programs.inverse_dynamics;
     let drives = derivation.mechanism.drives.iter();
@@ -155,7 +161,7 @@ pub(super) fn inverse_dynamics(derivation: &Derivation, scope: &NameScope) -> To
     }
 }
 
-/// Whether the passive coordinates are found by Newton's method.
+/// Whether the passive coordinates are solved for by Newton's method.
 pub(super) fn is_newton(derivation: &Derivation) -> bool {
     matches!(
         derivation.programs.passive_position,

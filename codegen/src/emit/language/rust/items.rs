@@ -18,7 +18,7 @@ use crate::expr::Atom;
 use crate::expr::coordinates_of;
 use crate::lower::{OperationCount, ProgramStage, StraightLineProgram};
 
-/// What the module says of itself.
+/// The documentation of the module: title, cautions, and the dependent columns of eq. (6).
 pub(super) fn module_doc(derivation: &Derivation) -> String {
     let mechanism = &derivation.mechanism;
     let mut doc = String::new();
@@ -46,14 +46,16 @@ pub(super) fn module_doc(derivation: &Derivation) -> String {
     doc
 }
 
+/// Operations per state of a program.
 pub(super) fn operation_count(program: &StraightLineProgram) -> OperationCount {
     program.count_operations(ProgramStage::State)
 }
 
-/// All items.
+/// All items of a module without its optional structs.
 pub(super) fn items(derivation: &Derivation, scope: &NameScope) -> TokenStream {
     let mechanism = &derivation.mechanism;
     let tables = tables(derivation);
+    // Names, default values and units of both records.
     let constants: Vec<_> = mechanism
         .constants
         .iter()
@@ -96,6 +98,7 @@ pub(super) fn items(derivation: &Derivation, scope: &NameScope) -> TokenStream {
     }
 }
 
+/// Constants with counts and names, and the table of base parameters.
 fn tables(derivation: &Derivation) -> TokenStream {
     let mechanism = &derivation.mechanism;
     let (active, passive) = derivation.coordinates();
@@ -106,6 +109,7 @@ fn tables(derivation: &Derivation) -> TokenStream {
     let n_drives = drives.len();
     let bases = derivation.base_parameters();
     let n_base = bases.len();
+    // The table passes the printer as text, one entry per line.
     let bases = bases.iter().map(|base| {
         let (name, retained, expression, unit) =
             (&base.name, &base.retained, &base.expression, &base.unit);
@@ -135,7 +139,8 @@ fn tables(derivation: &Derivation) -> TokenStream {
     }
 }
 
-/// A struct of named quantities and the table of their values, in one list.
+/// A struct of named quantities and the table of their values, as one macro call. Names that Rust does not allow keep
+/// their original name in the table.
 fn record_struct(name: &str, doc: &str, table: &str, fields: &[(&str, f64, &str)]) -> TokenStream {
     let mut text = format!("/// {doc}\n{name}, {table}:");
     for (field, value, unit) in fields {
@@ -151,6 +156,7 @@ fn record_struct(name: &str, doc: &str, table: &str, fields: &[(&str, f64, &str)
     quote! { ::modelmill_runtime::record! { #text } }
 }
 
+/// Types of states and motions, and the functions that list a state as inputs of programs.
 fn state(derivation: &Derivation) -> TokenStream {
     let mechanism = &derivation.mechanism;
     let (active, passive) = derivation.coordinates();
@@ -160,6 +166,7 @@ fn state(derivation: &Derivation) -> TokenStream {
     } else {
         quote! { ::modelmill_runtime::State<T, N_ACTIVE> }
     };
+    // Names of inputs, which messages about a NaN print.
     let name = |atom: Atom| match atom {
         Atom::Rate(i) => format!("{}_d", mechanism.coordinates[i].name),
         Atom::Acceleration(i) => format!("{}_dd", mechanism.coordinates[i].name),
@@ -167,6 +174,7 @@ fn state(derivation: &Derivation) -> TokenStream {
         Atom::Coordinate(i) => mechanism.coordinates[i].name.clone(),
         _ => String::new(),
     };
+    // The table of names and the function that lists the numbers have the same order.
     let inputs = inputs_of_state(derivation, false);
     let n_inputs = Literal::usize_unsuffixed(inputs.len());
     let names = inputs.into_iter().map(|atom| format!("{:?}", name(atom)));
@@ -183,6 +191,7 @@ fn state(derivation: &Derivation) -> TokenStream {
         .iter()
         .flat_map(|(field, n)| (0..*n).map(move |k| format!("state.{field}[{k}]")))
         .collect();
+    // Programs that read passive coordinates solved for by Newton's method have more inputs.
     let with_passive = is_newton(derivation).then(|| {
         let all = inputs_of_state(derivation, true);
         let n_all = Literal::usize_unsuffixed(all.len());
@@ -223,14 +232,14 @@ fn state(derivation: &Derivation) -> TokenStream {
     }
 }
 
-/// How large the loops of a `geometry` in scope are beside those of the file, for numbers `T`; nothing where no coordinate
-/// in them is a length.
+/// The scale of the loops of a `geometry` in scope relative to those of the file, as a number `T`. `None` if no
+/// coordinate in them is a length.
 pub(super) fn loop_scale(derivation: &Derivation, scope: &NameScope) -> Option<TokenStream> {
     let program = derivation.programs.scale.as_ref()?;
     Some(single_value(derivation, scope, program))
 }
 
-/// Nominal values of coordinates, lengths in loops as many times longer as `scale` says.
+/// Nominal values of coordinates; lengths in loops are multiplied by `scale`.
 pub(super) fn nominal_values<'a>(
     derivation: &'a Derivation,
     coordinates: &'a [usize],
@@ -248,7 +257,7 @@ pub(super) fn nominal_values<'a>(
     })
 }
 
-/// Base parameters as eq. (16) gives them, term by term.
+/// The function that computes base parameters from physical parameters, eq. (16), term by term.
 fn base_parameters(derivation: &Derivation, scope: &NameScope) -> TokenStream {
     let BaseParameterCode {
         sums,
@@ -257,7 +266,7 @@ fn base_parameters(derivation: &Derivation, scope: &NameScope) -> TokenStream {
         read,
     } = crate::emit::tree::base_parameters(derivation, scope);
     let n_base = values.len();
-    // An argument that nothing reads is called so.
+    // An argument that is not read gets an underscore, so that the compiler does not warn.
     let argument = |name: &str, is_its: fn(&Atom) -> bool| {
         let unread = if read.iter().any(is_its) { "" } else { "_" };
         let name = format_ident!("{unread}{name}");
@@ -270,8 +279,10 @@ fn base_parameters(derivation: &Derivation, scope: &NameScope) -> TokenStream {
     let names: Vec<_> = (0..n_base)
         .map(|k| field_identifier(scope.input_name(Atom::Base(k))))
         .collect();
+    // Long sums are broken after a term.
     let written = names.iter().zip(&values);
     let written = written.flat_map(|(name, value)| sum_lines(&format!("let {name} = "), value));
+    // Denominators are checked before anything is divided.
     let divisors = divisors.iter().map(|divisor| {
         let [value, size] = [&divisor.value, &divisor.size].map(|x| RustSyntax.operand_text(x));
         format!("divisor({:?}, {value}, {size})?;", divisor.text)
@@ -295,10 +306,11 @@ fn base_parameters(derivation: &Derivation, scope: &NameScope) -> TokenStream {
     }
 }
 
-/// A statement with a sum, term by term in as many lines as it needs.
+/// A statement that assigns a sum, with a line break before a term where it is too long.
 fn sum_lines(start: &str, value: &CodeExpression) -> Vec<String> {
     let mut terms = Vec::new();
     let mut rest = value;
+    // Terms are collected from the right, because sums are nested to the left.
     loop {
         let (before, operator, term) = match rest {
             CodeExpression::Add(a, b) => (a, "+", b),
@@ -309,6 +321,7 @@ fn sum_lines(start: &str, value: &CodeExpression) -> Vec<String> {
             }
         };
         let text = RustSyntax.expression_text(term);
+        // A sum on the right of an operator needs parentheses.
         let nested = matches!(**term, CodeExpression::Add(..) | CodeExpression::Sub(..));
         terms.push(if nested {
             format!("{operator} ({text})")

@@ -1,4 +1,5 @@
-//! Newton's method on loops that have no closed form: what the runtime asks of a model, and who calls it.
+//! Newton's method for loops that have no closed form: the traits of the runtime that a model implements, and the
+//! methods that call them.
 
 use proc_macro2::{Literal, TokenStream};
 use quote::quote;
@@ -9,20 +10,24 @@ use crate::Derivation;
 use crate::emit::tree::NameScope;
 use crate::programs::PassivePosition;
 
-/// What a model with such loops brings along.
+/// What a model with such loops has in addition.
 pub(super) struct NewtonItems<'a> {
+    /// Programs of residual and scales.
     pub(super) functions: Vec<ProgramMethod<'a>>,
+    /// Implementations of the runtime's traits.
     pub(super) items: TokenStream,
+    /// Fields, their initial values and methods of `Model`.
     pub(super) more: ExtraItems,
 }
 
-/// The model's loops and its passive coordinates, where there is no closed form.
+/// The items of a model whose loops have no closed form; `None` for all others.
 #[allow(clippy::too_many_lines, reason = "one text from top to bottom")]
 pub(super) fn newton<'a>(derivation: &'a Derivation, scope: &NameScope) -> Option<NewtonItems<'a>> {
     let PassivePosition::Newton(loops) = &derivation.programs.passive_position else {
         return None;
     };
     let (active, passive) = derivation.coordinates();
+    // Programs of a pose, which only the runtime calls.
     let function = |program, name, item| ProgramMethod {
         program,
         name,
@@ -37,6 +42,7 @@ pub(super) fn newton<'a>(derivation: &'a Derivation, scope: &NameScope) -> Optio
         function(&loops.residual, "gaps", "Gaps"),
         function(&loops.scales, "scales", "LoopScales"),
     ];
+    // Nominal lengths in loops are scaled with the geometry.
     let scale = loop_scale(derivation, scope);
     let of_self = scale.as_ref().map(|_| quote! { self.scale });
     let nominal_active = nominal_values(derivation, &active, of_self.as_ref());
@@ -49,6 +55,7 @@ pub(super) fn newton<'a>(derivation: &'a Derivation, scope: &NameScope) -> Optio
         }
     });
     let scale_init = scale.map(|scale| quote! { scale: #scale, });
+    // The entries of an array as expressions.
     let entries = |array: &str, n: usize| -> Vec<TokenStream> {
         let array = quote::format_ident!("{array}");
         (0..n)
@@ -58,9 +65,11 @@ pub(super) fn newton<'a>(derivation: &'a Derivation, scope: &NameScope) -> Optio
             })
             .collect()
     };
+    // A pose is one array: independent coordinates, then passive ones.
     let mut pose = entries("q", active.len());
     pose.extend(entries("passive", passive.len()));
     let n_pose = Literal::usize_unsuffixed(pose.len());
+    // The cost of a step, for the documentation of the method.
     let cost = format!(
         " Every step of Newton's method takes one evaluation of the loops ({}) and a linear system of {} unknowns.",
         operation_count(&loops.residual),
@@ -111,6 +120,7 @@ pub(super) fn newton<'a>(derivation: &'a Derivation, scope: &NameScope) -> Optio
             }
         }
     };
+    // Methods of the model that make the traits available without importing them.
     let methods = quote! {
         /// Passive coordinates of a pose, in the assembly mode of the nominal pose, followed from there; see
         /// [`Assembly::passive_position`].
@@ -144,6 +154,7 @@ pub(super) fn newton<'a>(derivation: &'a Derivation, scope: &NameScope) -> Optio
                 nominal: Result<[T; N_PASSIVE], PoseError>,
                 #scale_field
             },
+            // The solution at the nominal pose needs the other fields, so it is set at the end.
             inits: quote! { nominal: Err(PoseError::OutOfReach), #scale_init },
             finish: quote! { model.nominal = solve_passive(&model, &model.nominal_active(), &[#(#nominal_passive),*]); },
             methods,

@@ -1,4 +1,4 @@
-//! What joints transmit, as a struct of its own.
+//! The struct `Reactions` of an emitted module: forces and moments that joints and loops transmit.
 
 use proc_macro2::{Literal, TokenStream};
 use quote::quote;
@@ -11,13 +11,14 @@ use super::program::{
 use crate::emit::tree::NameScope;
 use crate::{Derivation, ReactionPrograms};
 
-/// The struct `Reactions` with its tables.
+/// The struct `Reactions`, its result type and its tables of joints and loops.
 pub(super) fn reactions(
     derivation: &Derivation,
     scope: &NameScope,
     reactions: &ReactionPrograms,
 ) -> TokenStream {
     let program = &reactions.program;
+    // Components of a vector; those that are not determined are `None`.
     let three = |places: &[Option<usize>; 3]| {
         let components = places.iter().map(|place| match place {
             Some(k) => {
@@ -34,6 +35,7 @@ pub(super) fn reactions(
     });
     let loops = reactions.loops.iter().map(|closed| three(&closed.force));
     let made = quote! { ReactionForces { joints: [#(#joints),*], loops: [#(#loops),*] } };
+    // The program returns one array, which the method sorts into joints and loops.
     let n_outputs = Literal::usize_unsuffixed(program.outputs.len());
     let function = ProgramMethod {
         program,
@@ -92,6 +94,7 @@ pub(super) fn reactions(
 fn names(reactions: &ReactionPrograms) -> Vec<String> {
     let mut names = vec![String::new(); reactions.program.outputs.len()];
     let mut name = |letter: &str, of: &str, places: &[Option<usize>; 3]| {
+        // Names of joints may have characters that a variable cannot have.
         let of = of.replace(|c: char| !c.is_ascii_alphanumeric(), "_");
         for (place, axis) in places.iter().zip(["x", "y", "z"]) {
             if let Some(name) = place.and_then(|k| names.get_mut(k)) {
@@ -109,6 +112,7 @@ fn names(reactions: &ReactionPrograms) -> Vec<String> {
     names
 }
 
+/// Constants of the module: names, coordinates and axes of joints and loops.
 fn tables(reactions: &ReactionPrograms) -> TokenStream {
     let n_joints = Literal::usize_unsuffixed(reactions.joints.len());
     let n_loops = Literal::usize_unsuffixed(reactions.loops.len());

@@ -1,4 +1,4 @@
-//! A test of the base parameters that goes with the module.
+//! The function `self_test` of an emitted module, which compares base parameters with all parameters at random states.
 
 use proc_macro2::{Literal, TokenStream};
 use quote::quote;
@@ -12,7 +12,7 @@ use crate::derive::self_test::self_test_reach;
 use crate::emit::identifier::field_identifier;
 use crate::emit::tree::{NameScope, uses_load};
 
-/// The function `self_test`, and the regressor of all products that it needs.
+/// The function `self_test`, and the struct with the regressor H for all products.
 #[allow(clippy::too_many_lines, reason = "one text from top to bottom")]
 pub(super) fn self_test(derivation: &Derivation, scope: &NameScope) -> TokenStream {
     let mechanism = &derivation.mechanism;
@@ -48,6 +48,7 @@ pub(super) fn self_test(derivation: &Derivation, scope: &NameScope) -> TokenStre
         .iter()
         .map(|p| field_identifier(&p.name))
         .collect();
+    // Values of the products p_g.
     let values = products.iter().map(|product| {
         let powers = product.0.iter();
         let factors = powers.flat_map(|(p, n)| {
@@ -57,6 +58,7 @@ pub(super) fn self_test(derivation: &Derivation, scope: &NameScope) -> TokenStre
         quote! { 1.0 #(#factors)* }
     });
     let (active, _) = derivation.coordinates();
+    // Lengths are scaled with the geometry, so that the states stay near the nominal pose of a larger machine.
     let scale = loop_scale(derivation, scope);
     let scaled = scale.as_ref().map(|_| quote! { scale });
     let nominal = nominal_values(derivation, &active, scaled.as_ref());
@@ -73,7 +75,7 @@ pub(super) fn self_test(derivation: &Derivation, scope: &NameScope) -> TokenStre
             );
             quote! { #scaled #reach }
         });
-    // Slides of a small machine are slow, so that no column is lost beside others.
+    // Rates of lengths are scaled too, so that the columns of a small machine keep comparable sizes.
     let units = active.iter().map(|i| {
         let scale = scaled
             .as_ref()
@@ -81,6 +83,7 @@ pub(super) fn self_test(derivation: &Derivation, scope: &NameScope) -> TokenStre
         scale.cloned().unwrap_or_else(|| quote! { 1.0 })
     });
     let scale = scale.map(|scale| quote! { let scale = #scale; });
+    // Random loads if an effect depends on them.
     let load = uses_load(derivation)
         .then(|| quote! { load: ::core::array::from_fn(|_| random.uniform(-50.0, 50.0)), });
     quote! {

@@ -1,7 +1,7 @@
-//! Statements and expressions as text of Rust, and how that text gets through the printer of tokens.
+//! Statements and expressions as lines of Rust, and how these lines pass through the token printer.
 //!
-//! The printer knows no comments and breaks formulas early. So a line of a program travels through it as a text that
-//! stands by itself, and becomes what it says afterwards.
+//! The token printer drops comments and breaks formulas early. Therefore each line of a program travels through it as a
+//! string literal, which is replaced by its text afterwards.
 
 use proc_macro2::{Literal, TokenStream};
 use quote::quote;
@@ -11,13 +11,13 @@ use crate::emit::language::syntax::LanguageSyntax;
 use crate::emit::tree::{CodeStatement, PoseCheck};
 use crate::expr::Unary;
 
-/// What a line of a program begins with on its way.
+/// First character of a string literal that stands for a line of source.
 const LINE: char = '\u{a7}';
 
-/// How wide a line of a list may be, less the indentation of a program.
+/// Maximal width of a line in a list, without the indentation of the program.
 const WIDTH: usize = 88;
 
-/// The syntax of Rust, with `n` for the arithmetic in scope.
+/// The syntax of Rust; `n`, the arithmetic of the runtime, must be in scope.
 pub(super) struct RustSyntax;
 
 impl LanguageSyntax for RustSyntax {
@@ -51,7 +51,7 @@ impl LanguageSyntax for RustSyntax {
     }
 }
 
-/// Statements as tokens that become lines.
+/// Statements as tokens that [`restore_lines`] turns into lines.
 pub(super) fn statements(statements: &[CodeStatement]) -> TokenStream {
     let mut written = Vec::new();
     for statement in statements {
@@ -60,13 +60,13 @@ pub(super) fn statements(statements: &[CodeStatement]) -> TokenStream {
     line_tokens(&written)
 }
 
-/// Lines as tokens.
+/// Lines of source as string literals.
 pub(super) fn line_tokens(written: &[String]) -> TokenStream {
     let texts = written.iter().map(|line| format!("{LINE}{line}"));
     quote! { #(#texts;)* }
 }
 
-/// Items of a list between its begin and its end, in as many lines as they need.
+/// The items of a list between `start` and `end`, filled into lines.
 pub(super) fn fill_lines(
     start: &str,
     items: impl Iterator<Item = String>,
@@ -92,29 +92,30 @@ pub(super) fn fill_lines(
     lines
 }
 
-/// An item of a list as tokens that become what it says.
+/// Source of an expression as a string literal that [`restore_lines`] replaces.
 pub(super) fn verbatim_tokens(text: &str) -> TokenStream {
     let text = format!("{LINE}{text}");
     quote! { #text }
 }
 
-/// Printed source with its lines in place.
+/// The printed source with all literals of lines replaced by their text.
 pub(super) fn restore_lines(source: &str) -> String {
     let start = format!("\"{LINE}");
     let mut text = String::with_capacity(source.len());
     for line in source.lines() {
         let mut rest = line;
+        // Each literal that begins with the marker is unescaped and written without quotes.
         while let Some(at) = rest.find(&start) {
             text.push_str(&rest[..at]);
             let literal = &rest[at..at + literal_length(&rest[at..])];
             rest = &rest[at + literal.len()..];
             let value = syn::parse_str::<syn::LitStr>(literal).map(|literal| literal.value());
             let value = value.unwrap_or_default();
-            // Several lines begin where the first one does.
+            // Further lines of a text get the indentation of the first one.
             let indent = &line[..line.len() - line.trim_start().len()];
             let value = value.trim_start_matches(LINE);
             text.push_str(&value.replace('\n', &format!("\n{indent}")));
-            // A statement brings its own end.
+            // A statement has its own semicolon.
             if rest == ";" {
                 rest = "";
             }
@@ -125,7 +126,7 @@ pub(super) fn restore_lines(source: &str) -> String {
     text
 }
 
-/// Length of the text literal that something starts with.
+/// Length in bytes of the string literal at the start of the text.
 fn literal_length(text: &str) -> usize {
     let mut escaped = false;
     for (at, c) in text.char_indices().skip(1) {
@@ -138,6 +139,7 @@ fn literal_length(text: &str) -> usize {
     text.len()
 }
 
+/// Appends a statement as lines, indented by `depth` levels.
 fn write(statement: &CodeStatement, depth: usize, lines: &mut Vec<String>) {
     let indent = "    ".repeat(depth);
     let mut line = |text: String| lines.push(format!("{indent}{text}"));
@@ -153,6 +155,7 @@ fn write(statement: &CodeStatement, depth: usize, lines: &mut Vec<String>) {
                 RustSyntax.operand_text(value)
             ));
         }
+        // Sines and cosines of all angles of a program are computed together, in vectors.
         CodeStatement::Angles(angles) => {
             let values = angles.iter().map(|angle| {
                 let value = RustSyntax.operand_text(&angle.value);
@@ -163,7 +166,7 @@ fn write(statement: &CodeStatement, depth: usize, lines: &mut Vec<String>) {
                 }
             });
             let mut values: Vec<String> = values.collect();
-            // The compiler makes pairs only of a number of angles that is even.
+            // The compiler pairs the lanes only if the number of angles is even, so the last one is repeated.
             if values.len() % 2 == 1 {
                 values.extend(values.last().cloned());
             }
@@ -204,6 +207,7 @@ fn write(statement: &CodeStatement, depth: usize, lines: &mut Vec<String>) {
                 RustSyntax.operand_text(value)
             ));
         }
+        // A block, which returns the values that later statements read.
         CodeStatement::Group {
             statements,
             exported: handed,
@@ -228,7 +232,7 @@ fn write(statement: &CodeStatement, depth: usize, lines: &mut Vec<String>) {
     }
 }
 
-/// A number without a suffix.
+/// A number as an unsuffixed literal with its sign.
 pub(super) fn number_token(value: f64) -> TokenStream {
     let magnitude = Literal::f64_unsuffixed(value.abs());
     if value.is_sign_negative() {
