@@ -12,26 +12,26 @@ use crate::emit::language::{EmissionRequest, EmittedFile};
 
 /// Status codes in the order of their values: name in the header after the prefix, and meaning.
 pub(super) const STATUS: [(&str, &str); 9] = [
-    ("OK", "all is well"),
+    ("OK", "no error"),
     (
         "OUT_OF_REACH",
         "the loops cannot close: the pose is out of reach",
     ),
     ("SINGULAR", "the pose is singular"),
-    ("UNDEFINED", "a term of the model has no finite value there"),
     (
-        "NOT_FINITE",
-        "an input is no number, or too large to compute with",
+        "UNDEFINED",
+        "a term of the model has no finite value at this state",
     ),
+    ("NOT_FINITE", "an input is NaN, infinite, or above 1e60"),
     (
         "NOT_PREPARED",
-        "the structure was not filled by the function that prepares it",
+        "the structure was not filled by the function `prepare`",
     ),
     ("NULL_POINTER", "an argument is a null pointer"),
     ("LENGTH", "arrays of different lengths"),
     (
         "SPECIAL",
-        "base parameters divide by what vanishes for this geometry",
+        "a denominator of the base parameters is zero for this geometry",
     ),
 ];
 
@@ -39,8 +39,8 @@ pub(super) const STATUS: [(&str, &str); 9] = [
 /// that name next to the manifest.
 pub(in crate::emit) fn emit_c(from: &EmissionRequest<'_>) -> Vec<EmittedFile> {
     let face = LanguageBinding::new(from, &RESERVED);
-    let doc = "The model for C: see the header in `include`. All `unsafe` code is here, and all of it reads and writes what the \
-               caller's pointers point to.";
+    let doc = "The model for C: see the header in `include`. All `unsafe` code is here. It only reads and writes the memory that \
+               the caller's pointers point to.";
     vec![
         manifest(&face),
         source_file("src/lib.rs", doc, &items(&face)),
@@ -250,7 +250,7 @@ fn items(face: &LanguageBinding<'_>) -> TokenStream {
     });
     quote! {
         #![cfg_attr(not(feature = "std"), no_std)]
-        #![allow(non_camel_case_types, clippy::missing_safety_doc, reason = "the header says what pointers must point to")]
+        #![allow(non_camel_case_types, clippy::missing_safety_doc, reason = "the header states what pointers must point to")]
 
         pub mod model;
 
@@ -259,10 +259,10 @@ fn items(face: &LanguageBinding<'_>) -> TokenStream {
 
         #(#status_constants)*
 
-        /// What a prepared structure begins with.
+        /// First word of a prepared structure.
         const READY: u64 = 0x6d6f_6465_6c6d_696c;
 
-        /// Room for a prepared model, as the header declares it.
+        /// Memory for a prepared model, as the header declares it.
         #[repr(C)]
         pub struct #dynamics {
             ready: u64,
@@ -299,7 +299,7 @@ fn items(face: &LanguageBinding<'_>) -> TokenStream {
         }
 
         unsafe fn array<'a, const N: usize>(from: *const f64) -> Option<&'a [f64; N]> {
-            // Of nothing nothing is read, whatever the pointer is.
+            // Nothing is read of an array of length zero, so any pointer is allowed for it.
             let from = if N == 0 { core::ptr::NonNull::<[f64; N]>::dangling().as_ptr().cast_const() } else { from.cast() };
             unsafe { from.as_ref() }
         }
@@ -401,7 +401,7 @@ fn items(face: &LanguageBinding<'_>) -> TokenStream {
         #forces_many
         #regressor_many
 
-        /// Without the standard library somebody has to say what a panic does. None of the code above can.
+        /// Without the standard library a panic handler is required. None of the code above can panic.
         #[cfg(not(feature = "std"))]
         #[panic_handler]
         fn panic(_: &core::panic::PanicInfo<'_>) -> ! {

@@ -35,7 +35,7 @@ pub(super) fn header(face: &LanguageBinding<'_>) -> String {
  *
  * Inverse dynamics tau = H_min(q, q', q'') p_min, written by modelmill; do not edit.
  *
- * Prepare once, then call; nothing allocates, locks or throws, and all of it is reentrant:
+ * Prepare once, then call. No function allocates, locks or throws; all functions are reentrant:
  *
  *     double geometry[{}], parameters[{}], base[{}];
  *     {name}_dynamics dynamics;
@@ -44,8 +44,8 @@ pub(super) fn header(face: &LanguageBinding<'_>) -> String {
  *     {name}_base_parameters(geometry, parameters, base);
  *     {name}_prepare(&dynamics, geometry, base);
  *
- * SI units. Pointers must be aligned and point to as many numbers as the declaration says; arrays that are read and
- * written must not overlap. Functions return a status; results are only written when it is OK. */
+ * SI units. Pointers must be aligned and point to as many numbers as the declaration states. Arrays that are read must not
+ * overlap arrays that are written. Functions return a status; results are written only if it is OK. */
 #ifndef {upper}_H
 #define {upper}_H
 
@@ -61,7 +61,7 @@ pub(super) fn header(face: &LanguageBinding<'_>) -> String {
     for count in [active, passive, drives, base, constants, parameters] {
         _ = writeln!(text, "#define {upper}_N_{} {}", count.name, count.n);
     }
-    text.push_str("\n/* What functions return. */\n");
+    text.push_str("\n/* Status codes. */\n");
     for (k, (status, meaning)) in STATUS.iter().enumerate() {
         _ = writeln!(text, "#define {upper}_{status} {k} /* {meaning} */");
     }
@@ -112,7 +112,7 @@ pub(super) fn header(face: &LanguageBinding<'_>) -> String {
 extern \"C\" {{
 #endif
 
-/* A prepared model. Its content is its own. */
+/* A prepared model. Do not read or change its fields. */
 typedef struct {name}_dynamics {{
   uint64_t ready;
   uint64_t room[{}];
@@ -122,10 +122,10 @@ typedef struct {name}_dynamics {{
 int32_t {name}_default_geometry(double {});
 int32_t {name}_nominal_parameters(double {});
 
-/* Base parameters of physical ones. */
+/* Base parameters from physical parameters. */
 int32_t {name}_base_parameters(const double *geometry, const double *parameters, double {base});
 
-/* Computes what depends on geometry and base parameters alone. */
+/* Computes what depends only on geometry and base parameters. */
 int32_t {name}_prepare({name}_dynamics *dynamics, const double *geometry, const double {base});",
         storage_words(face),
         array("geometry", &constants),
@@ -135,8 +135,8 @@ int32_t {name}_prepare({name}_dynamics *dynamics, const double *geometry, const 
     let functions = wrapped_functions(face);
     if functions.iter().any(|one| one.follows) {
         text.push_str(
-            "\n/* Passive coordinates are followed from the nominal pose to that of a state. Functions that end in `_near` take those
- * of a pose near by, such as the last cycle's, which is faster; they become those of this state. */\n",
+            "\n/* Passive coordinates are followed from the nominal pose to the pose of a state. Functions that end in `_near` start
+ * from those of a nearby pose, such as the last cycle's, which is faster; they are replaced by those of this state. */\n",
         );
     }
     for one in &functions {
@@ -152,7 +152,7 @@ int32_t {name}_prepare({name}_dynamics *dynamics, const double *geometry, const 
         }
     }
     if face.newton {
-        text.push_str("\n/* Passive coordinates of a pose; or from those of a pose near by, which they replace. */\n");
+        text.push_str("\n/* Passive coordinates of a pose; `_near`: from those of a nearby pose, which are replaced. */\n");
         for suffix in ["", "_near"] {
             _ = writeln!(
                 text,
@@ -172,9 +172,9 @@ int32_t {name}_prepare({name}_dynamics *dynamics, const double *geometry, const 
     _ = writeln!(
         text,
         "
-/* Forces and H_min for n states at once, in the widest vectors of the machine. Number i of coordinate k stands at
- * k * n + i, and so do results (the regressor's entries row by row). Where a state has no answer, its number goes to
- * `failed`, which may be NULL, and all results before it are in place. */
+/* Forces and H_min for n states at once, in the widest vectors of the machine. Coordinate k of state i has the index
+ * k * n + i; results are stored alike (the regressor's entries row by row). If a state has no solution, its number is
+ * written to `failed`, which may be NULL, and all results before it are valid. */
 int32_t {name}_inverse_dynamics_many(const {name}_dynamics *dynamics, size_t n, {states}double *forces, size_t *failed);
 int32_t {name}_regressor_many(const {name}_dynamics *dynamics, size_t n, {states}double *regressor, size_t *failed);
 

@@ -26,7 +26,7 @@ pub(in crate::emit) fn emit_python(from: &EmissionRequest<'_>) -> Vec<EmittedFil
     // A package name may not begin with an underscore.
     let package = name.trim_start_matches('_');
     let cargo = format!(
-        "# Written by modelmill. `maturin build --release` makes a wheel of it; without maturin, `cargo build --release` makes
+        "# Written by modelmill. `maturin build --release` builds a wheel; without maturin, `cargo build --release` builds
 # target/release/lib{name}.so, which Python imports under the name {name}.so.
 [package]
 name = \"model-{package}\"
@@ -80,10 +80,10 @@ fn items(face: &LanguageBinding<'_>) -> TokenStream {
     let mechanism = &face.derivation.mechanism;
     // The documentation of the module, which `help` prints.
     let title = format!(
-        "{}.\n\nInverse dynamics tau = H_min(q, q', q'') p_min. Arrays of one state have one number per coordinate; arrays \
-         of n states have shape (coordinates, n) and are read as they lie in memory, and so are results: forces (drives, n), \
-         regressor (drives, base parameters, n). SI units.\n\nArrays of other types or shapes, numbers that are none and poses \
-         without an answer raise ValueError, with the number of the state; names that the model has not, KeyError.",
+        "{}.\n\nInverse dynamics tau = H_min(q, q', q'') p_min. Arrays of one state have one number per coordinate. \
+         Arrays of n states have shape (coordinates, n), contiguous in memory; so have results: forces (drives, n), regressor \
+         (drives, base parameters, n). SI units.\n\nArrays of another type or shape, NaN and poses without a solution raise \
+         ValueError with the number of the state. Unknown names raise KeyError.",
         modelmill_boundary::text::comment(mechanism.title.as_deref().unwrap_or(&mechanism.name))
     );
     let title = doc_lines(&title, false);
@@ -115,13 +115,12 @@ fn items(face: &LanguageBinding<'_>) -> TokenStream {
         .map(|one| single_state_function(face, one))
         .collect();
     // Documentation of the three functions that are written out.
-    let doc_forces = "Forces of the drives, N or N m, for base parameters `p`. `parallel` uses all cores; `geometry` names known \
-                      quantities that differ from the model file's.";
+    let doc_forces = "Forces of the drives, N or N m, for base parameters `p`. `parallel` uses all cores; `geometry` has the \
+                      known quantities that differ from the model file, by name.";
     let doc_regressor = "H_min: one row per drive, one column per base parameter. `parallel` and `geometry` as in `inverse_dynamics`.";
-    let doc_base =
-        "Base parameters of physical ones; those that are not named are the model file's.";
+    let doc_base = "Base parameters from physical parameters; those that are not named have the model file's values.";
     quote! {
-        #![allow(clippy::needless_pass_by_value, reason = "pyo3 hands arguments over")]
+        #![allow(clippy::needless_pass_by_value, reason = "pyo3 passes arguments by value")]
 
         pub mod model;
 
@@ -142,7 +141,7 @@ fn items(face: &LanguageBinding<'_>) -> TokenStream {
             for (name, value) in by.unwrap_or_default() {
                 let place = names.iter().position(|n| *n == name);
                 let place = place.and_then(|k| values.get_mut(k)).ok_or_else(|| {
-                    PyKeyError::new_err(format!("no `{name}`; there are {}", names.join(", ")))
+                    PyKeyError::new_err(format!("the model has no `{name}`; it has {}", names.join(", ")))
                 })?;
                 *place = value;
             }
@@ -162,7 +161,7 @@ fn items(face: &LanguageBinding<'_>) -> TokenStream {
             value_error(error.to_string())
         }
 
-        /// How many states arrays hold, and whether results have an axis for them.
+        /// Number of states in the arrays, and whether results have an axis for them.
         struct BatchShape {
             n: usize,
             axis: bool,
@@ -199,10 +198,10 @@ fn items(face: &LanguageBinding<'_>) -> TokenStream {
         }
 
         fn slice<'a>(array: &'a PyReadonlyArrayDyn<'_, f64>, name: &str) -> PyResult<&'a [f64]> {
-            // `as_slice` alone would also take an array that lies column by column, and read it wrongly.
+            // `as_slice` alone would also accept a column-major array, and read it in the wrong order.
             let rows = array.is_c_contiguous().then(|| array.as_slice().ok()).flatten();
             rows.ok_or_else(|| {
-                value_error(format!("{name} does not lie row by row in memory: pass numpy.ascontiguousarray({name})"))
+                value_error(format!("{name} is not row-major in memory: pass numpy.ascontiguousarray({name})"))
             })
         }
 
@@ -213,7 +212,7 @@ fn items(face: &LanguageBinding<'_>) -> TokenStream {
         fn base_of(p: &PyReadonlyArray1<'_, f64>) -> PyResult<[f64; #n_base]> {
             let p = p.as_array();
             if p.len() != #n_base {
-                return Err(value_error(format!("p has {} numbers; there are {} base parameters", p.len(), #n_base)));
+                return Err(value_error(format!("p has {} numbers; the model has {} base parameters", p.len(), #n_base)));
             }
             Ok(std::array::from_fn(|k| p[k]))
         }
@@ -264,7 +263,7 @@ fn items(face: &LanguageBinding<'_>) -> TokenStream {
             Ok(regressor)
         }
 
-        /// Results of one state after the other, entry by entry, without Python's lock.
+        /// Results state by state, stored entry by entry, with Python's lock released.
         fn compute_results(
             py: Python<'_>, many: &BatchShape, entries: usize, at: impl Fn(usize) -> Result<Vec<f64>, PoseError> + Sync,
         ) -> PyResult<Vec<f64>> {
@@ -418,7 +417,7 @@ fn single_state_function(face: &LanguageBinding<'_>, one: &WrappedFunction) -> T
     });
     let shapes = shapes.collect::<Vec<String>>().join(", ");
     let doc = format!(
-        "{}; of n states {shapes}. `geometry` as in `inverse_dynamics`.",
+        "{}; shape for n states {shapes}. `geometry` as in `inverse_dynamics`.",
         one.doc
     );
     quote! {

@@ -8,20 +8,20 @@ use crate::emit::language::syntax::LanguageSyntax;
 
 /// Status codes in the order of their values: name after the prefix, and meaning.
 const STATUS: [(&str, &str); 6] = [
-    ("OK", "all is well"),
+    ("OK", "no error"),
     (
         "OUT_OF_REACH",
         "the loops cannot close: the pose is out of reach",
     ),
     ("SINGULAR", "the pose is singular"),
-    ("UNDEFINED", "a term of the model has no finite value there"),
     (
-        "NOT_FINITE",
-        "an input is no number, or too large to compute with",
+        "UNDEFINED",
+        "a term of the model has no finite value at this state",
     ),
+    ("NOT_FINITE", "an input is NaN, infinite, or above 1e60"),
     (
         "SPECIAL",
-        "base parameters divide by what vanishes for this geometry",
+        "a denominator of the base parameters is zero for this geometry",
     ),
 ];
 
@@ -40,7 +40,7 @@ pub(super) fn header(unit: &TranslationUnit<'_>) -> String {
  *
  * Inverse dynamics tau = H_min(q, q', q'') p_min, written by modelmill; do not edit.
  *
- * Prepare once, then call; nothing allocates or locks, and all of it is reentrant:
+ * Prepare once, then call. No function allocates or locks; all functions are reentrant:
  *
  *     {name}_geometry geometry;
  *     {name}_parameters parameters;
@@ -52,8 +52,8 @@ pub(super) fn header(unit: &TranslationUnit<'_>) -> String {
  *     {name}_prepare(&dynamics, &geometry, base);
  *     status = {name}_inverse_dynamics(&dynamics, {}, forces);
  *
- * SI units. Arrays have as many numbers as coordinates (q, qd, qdd) or drives (forces, load); functions return a status, and
- * write results only when it is OK. Links with the library of mathematics (-lm). */
+ * SI units. Arrays have as many numbers as coordinates (q, qd, qdd) or drives (forces, load). Functions return a status and
+ * write results only if it is OK. Link with the math library (-lm). */
 #ifndef {upper}_H
 #define {upper}_H
 
@@ -73,7 +73,7 @@ extern \"C\" {{
     ] {
         _ = writeln!(text, "#define {upper}_N_{what} {n}");
     }
-    text.push_str("\n/* What functions return. */\n");
+    text.push_str("\n/* Status codes. */\n");
     for (k, (status, meaning)) in STATUS.iter().enumerate() {
         _ = writeln!(text, "#define {upper}_{status} {k} /* {meaning} */");
     }
@@ -151,7 +151,7 @@ extern \"C\" {{
     );
     _ = writeln!(
         text,
-        "\n/* A prepared model: what depends on geometry and base parameters alone. */\ntypedef struct {{\n    int input;\n    \
+        "\n/* A prepared model: values that depend only on geometry and base parameters. */\ntypedef struct {{\n    int input;\n    \
          {name}_geometry geometry;\n    double base[{}];\n    double once[{}];",
         unit.n_base().max(1),
         unit.once.kept.len().max(1)
@@ -171,17 +171,18 @@ extern \"C\" {{
 void {name}_default_geometry({name}_geometry *geometry);
 void {name}_nominal_parameters({name}_parameters *parameters);
 
-/* Base parameters of physical ones, eq. (16). */
+/* Base parameters from physical parameters, eq. (16). */
 int {name}_base_parameters(const {name}_geometry *geometry, const {name}_parameters *parameters, double *base);
 
-/* Computes what depends on geometry and base parameters alone; says what is wrong with them, as all functions then do. */
+/* Computes what depends only on geometry and base parameters. If they are invalid, this and all other functions return the
+ * status. */
 int {name}_prepare({name}_dynamics *dynamics, const {name}_geometry *geometry, const double *base);"
     );
     if unit.newton {
         _ = writeln!(
             text,
             "
-/* Passive coordinates of a pose, followed from the nominal pose; or from those of a pose near by, which they replace. */
+/* Passive coordinates of a pose, followed from the nominal pose; `_near`: from those of a nearby pose, which are replaced. */
 int {name}_passive_position(const {name}_dynamics *dynamics, const double *q, double *passive);
 int {name}_passive_position_near(const {name}_dynamics *dynamics, const double *q, double *passive);"
         );
@@ -196,7 +197,7 @@ int {name}_passive_position_near(const {name}_dynamics *dynamics, const double *
         );
         _ = writeln!(text, "{};", signature(unit, function, "dynamics", false));
         if function.follows {
-            text.push_str("/* The same from the passive coordinates of a pose near by, which become those of this state. */\n");
+            text.push_str("/* The same, starting from the passive coordinates of a nearby pose, which are replaced by those of this state. */\n");
             _ = writeln!(text, "{};", signature(unit, function, "dynamics", true));
         }
     }
@@ -208,14 +209,14 @@ int {name}_passive_position_near(const {name}_dynamics *dynamics, const double *
         }
         _ = writeln!(
             text,
-            "\n/* Forward dynamics: accelerations under given forces of the drives; those of the state are not read. */\n{};",
+            "\n/* Forward dynamics: accelerations under given forces of the drives. Accelerations of the state are not read. */\n{};",
             forward_dynamics_declaration(unit)
         );
     }
     // The outputs of the reactions are listed, because some components may be missing.
     if let (Some((function, once)), Some(reactions)) = (&unit.reactions, unit.source.reactions) {
         text.push_str(
-            "\n/* What the joints transmit to the side away from the base: in order, with what is not determined left out.\n",
+            "\n/* Forces and moments that the joints transmit to the side away from the base, in order; undetermined components are left out.\n",
         );
         for (k, of) in source_names(reactions).iter().enumerate() {
             _ = writeln!(text, " * {k}: {}", comment(of));
@@ -244,9 +245,10 @@ int {name}_prepare_reactions({name}_reactions *reactions, const {name}_geometry 
         _ = writeln!(
             text,
             "
-/* Holds the base parameters against all parameters at random states around the nominal pose: 0 if H and H_min have rank
- * {upper}_N_BASE and H p = H_min p_min; 1 if too few states have an answer; 2 for the rank of H_min; 3 for that of H; 4 if
- * H_min p_min differs; 5 if the inverse dynamics differ; 6 if base parameters divide by what vanishes for this geometry. */
+/* Compares the base parameters with all parameters at random states around the nominal pose. Returns 0 if H and H_min have
+ * rank {upper}_N_BASE and H p = H_min p_min; 1 if too few states have a solution; 2 if the rank of H_min is wrong; 3 if that of
+ * H is wrong; 4 if H_min p_min differs from H p; 5 if the inverse dynamics differ from H p; 6 if a denominator of the base
+ * parameters is zero for this geometry. */
 int {name}_self_test(const {name}_geometry *geometry);"
         );
     }

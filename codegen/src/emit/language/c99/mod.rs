@@ -193,30 +193,38 @@ impl<'a> TranslationUnit<'a> {
         if let Some(dynamics) = source.dynamics {
             let accelerations = "accelerations are not read";
             for (program, name, doc, result) in [
-                (&dynamics.mass_matrix, "mass_matrix", format!("M row by row; {accelerations}"), "matrix"),
+                (
+                    &dynamics.mass_matrix,
+                    "mass_matrix",
+                    format!("M row by row; {accelerations}"),
+                    "matrix",
+                ),
                 (
                     &dynamics.coriolis,
                     "coriolis",
-                    format!("c, generalised forces that rates alone ask for; {accelerations}"),
+                    format!("c, generalised forces that depend on the rates; {accelerations}"),
                     "forces",
                 ),
                 (
                     &dynamics.gravity,
                     "gravity",
-                    "g, generalised forces that weight alone asks for; rates and accelerations are not read".to_owned(),
+                    "g, generalised forces of gravity; rates and accelerations are not read"
+                        .to_owned(),
                     "forces",
                 ),
                 (
                     &dynamics.effects,
                     "effects",
-                    format!("e, generalised forces of effects where nothing accelerates; {accelerations}"),
+                    format!(
+                        "e, generalised forces of the effects at zero acceleration; {accelerations}"
+                    ),
                     "forces",
                 ),
                 (
                     &dynamics.bias,
                     "bias_and_drives",
                     format!(
-                        "c + g + e, at a lower cost than one by one, then the Jacobian of the drives row by row; {accelerations}"
+                        "c + g + e, at a lower cost than the three separately, then the Jacobian of the drives row by row; {accelerations}"
                     ),
                     "bias",
                 ),
@@ -246,7 +254,7 @@ impl<'a> TranslationUnit<'a> {
             alone(function(
                 &reactions.program,
                 "transmitted",
-                "Forces and moments in the joints, and forces that close loops".to_owned(),
+                "Forces and moments in the joints, and forces in the closures of loops".to_owned(),
                 "wrenches",
                 Vec::new(),
             ))

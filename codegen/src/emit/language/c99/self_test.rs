@@ -196,7 +196,7 @@ typedef struct {{
                     reduced += h_min[d * {upper}_N_BASE + i] * base[i];
                     size += fabs(h_min[d * {upper}_N_BASE + i] * base[i]);
                 }}
-                /* What is no number is wrong too. */
+                /* NaN is an error too: every comparison with it is false. */
                 if (worst == 0 && !(fabs(reduced - expected) <= NOTHING * size))
                     worst = 4;
                 if (worst == 0 && !(fabs(forces[d] - expected) <= NOTHING * size))

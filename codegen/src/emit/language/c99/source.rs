@@ -155,7 +155,7 @@ fn write_base_parameters(unit: &TranslationUnit<'_>, text: &mut String) {
     // A denominator that is zero at this geometry is reported by its text.
     for divisor in &divisors {
         lines.push(format!(
-            "if (!(fabs({}) > SINGULAR_SHARE * {})) return {}_SPECIAL; /* {} vanishes */",
+            "if (!(fabs({}) > SINGULAR_SHARE * {})) return {}_SPECIAL; /* {} is zero */",
             c.operand_text(&divisor.value),
             c.grouped_text(&divisor.size),
             unit.upper,

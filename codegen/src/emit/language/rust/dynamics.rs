@@ -45,7 +45,7 @@ pub(super) fn dynamics(
         (
             ["mass_matrix", "MassMatrix"],
             &dynamics.mass_matrix,
-            "M, by rows: generalised force per acceleration of the independent coordinates. Accelerations of the state are \
+            "M, row by row: generalised force per acceleration of the independent coordinates. Accelerations of the state are \
              not read.",
             entries.collect(),
             quote! { [[T; N_ACTIVE]; N_ACTIVE] },
@@ -53,7 +53,7 @@ pub(super) fn dynamics(
         (
             ["coriolis", "Coriolis"],
             &dynamics.coriolis,
-            "c: generalised forces that rates alone ask for, centrifugal and Coriolis. Accelerations of the state are not \
+            "c: generalised forces that depend on the rates, centrifugal and Coriolis. Accelerations of the state are not \
              read.",
             of_each("c"),
             vector.clone(),
@@ -61,14 +61,14 @@ pub(super) fn dynamics(
         (
             ["gravity", "Gravity"],
             &dynamics.gravity,
-            "g: generalised forces that weight alone asks for. Rates and accelerations of the state are not read.",
+            "g: generalised forces of gravity. Rates and accelerations of the state are not read.",
             of_each("g"),
             vector.clone(),
         ),
         (
             ["effects", "Effects"],
             &dynamics.effects,
-            "e: generalised forces that effects ask for where the independent coordinates do not accelerate, such as \
+            "e: generalised forces of the effects at zero acceleration of the independent coordinates, such as \
              friction and springs. Accelerations of the state are not read.",
             of_each("e"),
             vector.clone(),
@@ -76,7 +76,7 @@ pub(super) fn dynamics(
         (
             ["bias", "Bias"],
             &dynamics.bias,
-            "c + g + e, at a lower cost than one by one. Accelerations of the state are not read.",
+            "c + g + e, at a lower cost than the three separately. Accelerations of the state are not read.",
             with_jacobian,
             vector,
         ),
@@ -105,7 +105,7 @@ pub(super) fn dynamics(
             /// The equation of motion for one geometry and one set of base parameters,
             /// `J' f = M(q) q'' + c(q, q') + g(q) + e(q, q')` with the forces f of the drives and their Jacobian J.
         },
-        prepares: "Prepares the equation of motion: what does not depend on the state is computed once.",
+        prepares: "Prepares the equation of motion: computes once what does not depend on the state.",
         is_public: true,
         preparation: PreparationInputs::Base,
         functions: functions.into(),
@@ -126,7 +126,7 @@ fn forward_dynamics(derivation: &Derivation, dynamics: &DynamicsPrograms) -> Tok
         /// Accelerations of the state are not read. Cost: [`Self::mass_matrix`], [`Self::bias`], and a linear system.
         ///
         /// # Errors
-        /// A pose out of reach or singular, a mass matrix that is singular, or an input that is no number or too large.
+        /// A pose that is out of reach or singular, a singular mass matrix, or an input that is NaN or too large.
     };
     let [matrix_reads, bias_reads] =
         [&dynamics.mass_matrix, &dynamics.bias].map(|program| reads_passive(derivation, program));
@@ -158,8 +158,8 @@ fn forward_dynamics(derivation: &Derivation, dynamics: &DynamicsPrograms) -> Tok
             self.forward_at(state, forces, &self.model.passive_position(&state.q)?)
         }
 
-        /// The same as [`Self::forward`], with the passive coordinates of a pose near by, such as those of the last step;
-        /// they become those of this state.
+        /// The same as [`Self::forward`], starting from the passive coordinates of a nearby pose, such as those of the last
+        /// step; they are replaced by those of this state.
         ///
         /// # Errors
         /// As [`Self::forward`].

@@ -92,7 +92,7 @@ pub(super) fn model(derivation: &Derivation, scope: &NameScope) -> TokenStream {
         scope,
         name: "Model",
         doc: quote! {
-            /// The model for one geometry; what depends on the geometry alone is computed once.
+            /// The model for one geometry; values that depend only on the geometry are computed once.
         },
         prepares: "Prepares the model of a geometry.",
         is_public: true,
@@ -143,7 +143,7 @@ pub(super) fn inverse_dynamics(derivation: &Derivation, scope: &NameScope) -> To
         doc: quote! {
             /// Inverse dynamics for one geometry and one set of base parameters.
         },
-        prepares: "Prepares the recursion: what does not depend on the state is computed once.",
+        prepares: "Prepares the recursion: computes once what does not depend on the state.",
         is_public: true,
         preparation: PreparationInputs::Base,
         functions: vec![function],

@@ -35,7 +35,7 @@ pub(super) fn module_doc(derivation: &Derivation) -> String {
     );
     line(String::new());
     if let Some(caution) = derivation.reduction.method.caution() {
-        line(format!("Beware: {caution}."));
+        line(format!("Caution: {caution}."));
         line(String::new());
     }
     line("# Dependent columns".to_owned());
@@ -122,7 +122,7 @@ fn tables(derivation: &Derivation) -> TokenStream {
     quote! {
         /// Number of independent coordinates.
         pub const N_ACTIVE: usize = #n_active;
-        /// Number of coordinates that follow from the loops.
+        /// Number of passive coordinates, which the loops determine.
         pub const N_PASSIVE: usize = #n_passive;
         /// Number of drives.
         pub const N_DRIVES: usize = #n_drives;
@@ -204,7 +204,7 @@ fn state(derivation: &Derivation) -> TokenStream {
             /// The inputs of a program that reads passive coordinates.
             const INPUTS_WITH_PASSIVE: [&str; #n_all] = #names;
 
-            /// The numbers of a state and of its passive coordinates in their order.
+            /// The values of a state and of its passive coordinates in the order of [`INPUTS_WITH_PASSIVE`].
             fn inputs_with_passive<V: Copy>(state: &State<V>, passive: &[V; N_PASSIVE]) -> [V; #n_all] {
                 #entries
             }
@@ -223,7 +223,7 @@ fn state(derivation: &Derivation) -> TokenStream {
         /// The inputs of a program, in order.
         const INPUTS: [&str; #n_inputs] = #names;
 
-        /// The numbers of a state in the order of [`INPUTS`].
+        /// The values of a state in the order of [`INPUTS`].
         fn inputs<V: Copy>(state: &State<V>) -> [V; #n_inputs] {
             #entries
         }
@@ -294,7 +294,7 @@ fn base_parameters(derivation: &Derivation, scope: &NameScope) -> TokenStream {
         /// Base parameters of given physical parameters, eq. (16).
         ///
         /// # Errors
-        /// [`SpecialGeometry`] where a denominator of theirs vanishes.
+        /// [`SpecialGeometry`] if one of their denominators is zero for this geometry.
         pub fn base_parameters<T: Real>(
             #geometry: &Geometry<T>, #parameters: &Parameters<T>,
         ) -> Result<[T; N_BASE], SpecialGeometry> {

@@ -50,7 +50,7 @@ pub(super) fn newton<'a>(derivation: &'a Derivation, scope: &NameScope) -> Optio
     let nominal_passive = nominal_values(derivation, &passive, of_model.as_ref());
     let scale_field = scale.as_ref().map(|_| {
         quote! {
-            /// How large the loops are beside those of the file, for lengths at the nominal pose.
+            /// Size of the loops relative to those of the file; it scales lengths of the nominal pose.
             scale: T,
         }
     });
@@ -76,10 +76,10 @@ pub(super) fn newton<'a>(derivation: &'a Derivation, scope: &NameScope) -> Optio
         passive.len()
     );
     let items = quote! {
-        /// A pose is not looked at before the loops are closed.
+        /// Names of the inputs of a pose. They are empty, because a pose is not checked before the loops are closed.
         const POSE: [&str; #n_pose] = [""; #n_pose];
 
-        /// The numbers of a pose in one row.
+        /// The values of a pose in one array.
         fn pose<T: Copy>(q: &[T; N_ACTIVE], passive: &[T; N_PASSIVE]) -> [T; #n_pose] {
             [#(#pose),*]
         }
@@ -128,12 +128,12 @@ pub(super) fn newton<'a>(derivation: &'a Derivation, scope: &NameScope) -> Optio
         #[doc = #cost]
         ///
         /// # Errors
-        /// A pose that is out of reach, or cannot be followed from the nominal one, or is singular, or is no number.
+        /// A pose that is out of reach, cannot be followed from the nominal pose, is singular, or is NaN.
         pub fn passive_position(&self, q: &[T; N_ACTIVE]) -> Result<[T; N_PASSIVE], PoseError> {
             Assembly::passive_position(self, q)
         }
 
-        /// Passive coordinates of a pose, from those of a pose near by; see [`Assembly::passive_position_near`].
+        /// Passive coordinates of a pose, from those of a nearby pose; see [`Assembly::passive_position_near`].
         ///
         /// # Errors
         /// As [`Self::passive_position`].

@@ -176,7 +176,7 @@ impl ProgramStruct<'_> {
         let has_once = !kept.is_empty();
         let once_field = has_once.then(|| {
             quote! {
-                /// What does not depend on the state.
+                /// Values that do not depend on the state.
                 once: [T; #n_kept],
             }
         });
@@ -228,7 +228,7 @@ impl ProgramStruct<'_> {
             #doc
             #[derive(Clone, Copy, Debug, PartialEq)]
             #visible struct #name<T> {
-                /// What is wrong with the geometry or the parameters.
+                /// The fault of the geometry or the parameters, if they have one.
                 input: Result<(), PoseError>,
                 geometry: Geometry<T>,
                 #pose_field
@@ -317,7 +317,7 @@ impl ProgramStruct<'_> {
         let errors = quote! {
             ///
             /// # Errors
-            /// A pose out of reach or singular, or an input that is no number or too large.
+            /// A pose that is out of reach or singular, or an input that is NaN or too large.
         };
         // The call of the program, with the conversion of its outputs if there is one.
         let run = |inputs: TokenStream| match &function.results {
@@ -343,10 +343,10 @@ impl ProgramStruct<'_> {
             };
         }
         let near = format_ident!("{name}_near");
-        let cost = " Cost: that of finding the passive coordinates besides.";
+        let cost = " Cost: in addition, that of solving for the passive coordinates.";
         let same = format!(
-            " The same as [`Self::{name}`], with the passive coordinates of a pose near by, such as those of the last \
-             cycle; they become those of this state."
+            " The same as [`Self::{name}`], starting from the passive coordinates of a nearby pose, such as those of the \
+             last cycle; they are replaced by those of this state."
         );
         let model = self.model();
         // With passive coordinates: solve for them, then evaluate at them.
@@ -560,7 +560,7 @@ pub(super) fn pose(derivation: &Derivation, scope: &NameScope) -> TokenStream {
         (0..pose.routine.results.len()).map(|k| RustSyntax.name(scope.input_name(Atom::Shared(k))));
     let results = verbatim_tokens(&fill_lines("Ok(variables![", results, "])").join("\n"));
     quote! {
-        /// Where the loops close and the drives are at a pose, the same for all programs.
+        /// Pose-dependent quantities (loop closure, drive lengths) shared by all functions.
         #[derive(Clone, Copy, Debug, PartialEq)]
         struct Pose<T> {
             geometry: Geometry<T>,

@@ -59,13 +59,13 @@ pub(super) fn reactions(
         scope,
         name: "Reactions",
         doc: quote! {
-            /// What the joints transmit, for one geometry and one set of parameters: all of them, since bearings feel what no
-            /// drive feels and base parameters therefore do not hold.
+            /// Forces and moments that the joints transmit, for one geometry and one set of parameters. All parameters are
+            /// needed: bearings carry loads that no drive carries, and that base parameters therefore do not contain.
             ///
-            /// `None` is what equations of motion do not determine at the model file's geometry, because the mechanism is
-            /// held there more often than once, such as a planar loop across its plane.
+            /// `None` is a component that the equations of motion do not determine at the model file's geometry, because the
+            /// mechanism is statically indeterminate there, such as a planar loop across its plane.
         },
-        prepares: "Prepares the recursion: what does not depend on the state is computed once.",
+        prepares: "Prepares the recursion: computes once what does not depend on the state.",
         is_public: true,
         preparation: PreparationInputs::Parameters,
         functions: vec![function],
@@ -75,14 +75,14 @@ pub(super) fn reactions(
     quote! {
         #tables
 
-        /// What the joints transmit at one state.
+        /// Forces and moments that the joints transmit at one state.
         #[derive(Clone, Copy, Debug, PartialEq)]
         pub struct ReactionForces<T> {
-            /// What each of [`JOINTS`] transmits to the side away from the base, N and N m, drive and friction in it
-            /// included: along the axes that the frame's steps reach behind the joint (those of the frame, if nothing
-            /// follows), the moment about the origin reached there.
+            /// Force and moment that each of [`JOINTS`] transmits to the side away from the base, N and N m, including its
+            /// drive and friction. They are in the axes that the frame's steps reach after the joint (those of the frame,
+            /// if no step follows); the moment is about the origin reached there.
             pub joints: [::modelmill_runtime::Wrench<T>; N_JOINTS],
-            /// For each of [`LOOPS`] the force on the side of the first point that it joins, N.
+            /// For each of [`LOOPS`] the force on the side of its first point, N.
             pub loops: [[Option<T>; 3]; N_LOOPS],
         }
 
@@ -128,9 +128,9 @@ fn tables(reactions: &ReactionPrograms) -> TokenStream {
         quote! { ::modelmill_runtime::ClosedLoop { name: #name, axes: #axes } }
     });
     quote! {
-        /// Number of joints whose reactions are told.
+        /// Number of joints whose reactions are computed.
         pub const N_JOINTS: usize = #n_joints;
-        /// Number of loops whose forces are told.
+        /// Number of loops whose forces are computed.
         pub const N_LOOPS: usize = #n_loops;
         /// Joints, from the base outwards, in the order of [`ReactionForces::joints`].
         pub const JOINTS: [::modelmill_runtime::Joint; N_JOINTS] = [#(#joints),*];

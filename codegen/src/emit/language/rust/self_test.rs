@@ -36,7 +36,7 @@ pub(super) fn self_test(derivation: &Derivation, scope: &NameScope) -> TokenStre
         doc: quote! {
             /// H for all products of parameters, for the self-test.
         },
-        prepares: "Prepares what depends on the geometry alone.",
+        prepares: "Computes once what depends only on the geometry.",
         is_public: false,
         preparation: PreparationInputs::Geometry,
         functions: vec![function],
@@ -90,15 +90,15 @@ pub(super) fn self_test(derivation: &Derivation, scope: &NameScope) -> TokenStre
         /// Number of products of parameters.
         pub const N_PRODUCTS: usize = #n_products;
 
-        /// Holds the base parameters against all parameters at random states around the nominal pose: H and H_min have
-        /// rank [`N_BASE`], and `H p = H_min p_min`.
+        /// Compares the base parameters with all parameters at random states around the nominal pose: H and H_min must
+        /// have rank [`N_BASE`], and `H p` must equal `H_min p_min`.
         ///
         /// Call it in a test of your own: `arm::self_test(&arm::Geometry::default())?;`, and for every other geometry that
-        /// you use. It needs room on the stack for the square of the number of products.
+        /// you use. It needs stack memory for the square of the number of products.
         ///
         /// # Errors
-        /// What does not hold, in numbers. The rank is smaller at geometries that are special, as with a length of zero
-        /// that is none in the model file.
+        /// The condition that fails, with numbers. The rank is smaller at special geometries, for example if a length is
+        /// zero that is not zero in the model file.
         pub fn self_test(geometry: &Geometry<f64>) -> Result<(), ::modelmill_runtime::SelfTestError> {
             type T = f64;
             #scale
