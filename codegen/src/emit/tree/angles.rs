@@ -1,20 +1,21 @@
-//! The angles of a program that come before everything else.
+//! The angles whose sines and cosines a program computes before anything else.
 
 use crate::lower::{ProgramOp, ProgramStage, StraightLineProgram};
 
-/// Sines with their cosines whose angles need no other function, if there are several: they take much of the time of one
-/// state, and less if they are computed at once.
+/// Pairs of sine and cosine whose angles need only arithmetic. They take much of the time of one state, and less if
+/// they are computed together. Empty if there is only one.
 pub(super) struct LeadingAngles {
-    /// The sines; the cosine of each stands right before it.
+    /// Indices of the sines; the cosine of each is the operation before.
     pub(super) sines: Vec<usize>,
-    /// Which operations are written before all others: what the angles are made of.
+    /// Operations that are written before all others, because the angles depend on them.
     pub(super) done: Vec<bool>,
 }
 
 impl LeadingAngles {
+    /// Finds the pairs of a program.
     pub(super) fn from_program(program: &StraightLineProgram) -> Self {
         let n = program.ops.len();
-        // What needs inputs and arithmetic alone.
+        // Values that depend on inputs by sums, products and signs only.
         let mut plain = vec![false; n];
         let mut done = vec![false; n];
         let mut sines = Vec::new();
@@ -48,6 +49,7 @@ impl LeadingAngles {
                 done: vec![false; n],
             };
         }
+        // All operands of the angles come first as well.
         for i in (0..n).rev() {
             if done[i] {
                 program.ops[i].for_each_operand(|v| done[v.index()] = true);
@@ -56,7 +58,7 @@ impl LeadingAngles {
         Self { sines, done }
     }
 
-    /// The same where operations stand in another order.
+    /// The same after the operations have been permuted.
     pub(super) fn reorder(self, order: &[usize]) -> Self {
         let mut place = vec![0; self.done.len()];
         for (k, i) in order.iter().enumerate() {

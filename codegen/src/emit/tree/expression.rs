@@ -1,45 +1,57 @@
-//! Expressions of the statement tree, and how wide they are when written.
+//! Expressions of the statement tree: constructors that normalise signs and order, and the precedence of operators.
 
 use crate::expr::print::{FormulaFunction, PrintedFormula};
 use crate::expr::{Rational, Unary};
 
-/// A formula in one line.
+/// A formula of variables and numbers. Operands may be exchanged only where the result is the same floating-point
+/// number.
 #[derive(Clone, Debug, PartialEq)]
 pub(in crate::emit) enum CodeExpression {
     /// A number.
     Number(f64),
     /// A variable.
     Name(String),
+    /// A sum of two operands.
     Add(Box<CodeExpression>, Box<CodeExpression>),
+    /// A difference.
     Sub(Box<CodeExpression>, Box<CodeExpression>),
+    /// A product.
     Mul(Box<CodeExpression>, Box<CodeExpression>),
+    /// A quotient.
     Div(Box<CodeExpression>, Box<CodeExpression>),
+    /// A change of sign.
     Neg(Box<CodeExpression>),
     /// A function of one argument.
     Call(Unary, Box<CodeExpression>),
-    /// Angle of the point (`x`, `y`): y, then x.
+    /// Angle of the point (`x`, `y`) in rad, with the operands in the order y, x.
     Atan2(Box<CodeExpression>, Box<CodeExpression>),
 }
 
-/// How tightly an expression holds together, from sums to names.
+/// How strongly an expression binds, in increasing order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(in crate::emit) enum OperatorPrecedence {
+    /// Sums and differences.
     Sum,
+    /// Products and quotients.
     Product,
+    /// Changes of sign and negative numbers.
     Negation,
+    /// Names, positive numbers and calls.
     Whole,
 }
 
 impl CodeExpression {
+    /// A variable.
     pub(in crate::emit) fn name(name: impl Into<String>) -> Self {
         Self::Name(name.into())
     }
 
+    /// A number, rounded to floating point.
     pub(in crate::emit) fn number(value: &Rational) -> Self {
         Self::Number(value.to_f64())
     }
 
-    /// `a + b`, written `b + a` where that needs no parentheses: it is the same number.
+    /// `a + b`, as `b + a` where that needs no parentheses; the result is the same number.
     pub(in crate::emit) fn add(a: Self, b: Self) -> Self {
         match (a, b) {
             (a, Self::Neg(b)) => Self::sub(a, *b),
@@ -54,6 +66,7 @@ impl CodeExpression {
         }
     }
 
+    /// `a - b`; changes of sign are merged into the operator.
     pub(in crate::emit) fn sub(a: Self, b: Self) -> Self {
         match (a, b) {
             (a, Self::Neg(b)) => Self::add(a, *b),
@@ -62,7 +75,7 @@ impl CodeExpression {
         }
     }
 
-    /// `a * b`, written `b * a` where that reads better: it is the same number. Signs are passed on.
+    /// `a * b`, as `b * a` where that reads better; the result is the same number. Signs are moved outwards.
     pub(in crate::emit) fn mul(a: Self, b: Self) -> Self {
         match (a, b) {
             (Self::Neg(a), b) => Self::neg(Self::mul(*a, b)),
@@ -71,6 +84,7 @@ impl CodeExpression {
         }
     }
 
+    /// A product without signs: numbers in front, nested products on the left.
     fn product(a: Self, b: Self) -> Self {
         let nested = b.precedence() == OperatorPrecedence::Product
             && a.precedence() != OperatorPrecedence::Product;
@@ -79,6 +93,7 @@ impl CodeExpression {
         Self::Mul(Box::new(a), Box::new(b))
     }
 
+    /// `a / b`; signs are moved outwards.
     pub(in crate::emit) fn div(a: Self, b: Self) -> Self {
         match (a, b) {
             (Self::Neg(a), b) => Self::neg(Self::div(*a, b)),
@@ -87,6 +102,7 @@ impl CodeExpression {
         }
     }
 
+    /// `-a`; two signs cancel, and a number takes the sign.
     pub(in crate::emit) fn neg(a: Self) -> Self {
         match a {
             Self::Neg(a) => *a,
@@ -95,7 +111,7 @@ impl CodeExpression {
         }
     }
 
-    /// The negative where it takes no operation more: it is the same number.
+    /// The negative, if it needs no additional operation; the result is the same number.
     fn negated_without_cost(&self) -> Option<Self> {
         match self {
             Self::Number(a) => Some(Self::Number(-a)),
@@ -120,7 +136,7 @@ impl CodeExpression {
         }
     }
 
-    /// The same number with a sign in front only where that saves nothing.
+    /// The same number, with its leading sign absorbed where possible.
     pub(in crate::emit) fn normalize_sign(self) -> Self {
         match self {
             Self::Neg(a) => a.negated_without_cost().unwrap_or(Self::Neg(a)),
@@ -128,14 +144,17 @@ impl CodeExpression {
         }
     }
 
+    /// A function of one argument.
     pub(in crate::emit) fn call(function: Unary, a: Self) -> Self {
         Self::Call(function, Box::new(a))
     }
 
+    /// Angle of the point (`x`, `y`).
     pub(in crate::emit) fn atan2(y: Self, x: Self) -> Self {
         Self::Atan2(Box::new(y), Box::new(x))
     }
 
+    /// Precedence of the outermost operator.
     pub(in crate::emit) fn precedence(&self) -> OperatorPrecedence {
         match self {
             Self::Add(..) | Self::Sub(..) => OperatorPrecedence::Sum,
@@ -148,7 +167,7 @@ impl CodeExpression {
         }
     }
 
-    /// Calls `visit` for every name.
+    /// Calls `visit` for every name, from left to right.
     pub(in crate::emit) fn for_each_name(&self, visit: &mut dyn FnMut(&str)) {
         match self {
             Self::Number(_) => {}
@@ -165,7 +184,7 @@ impl CodeExpression {
         }
     }
 
-    /// Calls `change` for every name.
+    /// Calls `change` for every name, from left to right.
     pub(in crate::emit) fn rename(&mut self, change: &dyn Fn(&mut String)) {
         match self {
             Self::Number(_) => {}
@@ -182,7 +201,7 @@ impl CodeExpression {
         }
     }
 
-    /// A printed formula as an expression; `rename` says how its names are called.
+    /// A printed formula as an expression; `rename` maps its names to those of the scope.
     pub(in crate::emit) fn from_formula(
         formula: &PrintedFormula,
         rename: &dyn Fn(&str) -> String,
@@ -194,6 +213,7 @@ impl CodeExpression {
                 Self::Name(rename(&symbol.text()))
             }
             PrintedFormula::Sum(terms) => {
+                // The terms of a sum are added in order, with their signs as operators.
                 let mut sum: Option<Self> = None;
                 for term in terms {
                     let (negative, term) = if term.is_negative() {
@@ -216,6 +236,7 @@ impl CodeExpression {
                 below,
             } => {
                 let magnitude = factor.abs();
+                // A term: factor times numerator over denominator.
                 let number = (!magnitude.is_one()).then(|| Self::number(&magnitude));
                 let product = |factors: Vec<Self>| {
                     let mut factors = factors.into_iter();
@@ -238,6 +259,7 @@ impl CodeExpression {
                 }
             }
             PrintedFormula::Power(base, n) => {
+                // A power becomes repeated multiplication.
                 let base = of(base);
                 (1..*n).fold(base.clone(), |power, _| {
                     Self::Mul(Box::new(power), Box::new(base.clone()))
@@ -252,6 +274,7 @@ impl CodeExpression {
     }
 }
 
+/// The operation of a function of one argument.
 fn unary(function: FormulaFunction) -> Unary {
     match function {
         FormulaFunction::Sin => Unary::Sin,

@@ -1,4 +1,4 @@
-//! What several programs compute once, computed once for all of them.
+//! Precomputed values of several programs: values that two programs have in common are computed once.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -7,19 +7,23 @@ use super::scope::{NameScope, unique_name};
 use super::{CodeStatement, PoseCheck, StatementRoutine};
 use crate::expr::Atom;
 
-/// What is computed once for a geometry and its parameters, by all programs of one struct.
+/// What all programs of one struct compute once per geometry and parameters.
 #[derive(Clone, Debug)]
 pub(in crate::emit) struct PrecomputedValues {
+    /// The statements, in order.
     statements: Vec<CodeStatement>,
-    /// Names of the values that programs need at every state.
+    /// Names of the values that programs read at every state, in the order in which they are stored.
     pub(in crate::emit) kept: Vec<String>,
-    /// Inputs that are read.
+    /// Inputs that the statements read.
     pub(in crate::emit) read: BTreeSet<Atom>,
+    /// Names that may not be used again.
     taken: BTreeSet<String>,
+    /// Counter of generated names.
     next: usize,
 }
 
 impl PrecomputedValues {
+    /// No values; names of the scope are taken.
     pub(in crate::emit) fn new(scope: &NameScope) -> Self {
         Self {
             statements: Vec::new(),
@@ -30,12 +34,15 @@ impl PrecomputedValues {
         }
     }
 
-    /// Takes over what a program computes once; values that are there already are not computed again.
+    /// Moves the precomputed statements of a program here. Statements with an equal value are shared, and names in the
+    /// program are replaced by the ones chosen here.
     pub(in crate::emit) fn absorb(&mut self, routine: &mut StatementRoutine) {
+        // New names by old names of this program.
         let mut renamed: BTreeMap<String, String> = BTreeMap::new();
         for mut statement in std::mem::take(&mut routine.once) {
             statement.rename(&|name| replace_name(&renamed, name));
             match statement {
+                // The same value under another name is reused.
                 CodeStatement::Let { name, value, note } => {
                     let known = self.statements.iter().find_map(|other| match other {
                         CodeStatement::Let { name, value: v, .. } if *v == value => {
@@ -77,6 +84,7 @@ impl PrecomputedValues {
                 other => self.statements.push(other),
             }
         }
+        // The rest of the program follows the renaming.
         for name in &mut routine.kept {
             replace_name(&renamed, name);
             if !self.kept.contains(name) {
@@ -93,11 +101,12 @@ impl PrecomputedValues {
         self.read.extend(&routine.read_once);
     }
 
-    /// All statements.
+    /// All statements, in groups if they are many.
     pub(in crate::emit) fn statements(&self) -> Vec<CodeStatement> {
         group_statements(self.statements.clone(), &self.kept)
     }
 
+    /// The wanted name, or a similar one that is free. Generated names are numbered anew.
     fn unique_name(&mut self, name: &str) -> String {
         let numbered = name
             .strip_prefix('k')
@@ -115,6 +124,7 @@ impl PrecomputedValues {
     }
 }
 
+/// Replaces a name if it has a new one.
 fn replace_name(renamed: &BTreeMap<String, String>, name: &mut String) {
     if let Some(new) = renamed.get(name) {
         new.clone_into(name);
@@ -122,7 +132,7 @@ fn replace_name(renamed: &BTreeMap<String, String>, name: &mut String) {
 }
 
 impl CodeStatement {
-    /// Calls `change` for every name that it reads.
+    /// Calls `change` for every name that the statement reads.
     fn rename(&mut self, change: &dyn Fn(&mut String)) {
         match self {
             Self::Section(_) => {}

@@ -1,4 +1,6 @@
-//! Headings of a program, for the reader: loops, drives, motion of the links, their wrenches, forces.
+//! Sections of a program, printed as headings: loops, drives, motion of the links, their wrenches, forces.
+//!
+//! Names of values decide their sections; a value without a name belongs to the section that needs it first.
 
 use std::collections::BTreeMap;
 
@@ -8,22 +10,26 @@ use super::build::NamedValue;
 use crate::Derivation;
 use crate::lower::{PoseGuard, ProgramOp, ProgramStage, StraightLineProgram};
 
-/// Programs of more statements are put in the order that suits machines; their parts of the mechanism are mixed.
+/// Programs of more statements have no sections: they are ordered for speed, which mixes the parts of the mechanism.
 const MOST_STATEMENTS: usize = 150;
 
-/// Which name belongs where; what stands nowhere stands where it is needed first.
+/// The headings, and the section of each name.
 #[derive(Clone, Debug)]
 pub(in crate::emit) struct CodeSections {
+    /// Heading of each section, in order of the text; the first one is empty.
     headings: Vec<String>,
+    /// Section by name.
     names: BTreeMap<String, usize>,
 }
 
-/// The section of the loops.
+/// Index of the section of the loops.
 const LOOPS: usize = 1;
 
+/// Ends of the names of components.
 const AXES: [&str; 3] = ["x", "y", "z"];
 
 impl CodeSections {
+    /// Sections in the order of the recursion, with all names that belong to them.
     pub(super) fn new(derivation: &Derivation) -> Self {
         let mechanism = &derivation.mechanism;
         let mut sections = Self {
@@ -40,6 +46,7 @@ impl CodeSections {
                 sections.assign_section("r", &of, "", closes);
             }
         }
+        // Tags of the drives' equations count as on the page.
         let mut tag = 0;
         for (d, drive) in mechanism.drives.iter().enumerate() {
             let DriveKind::Linear { from, to } = drive.kind else {
@@ -70,8 +77,9 @@ impl CodeSections {
                 sections.names.insert(name, along);
             }
         }
+        // Names of motions, by what they are.
         let rates = sections.add("Rates of the links.".to_owned());
-        let accelerations = sections.add("Accelerations of the links, less gravity.".to_owned());
+        let accelerations = sections.add("Accelerations of the links, minus gravity.".to_owned());
         for frame in &mechanism.frames {
             sections.assign_section("omega", &frame.name, "", rates);
             sections.assign_section("omega", &frame.name, "_sq", rates);
@@ -95,7 +103,7 @@ impl CodeSections {
                 .names
                 .insert(format!("{}_dd", coordinate.name), accelerations);
         }
-        // From the ends to the base, as wrenches are carried.
+        // From the last link to the base, the direction in which wrenches are summed.
         for frame in mechanism.frames.iter().rev() {
             let text = format!("Link {}: balances of forces and moments.", frame.name);
             let wrench = sections.add(text);
@@ -111,11 +119,13 @@ impl CodeSections {
         sections
     }
 
+    /// Appends a section and returns its index.
     fn add(&mut self, heading: String) -> usize {
         self.headings.push(heading);
         self.headings.len() - 1
     }
 
+    /// Assigns the three components of a vector to a section.
     fn assign_section(&mut self, letter: &str, of: &str, suffix: &str, section: usize) {
         for axis in AXES {
             self.names
@@ -123,18 +133,18 @@ impl CodeSections {
         }
     }
 
-    /// The section of the forces, which is the last.
+    /// Index of the section of the drives' forces, the last one.
     pub(super) fn force_section(&self) -> usize {
         self.headings.len() - 1
     }
 
-    /// The heading of a section, if it has one.
+    /// Heading of a section; `None` for the first one.
     pub(super) fn heading(&self, section: usize) -> Option<&str> {
         let heading = self.headings.get(section)?;
         (!heading.is_empty()).then_some(heading)
     }
 
-    /// The section of each value of a program, with results in `last`; none where it is long.
+    /// The section of each value of a program, with outputs in `last`; `None` if the program is too long.
     pub(super) fn value_sections(
         &self,
         program: &StraightLineProgram,
@@ -147,7 +157,8 @@ impl CodeSections {
         if (0..n).filter(moving).filter(|i| !inside[*i]).count() > MOST_STATEMENTS {
             return None;
         }
-        // What nothing asks for stands where its operands do.
+        // Backwards: each value belongs to the earliest section that needs it. A value without users follows its
+        // operands.
         let mut sections: Vec<Option<usize>> = vec![None; n];
         for value in &program.outputs {
             sections[value.index()] = last;
@@ -160,7 +171,7 @@ impl CodeSections {
         let earlier = |a: Option<usize>, b: Option<usize>| a.into_iter().chain(b).min();
         for i in (0..n).rev() {
             let own = named.get(&i).and_then(|named| self.names.get(&named.name));
-            // Quotients take long: they begin as soon as they can.
+            // Divisions have a long latency, so they start as early as possible.
             let quotient = matches!(program.ops[i], ProgramOp::Div(..)) && !named.contains_key(&i);
             let own = own.copied().or(quotient.then_some(0));
             sections[i] = earlier(sections[i], own);
@@ -168,6 +179,7 @@ impl CodeSections {
                 sections[v.index()] = earlier(sections[v.index()], sections[i]);
             });
         }
+        // Forwards: a value cannot come before its operands.
         let mut sections: Vec<usize> = sections
             .into_iter()
             .map(Option::unwrap_or_default)
@@ -185,7 +197,7 @@ impl CodeSections {
     }
 }
 
-/// What is said of the loops.
+/// The heading of the loops: their names and the tags of their equations; empty without loops.
 fn closure_heading(derivation: &Derivation) -> String {
     let loops = &derivation.equations.projection.loops;
     let mechanism = &derivation.mechanism;
