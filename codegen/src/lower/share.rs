@@ -8,7 +8,7 @@ use super::flatten::{rebuild, rewrite};
 use super::schedule::fixed_nodes;
 use crate::expr::{ExprId, Graph, Node, Rational};
 
-/// Gives a node of its own to every pair that occurs at least twice, most frequent first.
+/// Gives every pair that occurs at least twice a node of its own, most frequent pairs first.
 pub(crate) fn share_pairs(graph: &Graph, roots: &[ExprId]) -> (Graph, Vec<ExprId>) {
     let (mut graph, mut roots) = graph.compacted(roots);
     let mut live = graph.len();
@@ -18,6 +18,7 @@ pub(crate) fn share_pairs(graph: &Graph, roots: &[ExprId]) -> (Graph, Vec<ExprId
             break;
         }
         roots = replace_pairs(&mut graph, &roots, &pairs);
+        // Replaced nodes stay in the arena, so it is compacted when it has doubled.
         if graph.len() > 2 * live {
             (graph, roots) = graph.compacted(&roots);
             live = graph.len();
@@ -26,14 +27,17 @@ pub(crate) fn share_pairs(graph: &Graph, roots: &[ExprId]) -> (Graph, Vec<ExprId
     (graph, roots)
 }
 
-/// Two operands that stand together: factors, or terms with the ratio of their coefficients.
+/// Two operands that occur together.
 #[derive(Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
 enum OperandPair {
+    /// Two factors of a product.
     Factors(ExprId, ExprId),
+    /// Two terms of a sum, with the ratio of the second coefficient to the first.
     Terms(ExprId, ExprId, Rational),
 }
 
 impl OperandPair {
+    /// The two operands.
     fn operands(&self) -> [ExprId; 2] {
         match self {
             Self::Factors(a, b) | Self::Terms(a, b, _) => [*a, *b],
@@ -41,6 +45,7 @@ impl OperandPair {
     }
 }
 
+/// Calls `visit` for every pair of operands of a node. Pairs of fixed operands cost nothing and are left out.
 fn pairs_of(node: &Node, fixed: &[bool], mut visit: impl FnMut(OperandPair)) {
     match node {
         Node::Sum(terms) if terms.len() > 2 => {
@@ -63,7 +68,7 @@ fn pairs_of(node: &Node, fixed: &[bool], mut visit: impl FnMut(OperandPair)) {
                 }
             }
         }
-        // A sum or product of just two is a pair that exists already.
+        // A sum or product of two operands is such a pair already.
         Node::Sum(terms) if terms.len() == 2 => {
             let ((a, k), (b, m)) = (&terms[0], &terms[1]);
             if !(fixed[a.index()] && fixed[b.index()]) {
@@ -82,7 +87,7 @@ fn pairs_of(node: &Node, fixed: &[bool], mut visit: impl FnMut(OperandPair)) {
     }
 }
 
-/// Pairs that occur more than once, best first, no operand twice, so that they can be replaced together.
+/// Pairs that occur most often and at least twice. No operand is in two of them, so that they can be replaced together.
 fn common_pairs(graph: &Graph, roots: &[ExprId]) -> BTreeSet<OperandPair> {
     let fixed = fixed_nodes(graph, roots);
     let mut counts: FxHashMap<OperandPair, usize> = FxHashMap::default();
@@ -99,6 +104,7 @@ fn common_pairs(graph: &Graph, roots: &[ExprId]) -> BTreeSet<OperandPair> {
         .filter(|(_, n)| *n > 1)
         .map(|(p, n)| (n, p))
         .collect();
+    // Equal counts are ordered by the pair itself, so that the result is always the same.
     found.sort_by(|a, b| b.0.cmp(&a.0).then_with(|| a.1.cmp(&b.1)));
     let Some(most) = found.first().map(|f| f.0) else {
         return BTreeSet::new();
@@ -116,12 +122,13 @@ fn common_pairs(graph: &Graph, roots: &[ExprId]) -> BTreeSet<OperandPair> {
         .collect()
 }
 
+/// Rewrites all sums and products that contain one of the pairs.
 fn replace_pairs(
     graph: &mut Graph,
     roots: &[ExprId],
     pairs: &BTreeSet<OperandPair>,
 ) -> Vec<ExprId> {
-    // No operand stands in two pairs of a kind, so that the first one tells which pair it is.
+    // No operand is in two pairs of a kind, so its first operand identifies a pair.
     let (mut terms_with, mut factors_with) = (FxHashMap::default(), FxHashMap::default());
     for pair in pairs {
         match pair {
@@ -131,6 +138,7 @@ fn replace_pairs(
     }
     rewrite(graph, roots, |graph, id, node| match &node {
         Node::Sum(terms) if terms.len() > 2 => {
+            // Operands in the order of nodes, so that the result does not depend on the order of terms.
             let mut firsts: Vec<ExprId> = terms.iter().map(|(t, _)| *t).collect();
             firsts.sort_unstable();
             let mut terms = terms.clone();
@@ -139,6 +147,7 @@ fn replace_pairs(
                     continue;
                 };
                 let find = |id: ExprId| terms.iter().position(|(t, _)| *t == id);
+                // The pair must have the same ratio of coefficients here.
                 if let (Some(i), Some(j)) = (find(a), find(*b))
                     && terms.len() > 2
                     && terms[j].1 == &terms[i].1 * *ratio
