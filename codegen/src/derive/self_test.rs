@@ -1,9 +1,10 @@
-//! How far from the nominal pose an emitted self-test looks.
+//! The range of states around the nominal pose that an emitted self-test draws from.
 
 use crate::Derivation;
 use crate::loops::magnitude;
 
-/// Reach of every independent coordinate, rad or m: everywhere for open chains, where loops stay closed for others.
+/// Range of every independent coordinate, rad or m: large for open chains, small enough for loops to stay closed
+/// otherwise.
 pub(crate) fn self_test_reach(derivation: &Derivation) -> Vec<f64> {
     let mechanism = &derivation.mechanism;
     let residual = &derivation.equations.projection.loops.residual;

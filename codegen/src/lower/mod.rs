@@ -44,21 +44,21 @@ pub(crate) struct LoweringPass {
 /// The passes in the order in which they run. Tests and counts of operations read this list.
 pub(crate) static PASSES: [LoweringPass; 3] = [
     LoweringPass {
-        name: "nested sums and products opened first",
+        name: "nested sums and products flattened first",
         run: |mut graph, roots| {
             let roots = flatten::flatten(&mut graph, roots);
             (graph, roots)
         },
     },
     LoweringPass {
-        name: "common factors out of sums",
+        name: "common factors taken out of sums",
         run: |mut graph, roots| {
             let roots = factor_sums::factor_sums(&mut graph, roots);
             (graph, roots)
         },
     },
     LoweringPass {
-        name: "common pairs of terms and factors once",
+        name: "common pairs of terms and factors computed once",
         run: |graph, roots| share::share_pairs(&graph, roots),
     },
 ];

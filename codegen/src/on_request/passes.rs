@@ -30,7 +30,7 @@ impl Derivation {
     /// As [`crate::derive`].
     pub fn operations_by_pass(&self) -> Result<Vec<PassCount>, DeriveError> {
         let mut counts = Vec::new();
-        let plain = ["plain recursion, equal expressions once"];
+        let plain = ["plain recursion, equal expressions computed once"];
         let forms = plain.iter().chain(&cheapest::PASSES).enumerate();
         let forms = forms.map(|(n, pass)| (*pass, n, &lower::PASSES[..0]));
         let all_forms = cheapest::PASSES.len();

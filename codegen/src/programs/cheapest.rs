@@ -89,11 +89,11 @@ impl FrameCache {
 
 /// The passes of the recursions, by name, in the order in which they are tried.
 pub(crate) const PASSES: [&str; 5] = [
-    "parallel axes at once, or in axes that do not turn",
+    "parallel axes combined, or in fixed axes",
     "acceleration of a joint's axis from its parent",
-    "offsets along an axis behind its joint",
+    "offsets along an axis after its joint",
     "moments about a joint's axis on its fixed side",
-    "inertia turned rather than motion, forces read off in one frame",
+    "inertia rotated instead of motion, forces computed in one frame",
 ];
 
 /// The columns of some products, one entry per drive, in the cheapest form after the first `n_passes` passes.

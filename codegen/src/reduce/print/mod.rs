@@ -1,4 +1,4 @@
-//! Printing of the factors of eq. (6): expanded for scripts, factored for people.
+//! Printing of the factors of eq. (6): expanded for scripts, factored for readers.
 
 mod factor;
 
@@ -14,7 +14,7 @@ use crate::expr::Rational;
 use crate::expr::print::{FormulaFunction, PrintedFormula};
 
 impl FactorVariable {
-    /// As it is printed: the constant's name, or its sine or cosine.
+    /// The variable as it is printed: the name of a constant, its sine or cosine, or a root.
     pub fn formula(self, mechanism: &Mechanism) -> PrintedFormula {
         let name = |i: usize| PrintedFormula::name(&*mechanism.constants[i].name);
         match self {
@@ -29,12 +29,14 @@ impl FactorVariable {
 }
 
 impl RationalFunction {
-    /// As a sum of plain terms, each times `factors`: what a script reads.
+    /// The terms of the expanded numerator, each divided by the denominator and multiplied by `factors`: the form that
+    /// a script reads.
     pub fn expanded_terms(
         &self,
         mechanism: &Mechanism,
         factors: &[PrintedFormula],
     ) -> Vec<PrintedFormula> {
+        // A denominator of one term is divided factor by factor, any other one as a whole.
         let below = match self.denominator.first_key_value() {
             Some((powers, k)) if self.denominator.len() == 1 => {
                 let mut below = power_factors(powers, mechanism);
@@ -54,12 +56,12 @@ impl RationalFunction {
             .collect()
     }
 
-    /// As a sum of plain terms.
+    /// The function as a sum of expanded terms.
     pub fn expanded_formula(&self, mechanism: &Mechanism) -> PrintedFormula {
         PrintedFormula::sum(self.expanded_terms(mechanism, &[]))
     }
 
-    /// Factored as far as is cheap: numbers and powers outside, linear factors, sums of squares.
+    /// The function factored as far as is cheap: numbers and powers in front, linear factors, sums of squares.
     pub fn formula(&self, mechanism: &Mechanism) -> PrintedFormula {
         let (number, above) = polynomial_factors(&self.numerator, mechanism);
         let (divisor, below) = polynomial_factors(&self.denominator, mechanism);
@@ -69,7 +71,7 @@ impl RationalFunction {
         PrintedFormula::term(&number * &divisor.recip(), above, below)
     }
 
-    /// The number in front and the function without it, so that equal functions up to a number can be recognised.
+    /// The rational factor and the function without it, so that functions that differ by a number only are equal.
     pub(crate) fn split_number(&self) -> (Rational, Self) {
         let Some((_, leading)) = ordered_terms(&self.numerator).into_iter().next() else {
             return (Rational::ZERO, Self::constant(Rational::ONE));
@@ -78,7 +80,7 @@ impl RationalFunction {
         if leading.is_negative() {
             content = -&content;
         }
-        // The denominator's number goes along.
+        // The number of the denominator belongs to the factor as well.
         let below = self
             .denominator
             .values()
@@ -95,12 +97,12 @@ impl RationalFunction {
     }
 }
 
-/// The largest number that divides all coefficients.
+/// The greatest common divisor of all coefficients.
 fn content(p: &TrigonometricPolynomial) -> Rational {
     p.values().fold(Rational::ZERO, |c, k| c.content_with(k))
 }
 
-/// Powers as factors.
+/// A monomial as a list of powers.
 fn power_factors(powers: &PowerProduct, mechanism: &Mechanism) -> Vec<PrintedFormula> {
     powers
         .iter()
@@ -111,7 +113,7 @@ fn power_factors(powers: &PowerProduct, mechanism: &Mechanism) -> Vec<PrintedFor
         .collect()
 }
 
-/// Terms as people order them: higher degrees first, then higher powers of the constants that are declared first.
+/// Terms in the usual order: higher degrees first, then higher powers of the constants that are declared first.
 fn ordered_terms(p: &TrigonometricPolynomial) -> Vec<(&PowerProduct, &Rational)> {
     let degree = |powers: &PowerProduct| powers.iter().map(|(_, n)| *n).sum::<u32>();
     let mut terms: Vec<_> = p.iter().collect();
@@ -119,6 +121,7 @@ fn ordered_terms(p: &TrigonometricPolynomial) -> Vec<(&PowerProduct, &Rational)>
     terms
 }
 
+/// Order of two monomials by their variables and powers; a monomial that continues comes before one that ends.
 fn compare_powers(a: &PowerProduct, b: &PowerProduct) -> Ordering {
     let (mut a, mut b) = (a.iter().peekable(), b.iter().peekable());
     loop {
@@ -138,6 +141,7 @@ fn compare_powers(a: &PowerProduct, b: &PowerProduct) -> Ordering {
     }
 }
 
+/// A polynomial as a sum of terms in the usual order.
 fn expand_polynomial(p: &TrigonometricPolynomial, mechanism: &Mechanism) -> PrintedFormula {
     PrintedFormula::sum(
         ordered_terms(p).into_iter().map(|(powers, k)| {
@@ -146,7 +150,7 @@ fn expand_polynomial(p: &TrigonometricPolynomial, mechanism: &Mechanism) -> Prin
     )
 }
 
-/// A number and the factors of a polynomial.
+/// The rational factor of a polynomial and its other factors.
 fn polynomial_factors(
     p: &TrigonometricPolynomial,
     mechanism: &Mechanism,
@@ -164,10 +168,11 @@ fn polynomial_factors(
     (number, formulas)
 }
 
-/// A sum whose quadratic terms are gathered to squares where they are some: `(r2 + r3)^2 + d3^2`.
+/// A sum whose quadratic terms are written as squares where they form some: `(r2 + r3)^2 + d3^2`.
 fn gather_squares(p: &TrigonometricPolynomial, mechanism: &Mechanism) -> PrintedFormula {
     let mut rest = p.clone();
     let mut squares: BTreeMap<FactorVariable, PrintedFormula> = BTreeMap::new();
+    // Each square takes its terms out of the sum.
     for square in factor::find_squares(p) {
         let first = square.linear[0].0;
         let sum = PrintedFormula::sum(
