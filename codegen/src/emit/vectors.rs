@@ -41,7 +41,7 @@ pub fn vectors_c(derivation: &Derivation, program: &StraightLineProgram, width: 
     // Position of a coordinate among the active ones.
     let place = |coordinate: usize| {
         let place = active.iter().position(|a| *a == coordinate);
-        place.expect("passive coordinates are put in place")
+        place.expect("passive coordinates are replaced by their closed form")
     };
     // Array and line of an input: positions, rates, accelerations and loads follow each other.
     let input = |atom: Atom| match atom {

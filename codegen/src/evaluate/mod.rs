@@ -473,7 +473,7 @@ impl<'a> ModelEvaluator<'a> {
         self.active
             .iter()
             .position(|a| *a == coordinate)
-            .expect("passive rates are put in place")
+            .expect("passive rates are replaced by expressions")
     }
 
     /// The value of an input that does not depend on the state.

@@ -2,7 +2,7 @@
 //! reduction go in, straight-line programs come out.
 //!
 //! Retained columns are original columns, so the inverse dynamics with base parameters is the same recursion with
-//! p_min put in place of the retained products and zero for all others.
+//! p_min as values of the retained products and zero for all others.
 
 pub(crate) mod cheapest;
 pub(crate) mod closing;

@@ -42,6 +42,7 @@ pub fn factored_base_expression(derivation: &Derivation, k: usize) -> PrintedFor
             PrintedFormula::product(Rational::ONE, lumped_formulas(mechanism, reduction, at));
         // The numeric content of a factor is split off, so that factors that differ by a number only share a group.
         for (_, factor) in line.equals.iter().filter(|(at, _)| *at == k) {
+            // Equal functions are found by comparison, since there are few.
             let (number, function) = factor.split_number();
             let member = (number, what.clone());
             match groups.iter_mut().find(|(f, _)| *f == function) {
@@ -67,6 +68,7 @@ pub fn factored_base_expression(derivation: &Derivation, k: usize) -> PrintedFor
         let sum = members
             .into_iter()
             .map(|(k, what)| PrintedFormula::product(k, [what]));
+        // number * function * sum
         let term = PrintedFormula::product(number, [factor, PrintedFormula::sum(sum)]);
         terms.push(term);
     }
@@ -85,6 +87,7 @@ pub fn base_summand(derivation: &Derivation, k: usize, product_idx: usize) -> Pr
     } = derivation;
     let what = product(mechanism, &reduction.products[product_idx]);
     let mut lines = reduction.dependencies.iter();
+    // A line without `via` gives the factor directly.
     let line = lines.find(|line| line.product == product_idx && line.via.is_empty());
     let factor = line.and_then(|line| line.equals.iter().find(|(at, _)| *at == k));
     match factor {
@@ -112,6 +115,7 @@ pub(super) fn products(page: &mut PageDocument, derivation: &Derivation) {
         reduction,
         ..
     } = derivation;
+    // The model that the table belongs to comes first.
     page.heading("Products of dynamic parameters");
     let mut line = vec![text(
         "The forces of the drives are linear in products of dynamic parameters, eq. (5): ",
@@ -125,6 +129,7 @@ pub(super) fn products(page: &mut PageDocument, derivation: &Derivation) {
     page.paragraph(line);
     // Nominal values of single parameters; the value of a product follows from them.
     let parameters: Vec<f64> = mechanism.parameters.iter().map(|p| p.nominal).collect();
+    // One row per product of p_g.
     let rows = reduction
         .products
         .iter()
@@ -154,6 +159,7 @@ pub(super) fn products(page: &mut PageDocument, derivation: &Derivation) {
             rows,
         },
     );
+    // Products without effect are listed, so that a reader does not look for them in the table.
     if !reduction.without_effect.is_empty() {
         let mut line: TextLine = vec![text(
             "These products do not affect the drives and are left out: ",
@@ -176,6 +182,7 @@ pub(super) fn dependencies(page: &mut PageDocument, derivation: &Derivation) {
         reduction,
         ..
     } = derivation;
+    // Without dependencies one sentence is enough.
     page.heading("Dependent columns");
     if reduction.dependencies.is_empty() {
         let mut says =
@@ -208,6 +215,7 @@ pub(super) fn dependencies(page: &mut PageDocument, derivation: &Derivation) {
         .iter()
         .enumerate()
         .map(|(i, line)| PageEquation {
+            // The dependent column.
             left: column_symbol(mechanism, &reduction.products[line.product]),
             right: {
                 let retained = line.equals.iter();
@@ -237,6 +245,7 @@ pub(super) fn base_parameters(
         reduction,
         ..
     } = derivation;
+    // A sentence with the rank, then the equations, then the values.
     page.heading("Base parameters");
     let rank = reduction.retained.len();
     let mut line = vec![text(format!(
@@ -245,6 +254,7 @@ pub(super) fn base_parameters(
     ))];
     line.extend(linear_model("H_min", "p_min"));
     line.push(text("."));
+    // The numeric check, if the caller has made it.
     if let Some(n) = numeric {
         let verdict = if n.rank == rank {
             ", as derived"
@@ -287,10 +297,12 @@ pub(super) fn base_parameters(
             });
         page.equations("sums", sums.collect());
     }
+    // Factored forms, which are shorter than the expanded ones that scripts read.
     let grouped = (0..rank)
         .map(|k| equation(k, factored_base_expression(derivation, k)))
         .collect();
     page.equations("base parameters", grouped);
+    // Identified values where the file has them, nominal ones otherwise.
     let values = derivation.nominal_base_values();
     let rows = (0..rank)
         .map(|k| {

@@ -25,6 +25,7 @@ pub(super) fn effects(page: &mut PageDocument, mechanism: &Mechanism) {
     // Fallbacks are long, so that no model uses them by chance.
     let each = free(EACH, "x_of_the_place");
     let other = free(OTHER, "x_of_the_other_place");
+    // How the table is read.
     page.heading("Effects");
     page.paragraph([
         text("Each effect adds a force at its place. The name of a linear drive stands for its length, "),
@@ -55,6 +56,7 @@ pub(super) fn effects(page: &mut PageDocument, mechanism: &Mechanism) {
         .effects
         .iter()
         .map(|effect| {
+            // Places by their names in the model file.
             let mut places = TextLine::new();
             for (i, place) in effect.places.iter().enumerate() {
                 if i > 0 {
@@ -62,6 +64,7 @@ pub(super) fn effects(page: &mut PageDocument, mechanism: &Mechanism) {
                 }
                 places.push(code(mechanism.place_name(*place)));
             }
+            // The second place of a coupling.
             if let Some(other) = effect.other {
                 places.push(text(", by "));
                 places.push(code(mechanism.place_name(other)));
@@ -91,6 +94,7 @@ fn effect_contribution(
         .collect();
     // Effects without mechanics are expressions of the motion at their place.
     let Some(mechanics) = effect.mechanics else {
+        // A joint is named by its coordinate, a linear drive by its length.
         let name = |place: &EffectPlace| match place {
             EffectPlace::Drive(d) => match mechanism.drives[d.0].kind {
                 DriveKind::Joint(c) => Some(&*mechanism.coordinates[c.0].name),
@@ -105,6 +109,7 @@ fn effect_contribution(
             _ => each,
         };
         let other = effect.other.as_ref().and_then(name).unwrap_or(other);
+        // The sum of parameter times expression.
         let terms = effect.terms.iter().zip(&names);
         let sum = PrintedFormula::sum(terms.map(|(term, parameter)| {
             let factor = exact_formula_at(mechanism, &term.expression, [x, other]);

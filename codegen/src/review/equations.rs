@@ -140,6 +140,7 @@ fn as_map<S: Serializer>(pairs: &[(String, String)], serializer: S) -> Result<S:
 impl ReducedEquations {
     /// Collects texts and counts of a derivation. `numeric` adds the rank on the file's values.
     pub fn new(derivation: &Derivation, numeric: Option<&NumericRank>) -> Self {
+        // The fields that the equations are printed from.
         let Derivation {
             mechanism,
             reduction,
@@ -173,6 +174,7 @@ impl ReducedEquations {
             model: mechanism.name.clone(),
             parameters: (0..reduction.products.len()).map(product).collect(),
             dependencies: dependent.chain(vanishing).collect(),
+            // Named sums exist only where base parameters are long.
             sums: derivation.base_sums(),
             base: (0..reduction.retained.len())
                 .map(|k| BaseParameterLine {
@@ -181,6 +183,7 @@ impl ReducedEquations {
                     expression: base_expression(derivation, k).text(),
                 })
                 .collect(),
+            // Exact rank only if the reduction was exact.
             rank: RankSummary {
                 exact: matches!(reduction.method, ReductionMethod::Exact { .. })
                     // A numeric reduction states its rank with its method, so that it is not taken for an exact one.
@@ -189,6 +192,7 @@ impl ReducedEquations {
                 samples: numeric.map(|n| n.samples),
                 method: NumericMethod::from_reduction(reduction),
             },
+            // Operations of a state; precomputed values are not counted.
             operations: ProgramOperations {
                 regressor: programs.regressor.count_operations(ProgramStage::State),
                 inverse_dynamics: programs
@@ -204,6 +208,7 @@ impl ReducedEquations {
     pub fn json(&self) -> String {
         let mut text =
             serde_json::to_string_pretty(self).expect("strings and counts always make JSON");
+        // A text file ends with a line feed.
         text.push('\n');
         text
     }

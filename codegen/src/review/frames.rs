@@ -26,6 +26,7 @@ pub(super) fn frames(page: &mut PageDocument, mechanism: &Mechanism) {
             true,
         ),
     ] {
+        // One table per convention, with the frames that use it.
         let rows: Vec<Vec<TextLine>> = mechanism.frames[1..]
             .iter()
             .filter(|frame| match frame.convention {
@@ -39,6 +40,7 @@ pub(super) fn frames(page: &mut PageDocument, mechanism: &Mechanism) {
                 row
             })
             .collect();
+        // A convention that no frame uses has no table.
         if rows.is_empty() {
             continue;
         }
@@ -46,6 +48,7 @@ pub(super) fn frames(page: &mut PageDocument, mechanism: &Mechanism) {
         let head = vec!["frame", "on", "a", "alpha", "d", "theta"];
         page.blocks.push(PageBlock::Table(PageTable { head, rows }));
     }
+    // Frames that are given by single rotations and translations.
     let rows: Vec<Vec<TextLine>> = mechanism.frames[1..]
         .iter()
         .filter(|frame| matches!(frame.convention, FrameConvention::Transform(_)))
@@ -54,6 +57,7 @@ pub(super) fn frames(page: &mut PageDocument, mechanism: &Mechanism) {
             let mut steps: TextLine = Vec::new();
             for step in &frame.steps {
                 let (letter, axis, by) = match step {
+                    // A floating body is described in words.
                     FrameStep::Free(body) => {
                         steps.extend(free_body_motion(mechanism, body));
                         continue;
@@ -61,6 +65,7 @@ pub(super) fn frames(page: &mut PageDocument, mechanism: &Mechanism) {
                     FrameStep::Rotate(axis, by) => ("R", axis, angle_formula(mechanism, by)),
                     FrameStep::Translate(axis, by) => ("T", axis, length_formula(mechanism, by)),
                 };
+                // The letter of the axis becomes part of the name: `Rx`, `Tz`.
                 let axis = match axis {
                     FrameAxis::X => "x",
                     FrameAxis::Y => "y",
@@ -85,6 +90,7 @@ pub(super) fn frames(page: &mut PageDocument, mechanism: &Mechanism) {
         let head = vec!["frame", "on", "transform"];
         page.blocks.push(PageBlock::Table(PageTable { head, rows }));
     }
+    // Points with their frames and positions.
     let rows: Vec<Vec<TextLine>> = mechanism
         .points
         .iter()
@@ -130,12 +136,14 @@ fn free_body_motion(mechanism: &Mechanism, body: &FreeBody) -> TextLine {
 /// Lengths a and d (m), angles alpha and theta (rad), in the order a, alpha, d, theta.
 /// Steps about or along the same axis are summed.
 fn dh_parameters(mechanism: &Mechanism, frame: &ModelFrame) -> [PrintedFormula; 4] {
+    // The angle about an axis.
     let rotation = |wanted: FrameAxis| {
         PrintedFormula::sum(frame.steps.iter().filter_map(|step| match step {
             FrameStep::Rotate(axis, by) if *axis == wanted => Some(angle_formula(mechanism, by)),
             _ => None,
         }))
     };
+    // The length along an axis.
     let translation = |wanted: FrameAxis| {
         PrintedFormula::sum(frame.steps.iter().filter_map(|step| match step {
             FrameStep::Translate(axis, by) if *axis == wanted => {
@@ -145,6 +153,7 @@ fn dh_parameters(mechanism: &Mechanism, frame: &ModelFrame) -> [PrintedFormula; 
         }))
     };
     [
+        // The convention has a along x, alpha about x, d along z and theta about z.
         translation(FrameAxis::X),
         rotation(FrameAxis::X),
         translation(FrameAxis::Z),
@@ -173,6 +182,7 @@ fn inertia_entries(
 ) -> TextLine {
     let mut line = Vec::new();
     for (name, value) in names.iter().zip(values) {
+        // Most inertias have few entries.
         if value.is_zero() {
             continue;
         }
@@ -196,6 +206,7 @@ pub(super) fn bodies(page: &mut PageDocument, mechanism: &Mechanism) {
     page.heading("Bodies");
     let (mut about_centre, mut linear) = (Vec::new(), Vec::new());
     for part in &mechanism.parts {
+        // Name and frame of a part.
         let start = vec![
             cell(text(&*part.name)),
             cell(code(&*mechanism.frames[part.frame.0].name)),
@@ -219,6 +230,7 @@ pub(super) fn bodies(page: &mut PageDocument, mechanism: &Mechanism) {
         row.push(inertia_entries(mechanism, PLACES, inertia));
         rows.push(row);
     }
+    // Each form has its own table, because the third and fourth columns differ.
     if !about_centre.is_empty() {
         page.paragraph([text(
             "Parts by mass, centre of mass, and inertia about the centre of mass in the frame's axes. Entries not listed are zero.",
@@ -263,6 +275,7 @@ fn lumped_masses(page: &mut PageDocument, mechanism: &Mechanism) {
             // The share is exact, such as 1/2 of a rod's mass.
             let share = Rational::from(lump.share.clone());
             let mass = PrintedFormula::product(share, [exact_formula(mechanism, &lump.mass)]);
+            // Usually both balances use the same point.
             let same = lump.force_at == lump.moment_at;
             apart += usize::from(!same);
             let moment = if same {
@@ -287,6 +300,7 @@ fn lumped_masses(page: &mut PageDocument, mechanism: &Mechanism) {
     page.table("lumped masses", PageTable { head, rows });
     // Such a mass belongs to a simplified model and not to a rigid body, which a reader has to know.
     if apart > 0 {
+        // The noun in singular or plural.
         let n = if apart == 1 {
             "one mass".to_owned()
         } else {

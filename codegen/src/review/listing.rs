@@ -35,6 +35,7 @@ pub(super) fn list_program(
     outputs: &[FormulaSymbol],
     prefix: &str,
 ) -> ProgramListing {
+    // How often a value is used decides whether it gets a name.
     let uses = count_uses(program);
     let mut lister = ListingBuilder {
         mechanism,
@@ -50,6 +51,7 @@ pub(super) fn list_program(
     // Names of quantities and outputs are taken before any name is generated.
     lister.taken.extend(names.values().map(|m| m.symbol.text()));
     lister.taken.extend(outputs.iter().map(FormulaSymbol::text));
+    // Whether a value is an output.
     let is_output = |i: usize| program.outputs.iter().any(|o| o.index() == i);
     // Values in order: each becomes a formula, and an equation if it gets a name.
     for (i, op) in program.ops.iter().enumerate() {
@@ -58,7 +60,9 @@ pub(super) fn list_program(
             lister.formulas.push(PrintedFormula::integer(0));
             continue;
         }
+        // The formula with operands inlined or named.
         let formula = lister.formula(op);
+        // A single name or number needs no name of its own.
         let simple = count_leaves(&formula) < 2;
         // Whether the value gets a name, and which: known quantity, sine or cosine, shared, long, or used by a later
         // stage.
@@ -71,6 +75,7 @@ pub(super) fn list_program(
             _ if simple => None,
             // An output used nowhere else is written where the outputs are.
             _ if is_output(i) && uses[i].count == 1 => None,
+            // Functions always have a line of their own, because their arguments are long.
             ProgramOp::Atan2(..) | ProgramOp::Unary(..) => {
                 Some(lister.next_symbol(program.stages[i]))
             }
@@ -82,6 +87,7 @@ pub(super) fn list_program(
             }
             _ => None,
         };
+        // A named value becomes an equation, all others stay formulas.
         match wanted {
             // The named quantity may be the negative of this value; then the equation and its uses change sign.
             Some(symbol) => {
@@ -124,6 +130,7 @@ fn count_uses(program: &StraightLineProgram) -> Vec<ValueUses> {
         uses[output.index()].count += 1;
     }
     for i in (0..program.ops.len()).rev() {
+        // Operations that nothing needs do not count as users.
         if uses[i].count == 0 {
             continue;
         }
@@ -156,6 +163,7 @@ struct ListingBuilder<'a> {
 impl ListingBuilder<'_> {
     /// Appends `left = right` to the equations of the stage.
     fn add_equation(&mut self, stage: ProgramStage, left: FormulaSymbol, right: PrintedFormula) {
+        // The tag is not known before the listing is complete.
         let equation = PageEquation {
             left: PrintedFormula::Symbol(left),
             right,
@@ -170,6 +178,7 @@ impl ListingBuilder<'_> {
 
     /// A name for a value without a meaning of its own: k1, k2, ... once per geometry, x1, x2, ... at every state.
     fn next_symbol(&mut self, stage: ProgramStage) -> FormulaSymbol {
+        // Numbers of both stages are independent.
         let (letter, counter) = match stage {
             ProgramStage::Fixed => ("k", 0),
             ProgramStage::State => ("x", 1),
@@ -185,6 +194,7 @@ impl ListingBuilder<'_> {
 
     /// A symbol for a sine or cosine: `s_theta1`, `c_theta1`, ... An angle that is no sum of names is numbered.
     fn trigonometric_symbol(&mut self, op: &ProgramOp, angle: usize) -> FormulaSymbol {
+        // The same angle may have a sine and a cosine.
         let letter = if matches!(op, ProgramOp::Sin(_)) {
             "s"
         } else {
@@ -204,6 +214,7 @@ impl ListingBuilder<'_> {
 
     /// The formula of an operation, with the formulas of its operands in place.
     fn formula(&self, op: &ProgramOp) -> PrintedFormula {
+        // Operands as formulas or symbols.
         let at = |v: &crate::ValueId| self.formulas[v.index()].clone();
         match op {
             ProgramOp::Number(n) => PrintedFormula::Number(n.clone()),
@@ -236,6 +247,7 @@ fn count_leaves(formula: &PrintedFormula) -> usize {
             above,
             below,
         } => {
+            // A factor of one is not printed.
             let number = usize::from(!factor.abs().is_one());
             number + above.iter().chain(below).map(count_leaves).sum::<usize>()
         }
@@ -260,6 +272,7 @@ fn angle_name(formula: &PrintedFormula) -> Option<String> {
             let [PrintedFormula::Symbol(symbol)] = above.as_slice() else {
                 return None;
             };
+            // An integer factor is part of the name: `2theta1`, `mtheta1` for minus.
             let (n, d) = factor.as_small()?;
             let sign = if n < 0 { "m" } else { "" };
             let count = match n.unsigned_abs() {

@@ -55,7 +55,9 @@ pub(super) fn loops(page: &mut PageDocument, derivation: &Derivation) {
     // The tag counts all closure equations, so that a missing number shows that a long one was left out.
     let mut tag = 0;
     for (l, closure) in mechanism.loops.iter().zip(&projection.loops.closures) {
+        // The two points that coincide.
         let [a, b] = l.joins.map(|p| code(&*mechanism.points[p.0].name));
+        // A chain of links exists for planar loops only.
         let plane = if closure.chain.is_some() {
             "; the loop is planar"
         } else {
@@ -70,6 +72,7 @@ pub(super) fn loops(page: &mut PageDocument, derivation: &Derivation) {
             b,
             text(format!(" coincide{plane}.")),
         ]);
+        // Equations that fit into a line.
         let lines = closure
             .residual
             .iter()
@@ -88,7 +91,9 @@ pub(super) fn loops(page: &mut PageDocument, derivation: &Derivation) {
     // How the passive coordinates are computed: not at all, in closed form, or iteratively.
     match &programs.passive_position {
         PassivePosition::None => {}
+        // Closed form: the steps of the solution.
         PassivePosition::Closed => list_closed_form(page, derivation),
+        // Iterative: the list of the coordinates is enough.
         PassivePosition::Newton { .. } => {
             let mut line = vec![text("The passive coordinates ")];
             line.extend(coordinate_names(mechanism, &projection.loops.passive));
@@ -115,6 +120,7 @@ pub(super) fn loops(page: &mut PageDocument, derivation: &Derivation) {
         .collect();
     let mut says = "Their rates and accelerations follow from the differentiated closure equations, which are linear in them."
         .to_owned();
+    // Determinants that are too long are not listed.
     if determinants.is_empty() {
         says.push_str(" A pose where their matrix is singular is reported.");
     } else {
@@ -135,6 +141,7 @@ fn list_couplings(page: &mut PageDocument, derivation: &Derivation) {
     let closures = equations.projection.loops.closures.iter();
     let mut lines = Vec::new();
     for follower in closures.filter_map(|closure| closure.follower.as_ref()) {
+        // A long coupling is left out.
         let Some(right) = short_formula(graph, mechanism, follower.value) else {
             continue;
         };
@@ -148,6 +155,7 @@ fn list_couplings(page: &mut PageDocument, derivation: &Derivation) {
     if lines.is_empty() {
         return;
     }
+    // Equations of all couplings together.
     page.heading("Couplings");
     page.paragraph([text(
         "These coordinates are determined by others, and so are their rates and accelerations. A force on one of them acts \
@@ -169,6 +177,7 @@ fn list_closed_form(page: &mut PageDocument, derivation: &Derivation) {
     };
     // Relations between angles of parallelograms and the like are gathered and shown at the end.
     let mut related = Vec::new();
+    // Whether a coordinate is determined by a coupling.
     let is_follower = |i: &usize| {
         let mut couplings = mechanism.couplings.iter();
         couplings.any(|coupling| coupling.coordinate.0 == *i)
@@ -179,6 +188,7 @@ fn list_closed_form(page: &mut PageDocument, derivation: &Derivation) {
             continue;
         }
         for relation in &step.solved.relations {
+            // Offsets are multiples of pi/12.
             let offset = Rational::new(i64::from(relation.pi12), 12);
             related.push(PageEquation {
                 left: PrintedFormula::name(&*mechanism.coordinates[relation.coordinate].name),
@@ -239,9 +249,11 @@ pub(super) fn drives(page: &mut PageDocument, derivation: &Derivation) {
         .iter()
         // A joint drive acts on a coordinate, a linear drive between two points.
         .map(|drive| {
+            // What the force acts on, and its sign.
             let acts = match drive.kind {
                 DriveKind::Joint(i) => {
                     let coordinate = &mechanism.coordinates[i.0];
+                    // Torque or force, by the motion of the coordinate.
                     let kind = match coordinate.motion.place_load() {
                         PlaceLoad::Torque => "torque on ",
                         _ => "force on ",
@@ -293,7 +305,9 @@ pub(super) fn drives(page: &mut PageDocument, derivation: &Derivation) {
             });
             Some(())
         };
+        // The length.
         line(format!("l_{}", drive.name), projection.drives[d].coordinate);
+        // The row of the Jacobian.
         for (a, slope) in projection
             .loops
             .active

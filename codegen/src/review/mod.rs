@@ -54,6 +54,7 @@ pub enum PageFormat {
 ///
 /// `numeric` is the rank of eq. (9) on the file's values, if the caller has computed it.
 pub fn page(derivation: &Derivation, format: PageFormat, numeric: Option<&NumericRank>) -> String {
+    // JSON needs no page, so it is composed on demand.
     let document = || compose_page(derivation, numeric);
     match format {
         PageFormat::Text => render_text::render(&document()),
@@ -69,6 +70,7 @@ pub fn page(derivation: &Derivation, format: PageFormat, numeric: Option<&Numeri
 
 /// The mechanism at its nominal pose, as an inline SVG.
 fn mechanism_picture(mechanism: &Mechanism) -> String {
+    // Nominal pose, from the direction in which the mechanism is seen best.
     let nominal: Vec<f64> = mechanism.coordinates.iter().map(|c| c.nominal).collect();
     let scene = MechanismScene::new(mechanism, &nominal);
     inline_svg(&[&scene], &scene.best_view(), &DrawingStyle::default())
@@ -77,11 +79,13 @@ fn mechanism_picture(mechanism: &Mechanism) -> String {
 /// The page in the order of the derivation: given quantities, kinematics, effects, base parameters, programs.
 fn compose_page(derivation: &Derivation, numeric: Option<&NumericRank>) -> PageDocument {
     let mechanism = &derivation.mechanism;
+    // The title of the model file, or the name of the model.
     let title = mechanism.title.clone();
     let mut page = PageDocument {
         title: title.unwrap_or_else(|| mechanism.name.clone()),
         blocks: Vec::new(),
     };
+    // Sections in the order in which one follows from the others.
     parameters::summary(&mut page, derivation);
     parameters::quantities(&mut page, mechanism);
     frames::frames(&mut page, mechanism);

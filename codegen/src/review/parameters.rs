@@ -16,6 +16,7 @@ pub(super) fn summary(page: &mut PageDocument, derivation: &Derivation) {
         1 => format!("1 {one}"),
         n => format!("{n} {many}"),
     };
+    // The number of passive coordinates is shown in parentheses.
     let passive = mechanism.coordinates.iter().filter(|c| c.passive).count();
     page.paragraph([
         text("Model "),
@@ -43,6 +44,7 @@ pub(super) fn quantities(page: &mut PageDocument, mechanism: &Mechanism) {
     if !mechanism.constants.is_empty() {
         page.heading("Constants");
     }
+    // Notes of the model file explain the symbols.
     let remark = |note: &Option<String>| cell(text(note.clone().unwrap_or_default()));
     let rows = mechanism
         .constants
@@ -63,6 +65,7 @@ pub(super) fn quantities(page: &mut PageDocument, mechanism: &Mechanism) {
         .gravity
         .each_ref()
         .map(|g| exact_formula(mechanism, g));
+    // A model without gravity states so.
     if gravity.iter().all(PrintedFormula::is_zero) {
         page.paragraph([text("Gravity does not act.")]);
     } else {
@@ -79,6 +82,7 @@ pub(super) fn quantities(page: &mut PageDocument, mechanism: &Mechanism) {
             text("."),
         ]);
     }
+    // Nominal values as in the model file.
     page.heading("Dynamic parameters");
     let rows = mechanism
         .parameters
@@ -94,6 +98,7 @@ pub(super) fn quantities(page: &mut PageDocument, mechanism: &Mechanism) {
         .collect();
     let head = vec!["symbol", "nominal", "unit", "meaning"];
     page.table("parameters", PageTable { head, rows });
+    // The role states which coordinates are inputs of the programs.
     page.heading("Coordinates");
     // A coordinate with a coupling is a given function of others.
     let follows = |i: usize| {
@@ -106,6 +111,7 @@ pub(super) fn quantities(page: &mut PageDocument, mechanism: &Mechanism) {
         .enumerate()
         .map(|(i, c)| {
             let in_unit = c.motion.unit();
+            // Angles are in rad, lengths in m.
             let kind = if c.motion.is_angle() {
                 "angle"
             } else {

@@ -32,6 +32,7 @@ pub(super) fn programs(page: &mut PageDocument, derivation: &Derivation) {
         ("H, all products", &programs.full_regressor),
         ("p_min from parameters", &programs.base_parameters),
     ] {
+        // A model without loops has no program for passive coordinates.
         if program.outputs.is_empty() {
             continue;
         }
@@ -39,6 +40,7 @@ pub(super) fn programs(page: &mut PageDocument, derivation: &Derivation) {
             (ProgramStage::State, "state"),
             (ProgramStage::Fixed, "geometry"),
         ] {
+            // Operations by kind.
             let count = program.count_operations(stage);
             // A program that does nothing at a state, or nothing beforehand, needs no line for it.
             if count == OperationCount::default()
@@ -48,6 +50,7 @@ pub(super) fn programs(page: &mut PageDocument, derivation: &Derivation) {
                 continue;
             }
             let mut row = vec![cell(text(what)), cell(text(when))];
+            // One column per kind of operation.
             row.extend(
                 [
                     count.add,
@@ -67,6 +70,7 @@ pub(super) fn programs(page: &mut PageDocument, derivation: &Derivation) {
     ];
     page.blocks.push(PageBlock::Table(PageTable { head, rows }));
 
+    // The legend comes first, then one folded listing per program.
     page.heading("Programs");
     let listings = listings(derivation);
     page.paragraph([text(
@@ -95,11 +99,13 @@ pub(super) fn listings(derivation: &Derivation) -> Vec<ListedProgram<'_>> {
         reduction,
         ..
     } = derivation;
+    // Known quantities are recognised by their values at a random state.
     let meanings = NamedQuantities::new(derivation);
     let taken = reserved_names(mechanism);
     // Names of quantities apply within a program; symbols of outputs take precedence.
     let list = |program: &StraightLineProgram, outputs: &[FormulaSymbol], prefix: &str| {
         let mut names = meanings.name_values(program);
+        // An output keeps its own symbol.
         names.retain(|_, meaning| !outputs.contains(&meaning.symbol));
         // Outputs that are motions of coordinates or drives get their symbol where they are computed.
         for (value, symbol) in program.outputs.iter().zip(outputs) {
@@ -144,6 +150,7 @@ pub(super) fn listings(derivation: &Derivation) -> Vec<ListedProgram<'_>> {
             outputs.extend(lengths);
         }
         for d in &mechanism.drives {
+            // One entry of the Jacobian per active coordinate.
             let row = active.iter().map(|a| {
                 FormulaSymbol::new(format!("J_{}_{}", d.name, mechanism.coordinates[*a].name))
             });
@@ -157,6 +164,7 @@ pub(super) fn listings(derivation: &Derivation) -> Vec<ListedProgram<'_>> {
         .flat_map(|d| (0..rank).map(move |k| FormulaSymbol::new(format!("H_{}_{}", d + 1, k + 1))))
         .collect();
     let rows: Vec<&str> = mechanism.drives.iter().map(|d| &*d.name).collect();
+    // The title names the first and the last column.
     let columns = match rank {
         0 => "none".to_owned(),
         1 => base_name(0),
@@ -215,6 +223,7 @@ fn add_legend(page: &mut PageDocument, listings: &[ListedProgram<'_>]) {
     for (_, _, _, listing) in listings {
         for equation in listing.fixed.iter().chain(&listing.state) {
             if let PrintedFormula::Symbol(symbol) = &equation.left {
+                // Names such as `omega_S3_z` begin with the letter.
                 let head = symbol.name.split('_').next().unwrap_or_default();
                 used.insert(head.trim_end_matches(|c: char| c.is_ascii_digit()));
             }
@@ -261,6 +270,7 @@ fn is_trivial(program: &StraightLineProgram, i: usize) -> bool {
 fn add_folded_listing(page: &mut PageDocument, title: &str, listing: ProgramListing) {
     let ProgramListing { fixed, state } = listing;
     let mut blocks: Vec<PageBlock> = Vec::new();
+    // A stage without equations has no heading.
     let mut part = |says: &str, equations: Vec<PageEquation>| {
         if !equations.is_empty() {
             blocks.push(PageBlock::Paragraph(vec![text(says)]));

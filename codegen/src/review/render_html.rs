@@ -15,6 +15,7 @@ use crate::expr::print::PrintedFormula;
 
 /// The page as HTML. `picture` is an SVG of the mechanism.
 pub(super) fn render(document: &PageDocument, picture: &str) -> String {
+    // The frame of the page is the same for all pages.
     let mut out = page::begin(&document.title);
     // Links to all sections come first.
     let headings: Vec<&String> = document
@@ -57,6 +58,7 @@ fn blocks(out: &mut String, blocks: &[PageBlock]) {
             }
             PageBlock::Paragraph(line) => _ = writeln!(out, "<p>{}</p>", inlines(line)),
             PageBlock::Table(table) => {
+                // The wrapper scrolls if the table is wider than the page.
                 out.push_str("<div class=\"wide\"><table>\n<thead><tr>");
                 for head in &table.head {
                     _ = write!(out, "<th scope=\"col\">{}</th>", escape(head));
@@ -110,6 +112,7 @@ fn unit(text: &str) -> String {
     let mut out = String::new();
     let mut raised = false;
     for c in text.chars() {
+        // The exponent begins after the caret.
         if c == '^' {
             out.push_str("<sup>");
             raised = true;
@@ -149,6 +152,7 @@ fn inlines(line: &TextLine) -> String {
             InlineSpan::Text(text) => escape(text).into_owned(),
             InlineSpan::Unit(text) => unit(text),
             InlineSpan::Code(text) => format!("<code>{}</code>", escape(text)),
+            // U+2212 is the minus sign.
             InlineSpan::Math(PrintedFormula::Number(n)) => n.to_string().replace('-', "\u{2212}"),
             InlineSpan::Math(formula) => mathml_segments(formula),
         })

@@ -14,6 +14,7 @@ const LINE: usize = 75;
 
 /// The page as a LaTeX document.
 pub(super) fn render(document: &PageDocument) -> String {
+    // The preamble needs only common packages.
     let mut out = String::from(
         "\\documentclass[a4paper,10pt]{article}\n\
          \\usepackage[utf8]{inputenc}\n\
@@ -45,6 +46,7 @@ fn blocks(out: &mut String, blocks: &[PageBlock]) {
             PageBlock::Table(table) => write_table(out, table),
             PageBlock::Equations(equations) => {
                 for equation in equations {
+                    // The tag is that of the page, not a number of LaTeX.
                     let tag = format!(" \\tag{{{}}}", equation.tag);
                     _ = writeln!(out, "\\[\n{}\n\\]", align_equation(equation, &tag));
                 }
@@ -60,7 +62,7 @@ fn blocks(out: &mut String, blocks: &[PageBlock]) {
 
 /// A table that may break across pages, with its head repeated.
 fn write_table(out: &mut String, table: &PageTable) {
-    // The last column of a wide table holds prose and may break.
+    // The last column of a wide table has prose and may break.
     let n = table.head.len();
     let wide = table.rows.iter().any(|row| {
         row.last()
@@ -87,6 +89,7 @@ pub(super) fn align_equation(equation: &PageEquation, end: &str) -> String {
         .unit
         .as_ref()
         .map_or_else(String::new, |text| format!(" \\quad [{}]", unit(text)));
+    // A sum of one line needs no alignment.
     let lines = break_sum(&equation.right);
     let left = equation.left.latex();
     if let [line] = lines.as_slice() {
@@ -102,6 +105,7 @@ pub(super) fn align_equation(equation: &PageEquation, end: &str) -> String {
 fn break_sum(formula: &PrintedFormula) -> Vec<String> {
     let mut lines: Vec<(usize, Vec<PrintedFormula>)> = Vec::new();
     for term in line_terms(formula) {
+        // The width of the plain text is a good estimate of that of the formula.
         let width = term.text().len() + 3;
         match lines.last_mut() {
             Some((used, line)) if *used + width <= LINE => {
@@ -115,12 +119,13 @@ fn break_sum(formula: &PrintedFormula) -> Vec<String> {
         .into_iter()
         .enumerate()
         .map(|(i, (_, line))| {
+            // A continued line begins with the sign of its first term.
             let leading = if i > 0 && !line[0].is_negative() {
                 "+ "
             } else {
                 ""
             };
-            // The first term stays first whatever its sign.
+            // The first term stays first even if it is negative.
             let sum = if line.len() == 1 {
                 line[0].latex()
             } else {

@@ -34,6 +34,7 @@ fn blocks(out: &mut String, blocks: &[PageBlock]) {
                 out.push('\n');
             }
             PageBlock::Equations(equations) => write_equations(out, equations),
+            // Markdown allows HTML for this.
             PageBlock::Folded(summary, inner) => {
                 _ = writeln!(out, "<details><summary>{}</summary>\n", html(summary));
                 self::blocks(out, inner);
@@ -45,6 +46,7 @@ fn blocks(out: &mut String, blocks: &[PageBlock]) {
 
 /// Equations in display style, or as one block of text if they are many.
 fn write_equations(out: &mut String, equations: &[PageEquation]) {
+    // Many formulas are slow to display, and hard to copy.
     if equations.len() > MOST_DISPLAYED {
         _ = writeln!(
             out,

@@ -65,6 +65,7 @@ pub(super) fn plain_text(line: &TextLine) -> String {
 fn wrap(out: &mut String, text: &str, indent: usize) {
     let mut column = 0;
     for word in text.split(' ') {
+        // Width in characters, which is that of the terminal for the letters used here.
         let width = word.chars().count();
         if column > 0 && column + 1 + width > WIDTH {
             _ = write!(out, "\n{:indent$}", "");
@@ -89,6 +90,7 @@ fn write_table(out: &mut String, table: &PageTable) {
     let head: Vec<String> = table.head.iter().map(|h| (*h).to_owned()).collect();
     // An empty row marks the place of the rule.
     let rule: Vec<String> = Vec::new();
+    // Width of each column, with its head.
     let widths: Vec<usize> = (0..head.len())
         .map(|i| {
             rows.iter()
@@ -114,6 +116,7 @@ fn write_table(out: &mut String, table: &PageTable) {
 
 /// Equations one below the other with right-aligned tags; long ones are broken after a term.
 pub(super) fn equation_lines(equations: &[PageEquation]) -> String {
+    // Tags are right-aligned, so that the equations begin in one column.
     let widest = equations
         .iter()
         .map(|e| e.tag.chars().count() + 2)
@@ -124,6 +127,7 @@ pub(super) fn equation_lines(equations: &[PageEquation]) -> String {
         let tag = format!("({})", equation.tag);
         let start = format!("  {tag:>widest$}  {} = ", equation.left);
         let indent = start.chars().count();
+        // The unit follows the equation in brackets.
         let mut body = equation.right.text();
         if let Some(unit) = &equation.unit {
             _ = write!(body, "   [{unit}]");
@@ -134,6 +138,7 @@ pub(super) fn equation_lines(equations: &[PageEquation]) -> String {
         for (i, piece) in split_at_signs(&body).into_iter().enumerate() {
             let width = piece.chars().count();
             if i > 0 && column + width > WIDTH {
+                // A long left side would leave too little room for continued lines.
                 let indent = indent.min(40);
                 _ = write!(out, "\n{:indent$}", "");
                 column = indent;
@@ -153,6 +158,7 @@ fn split_at_signs(text: &str) -> Vec<&str> {
     split_to_depth(text, 0)
         .into_iter()
         .flat_map(|piece| {
+            // A long product of sums is broken inside its parentheses.
             if piece.len() > WIDTH - 40 {
                 split_to_depth(piece, usize::MAX)
             } else {
