@@ -65,6 +65,7 @@ const IN_SCOPE: [&str; 20] = [
 /// Other names are spelled with a leading `_`, which no name of a model file has. Characters that an identifier cannot
 /// contain are written as their code, so that different names stay different.
 pub(super) fn field_identifier(name: &str) -> Ident {
+    // Letters first, then letters, digits and underscores.
     let plain = name.starts_with(|c: char| c.is_ascii_alphabetic())
         // Only ASCII names are taken as they are; others may look alike after normalisation.
         && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
@@ -72,6 +73,7 @@ pub(super) fn field_identifier(name: &str) -> Ident {
     if !plain {
         return Ident::new(&valid_spelling(name), Span::call_site());
     }
+    // A keyword is no identifier for the parser, and needs the raw form.
     if NEWER_KEYWORDS.contains(&name) || syn::parse_str::<syn::Ident>(name).is_err() {
         Ident::new_raw(name, Span::call_site())
     } else {
@@ -91,6 +93,7 @@ pub(super) fn module_identifier(name: &str) -> Ident {
 /// A leading `_` and the name with other characters as `_HEX_`.
 fn valid_spelling(name: &str) -> String {
     let mut spelled = "_".to_owned();
+    // The code of a character is unique, so that no two names become equal.
     for c in name.chars() {
         if c.is_ascii_alphanumeric() {
             spelled.push(c);

@@ -59,12 +59,14 @@ pub fn vectors_c(derivation: &Derivation, program: &StraightLineProgram, width: 
         _ => None,
     });
     let (parts, places): (BTreeSet<usize>, Vec<usize>) = read.unzip();
+    // Columns per array: one per active coordinate, and the loads up to the last one that is read.
     let loads = places.iter().map(|k| (k + 1).saturating_sub(3 * n_active));
     let widths = [n_active, n_active, n_active, loads.max().unwrap_or(0)];
 
     // One statement per operation: fixed values in front of the loop, values of a state inside it.
     let (mut fixed, mut of_state) = (String::new(), String::new());
     let n = program.ops.len();
+    // The order of the emitted Rust, without names and sections.
     for i in in_order(program, &vec![false; n], &vec![false; n], &vec![0; n]) {
         let op = &program.ops[i];
         let _ = match program.stages[i] {
@@ -84,12 +86,15 @@ pub fn vectors_c(derivation: &Derivation, program: &StraightLineProgram, width: 
     for guard in &program.guards {
         let value = vector_operand(guard.value(), &is_fixed);
         let _ = match guard {
+            // The complement is taken, so that NaN sets the bits.
             PoseGuard::Reachable(_) => writeln!(of_state, "            bad |= ~({value} >= 0.0);"),
             PoseGuard::Regular(_, size) => {
                 let size = vector_operand(*size, &is_fixed);
+                // A determinant is compared with the magnitude of its terms.
                 let holds = format!("absolute({value}) > {SINGULAR:e} * {size}");
                 writeln!(of_state, "            bad |= ~({holds});")
             }
+            // NaN and infinity are collected in `none`.
             PoseGuard::Finite(_) => writeln!(of_state, "            look_at({value}, &none);"),
         };
     }
@@ -101,6 +106,7 @@ pub fn vectors_c(derivation: &Derivation, program: &StraightLineProgram, width: 
     // Checks for missing arrays, transposition of inputs, and prefetching, one line per array.
     let [mut given, mut reads, mut fetches] = [const { String::new() }; 3];
     for part in 0..widths.len() {
+        // An array that is read must be given.
         if parts.contains(&part) {
             let _ = writeln!(given, "    if (!arrays[{part}]) return 1;");
         }
@@ -191,6 +197,7 @@ fn function_name(unary: Unary) -> &'static str {
 
 /// The right side of a fixed value, computed in scalars.
 fn scalar_operation(op: &ProgramOp, mechanism: &Mechanism) -> String {
+    // Arithmetic is the same for scalars.
     if let Some((a, sign, b)) = binary_operator(op) {
         return format!("x{a} {sign} x{b}");
     }
@@ -217,11 +224,13 @@ fn vector_statement(
     line: &dyn Fn(Atom) -> Option<usize>,
     is_fixed: &dyn Fn(ValueId) -> bool,
 ) -> String {
+    // Arithmetic on vectors; the compiler broadcasts scalars.
     if let Some((a, sign, b)) = binary_operator(op) {
         return format!("const V x{i} = x{a} {sign} x{b};");
     }
     // Operands of functions may be fixed, and are broadcast then.
     let wide = |value: &ValueId| self::vector_operand(*value, is_fixed);
+    // Inputs of a state are read from the lines.
     if let ProgramOp::Input(atom) = op
         && let Some(k) = line(*atom)
     {

@@ -79,6 +79,7 @@ impl OutputLanguage for RustModule {
     }
 
     fn emit_files(&self, source: &EmissionRequest<'_>) -> Vec<EmittedFile> {
+        // Optional structs are appended in a fixed order.
         let mut emitted = rust::emit(source.derivation);
         if let Some(dynamics) = source.dynamics {
             emitted = emitted.with_dynamics(source.derivation, dynamics);

@@ -53,6 +53,7 @@ pub(in crate::emit) trait LanguageSyntax {
         b: &CodeExpression,
         binding: OperatorPrecedence,
     ) -> String {
+        // Whether both operands are numbers.
         let both = matches!(
             (a, b),
             (CodeExpression::Number(_), CodeExpression::Number(_))

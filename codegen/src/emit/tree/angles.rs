@@ -22,6 +22,7 @@ impl LeadingAngles {
         for (i, op) in program.ops.iter().enumerate() {
             let mut of_plain = true;
             op.for_each_operand(|v| of_plain &= plain[v.index()]);
+            // Fixed values are available before the state.
             let fixed = program.stages[i] == ProgramStage::Fixed;
             let simple = matches!(
                 op,
@@ -33,6 +34,7 @@ impl LeadingAngles {
                     | ProgramOp::Neg(_)
             );
             plain[i] = fixed || simple && of_plain;
+            // A pair of cosine and sine.
             if let ProgramOp::Sin(a) = op
                 && i > 0
                 && program.ops[i - 1] == ProgramOp::Cos(*a)
@@ -43,6 +45,7 @@ impl LeadingAngles {
                 done[a.index()] = true;
             }
         }
+        // One pair gains nothing.
         if sines.len() < 2 {
             return Self {
                 sines: Vec::new(),

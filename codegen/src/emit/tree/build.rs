@@ -41,6 +41,7 @@ impl StatementRoutine {
         results_have_names: bool,
     ) -> Self {
         // Names, inlining and sections are decided on the program in its original order.
+        // Names that this program may not use.
         let mut taken = scope.reserved_names_in(program);
         let first = LeadingAngles::from_program(program);
         let named = name_values(program, scope, outputs, &mut taken);
@@ -57,6 +58,7 @@ impl StatementRoutine {
         for (k, i) in order.iter().enumerate() {
             place[*i] = k;
         }
+        // All tables in the new order.
         let mut builder = Builder {
             scope,
             taken,
@@ -77,6 +79,7 @@ impl StatementRoutine {
             program: program.reorder(&order),
         };
         (builder.uses, builder.by_state) = count_uses(&builder.program);
+        // Mark the outputs.
         for v in &builder.program.outputs {
             builder.outputs[v.index()] = true;
         }
@@ -89,6 +92,7 @@ impl StatementRoutine {
 fn count_uses(program: &StraightLineProgram) -> (Vec<usize>, Vec<bool>) {
     let n = program.ops.len();
     let (mut uses, mut by_state) = (vec![0; n], vec![false; n]);
+    // The sine of a pair is not counted, because the cosine reads the same angle.
     for (i, op) in program.ops.iter().enumerate() {
         if is_pair(&program.ops, i) {
             continue;
@@ -98,6 +102,7 @@ fn count_uses(program: &StraightLineProgram) -> (Vec<usize>, Vec<bool>) {
             by_state[v.index()] |= program.stages[i] == ProgramStage::State;
         });
     }
+    // An output counts as a use.
     for v in &program.outputs {
         uses[v.index()] += 1;
         by_state[v.index()] = true;
@@ -143,6 +148,7 @@ fn name_values(
             _ => None,
         })
         .collect();
+    // Results first, with the names that were given.
     for (v, name) in program.outputs.iter().zip(outputs) {
         // A result may have the name of an input that this program does not read.
         if !read.contains(name.as_str()) && scope.is_input(name) {
@@ -156,6 +162,7 @@ fn name_values(
             named.insert(i, NamedValue { name, negative });
         }
     }
+    // Then the known quantities.
     for (i, meaning) in scope.meanings.name_values(program) {
         if named.contains_key(&i) {
             continue;
@@ -207,6 +214,7 @@ fn inlined_values(
         let mut total = own;
         op.for_each_operand(|v| {
             let k = v.index();
+            // Sines and cosines always have names.
             let sine = matches!(program.ops[k], ProgramOp::Sin(_) | ProgramOp::Cos(_));
             // A value is inlined only in an operation of the same stage.
             let same_time = program.stages[k] == program.stages[i];
@@ -311,8 +319,10 @@ impl Builder<'_> {
                 self.put_outputs(i, outputs, &mut state);
             }
         }
+        // Guards that have not been written yet.
         let mut guards = self.program.guards.clone();
         let mut section = 0;
+        // Statements of the state in order.
         for i in 0..self.program.ops.len() {
             if self.program.stages[i] == ProgramStage::Fixed {
                 continue;
@@ -401,6 +411,7 @@ impl Builder<'_> {
 
     /// The expression of a value; it must have been written.
     fn value_expression(&self, i: usize) -> CodeExpression {
+        // Operands come first in the order.
         let value = self.values[i].clone();
         value.expect("operands stand before what needs them")
     }
@@ -461,6 +472,7 @@ impl Builder<'_> {
             && self.outputs[i]
             && !self.named.contains_key(&i)
             && !self.results_have_names;
+        // Whether the value is written at its uses only.
         let unnamed = is_leaf(&op)
             || self.inside[i]
             || only_put && !self.is_precomputed(i)
@@ -473,6 +485,7 @@ impl Builder<'_> {
         }
         // All others are named, with the sign chosen so that no extra operation is needed.
         let (name, value, turned) = self.choose_sign(i, value);
+        // A comment names the equation on the page.
         let note = self.scope.value_note(&name);
         let written = CodeExpression::name(&name);
         statements.push(CodeStatement::Let { name, value, note });
@@ -486,6 +499,7 @@ impl Builder<'_> {
     /// Name and expression of a statement, and whether the value is minus the named expression. A sign that would be an
     /// operation of its own is left to the users of the value.
     fn choose_sign(&mut self, i: usize, value: CodeExpression) -> (String, CodeExpression, bool) {
+        // Fixed values are stored, so their sign must not be moved.
         let fixed = self.program.stages[i] == ProgramStage::Fixed;
         // A value without a meaning gets a generated name, and its sign is moved to its users.
         let Some(NamedValue { name, negative }) = self.named.get(&i).cloned() else {
@@ -542,6 +556,7 @@ impl Builder<'_> {
         if let Some(named) = self.named.get(&i) {
             return named.name.clone();
         }
+        // The names in the angle, joined.
         let mut parts = Vec::new();
         let mut terms = 0;
         self.operand_expression(angle).for_each_name(&mut |name| {
@@ -558,6 +573,7 @@ impl Builder<'_> {
 
     /// Writes a sine, together with its cosine if that is the operation before.
     fn write_sine(&mut self, i: usize, angle: ValueId, statements: &mut Vec<CodeStatement>) {
+        // The cosine gets its name here.
         let cosine = is_pair(&self.program.ops, i).then(|| {
             let name = self.angle_name(i - 1, "c", angle);
             self.values[i - 1] = Some(CodeExpression::name(&name));
@@ -578,6 +594,7 @@ impl Builder<'_> {
     /// The statements that compute the angles of all sines and cosines that come first.
     fn write_leading_angles(&mut self) -> Vec<CodeStatement> {
         let mut statements = Vec::new();
+        // One angle alone is not worth a list.
         if self.first.sines.is_empty() {
             return statements;
         }
@@ -592,6 +609,7 @@ impl Builder<'_> {
             let ProgramOp::Sin(angle) = self.program.ops[i] else {
                 continue;
             };
+            // The list in the order of the sines.
             angles.push(RequestedAngle {
                 value: self.operand_expression(angle),
                 plain: matches!(self.program.ops[angle.index()], ProgramOp::Input(_)),
@@ -667,6 +685,7 @@ pub(super) fn group_statements(
     statements: Vec<CodeStatement>,
     kept: &[String],
 ) -> Vec<CodeStatement> {
+    // Short programs stay flat.
     if statements.len() <= LONG {
         return statements;
     }
@@ -677,6 +696,7 @@ pub(super) fn group_statements(
             last_need.insert(name.to_owned(), k / GROUP);
         });
     }
+    // Precomputed values are read after the last group.
     for name in kept {
         last_need.insert(name.clone(), usize::MAX);
     }

@@ -54,6 +54,7 @@ impl CodeExpression {
     /// `a + b`, as `b + a` where that needs no parentheses; the result is the same number.
     pub(in crate::emit) fn add(a: Self, b: Self) -> Self {
         match (a, b) {
+            // Adding a negative is a subtraction.
             (a, Self::Neg(b)) => Self::sub(a, *b),
             (Self::Neg(a), b) => Self::sub(b, *a),
             (a, b)
@@ -86,6 +87,7 @@ impl CodeExpression {
 
     /// A product without signs: numbers in front, nested products on the left.
     fn product(a: Self, b: Self) -> Self {
+        // A product on the right would need parentheses.
         let nested = b.precedence() == OperatorPrecedence::Product
             && a.precedence() != OperatorPrecedence::Product;
         let number = matches!(b, Self::Number(_)) && a.precedence() != OperatorPrecedence::Product;
@@ -118,12 +120,14 @@ impl CodeExpression {
             Self::Neg(a) => Some((**a).clone()),
             Self::Sub(a, b) => Some(Self::Sub(b.clone(), a.clone())),
             Self::Add(a, b) => {
+                // One negated term is enough: the other one is subtracted.
                 let (turned, rest) = match a.negated_without_cost() {
                     Some(turned) => (turned, b),
                     None => (b.negated_without_cost()?, a),
                 };
                 Some(Self::Sub(Box::new(turned), rest.clone()))
             }
+            // A product is negated by one of its factors.
             Self::Mul(a, b) => match a.negated_without_cost() {
                 Some(a) => Some(Self::mul(a, (**b).clone())),
                 None => Some(Self::mul((**a).clone(), b.negated_without_cost()?)),
@@ -235,6 +239,7 @@ impl CodeExpression {
                 above,
                 below,
             } => {
+                // The sign is added at the end.
                 let magnitude = factor.abs();
                 // A term: factor times numerator over denominator.
                 let number = (!magnitude.is_one()).then(|| Self::number(&magnitude));

@@ -56,6 +56,7 @@ impl StatementRoutine {
 
     /// Outputs that are always zero.
     pub(in crate::emit) fn zero_outputs(&self) -> Vec<usize> {
+        // Whether any statement stores output k.
         let is_put = |k: usize| {
             self.has_statement(
                 &|statement| matches!(statement, CodeStatement::Put { output, .. } if *output == k),
@@ -161,6 +162,7 @@ pub(in crate::emit) fn uses_load(derivation: &Derivation) -> bool {
 pub(in crate::emit) fn inputs_of_state(derivation: &Derivation, with_passive: bool) -> Vec<Atom> {
     let (active, passive) = derivation.coordinates();
     let mut atoms: Vec<Atom> = active.iter().map(|i| Atom::Coordinate(*i)).collect();
+    // The order is that of `State` in emitted code.
     atoms.extend(active.iter().map(|i| Atom::Rate(*i)));
     atoms.extend(active.iter().map(|i| Atom::Acceleration(*i)));
     if uses_load(derivation) {
@@ -223,6 +225,7 @@ pub(in crate::emit) fn base_parameters(
         .chain(parameters.map(|(i, p)| (p.name.as_str(), Atom::Parameter(i))))
         .chain([("pi", Atom::Pi)])
         .collect();
+    // From names of the scope back to inputs.
     let called: BTreeMap<&str, Atom> = atoms.values().map(|a| (scope.input_name(*a), *a)).collect();
     let mut read = BTreeSet::new();
     // Collects what the expressions read.
@@ -235,6 +238,7 @@ pub(in crate::emit) fn base_parameters(
         value
     };
     let reduction = &derivation.reduction;
+    // Sums first, because the base parameters refer to them.
     let sums = base::dependent_sums(mechanism, reduction).into_iter();
     let sums = sums
         .map(|(name, formula)| (name, expression(&formula)))

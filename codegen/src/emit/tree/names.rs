@@ -41,6 +41,7 @@ const RELATIVE_AGREEMENT: f64 = 1e-10;
 impl NamedQuantities {
     /// Evaluates the known quantities at a random state; without any if no state has a solution.
     pub(crate) fn new(derivation: &Derivation) -> Self {
+        // A fixed seed, so that names are always the same.
         let mut stream = RandomStream::new(0x6E61_6D65);
         // The state comes closer to the nominal pose until the loops close.
         for scale in [0.05, 0.02, 0.005, 0.001, 0.0002] {
@@ -74,11 +75,13 @@ impl NamedQuantities {
             ) {
                 continue;
             }
+            // Values agree up to sign and rounding.
             let found = free
                 .iter()
                 .position(|(_, v)| (value.abs() - v.abs()).abs() <= RELATIVE_AGREEMENT * v.abs());
             if let Some(k) = found {
                 let (symbol, v) = free.remove(k).clone();
+                // The sign of the value decides how it is written.
                 let negative = (value < &0.0) != (v < 0.0);
                 names.insert(i, QuantityName { symbol, negative });
             }
@@ -107,6 +110,7 @@ fn generic_state(
         .iter()
         .map(|c| c.value * (1.0 + scale * uniform(stream)))
         .collect();
+    // Positions close to the nominal pose.
     let near = |i: &usize, stream: &mut RandomStream| {
         mechanism.coordinates[*i].nominal + scale * uniform(stream)
     };
@@ -138,6 +142,7 @@ fn generic_state(
             .passive_motion(&states)
             .ok()?
     };
+    // Values of all inputs that a program may read.
     let mut atoms = BTreeMap::new();
     for (i, value) in constants.iter().enumerate() {
         atoms.insert(Atom::Constant(i), *value);
@@ -201,6 +206,7 @@ fn evaluate_quantities(
     derivation: &Derivation,
     atoms: &BTreeMap<Atom, f64>,
 ) -> Vec<(FormulaSymbol, f64)> {
+    // Quantities are built in a copy of the graph.
     let mut graph = derivation.graph.clone();
     // In order of precedence.
     let mut named = trigonometric_quantities(&mut graph, derivation);
@@ -209,6 +215,7 @@ fn evaluate_quantities(
     named.extend(point_quantities(&mut graph, derivation));
     named.extend(wrench_quantities(&mut graph, derivation));
     let atom = |a: Atom| atoms.get(&a).copied().unwrap_or(f64::NAN);
+    // A name of the model file is not used for another quantity.
     let reserved = reserved_names(&derivation.mechanism);
     let mut known: Vec<(FormulaSymbol, f64)> = Vec::new();
     let ids: Vec<ExprId> = named.iter().map(|(_, id)| *id).collect();
@@ -283,6 +290,7 @@ pub(crate) fn trigonometric_name(
 ) -> FormulaSymbol {
     let mut name = letter.to_owned();
     for (atom, n) in angle.terms() {
+        // Factors other than one are part of the name.
         let factor = match n {
             1 => String::new(),
             -1 => "m".to_owned(),
@@ -302,6 +310,7 @@ fn motion_quantities(graph: &mut Graph, derivation: &Derivation) -> Vec<(Formula
     let mechanism = &derivation.mechanism;
     let projection = &derivation.equations.projection;
     let mut named = Vec::new();
+    // Passive coordinates.
     for (k, p) in projection.loops.passive.iter().enumerate() {
         let name = &*mechanism.coordinates[*p].name;
         named.push((
@@ -313,6 +322,7 @@ fn motion_quantities(graph: &mut Graph, derivation: &Derivation) -> Vec<(Formula
             projection.passive_accelerations[k],
         ));
     }
+    // Linear drives; joint drives have the names of their coordinates.
     for (d, drive) in mechanism.drives.iter().enumerate() {
         if matches!(drive.kind, DriveKind::Joint(_)) {
             continue;
@@ -338,6 +348,7 @@ fn motion_quantities(graph: &mut Graph, derivation: &Derivation) -> Vec<(Formula
             ));
         }
     }
+    // Determinants and their inverses, which linear systems use.
     for (k, id) in projection.determinants.iter().enumerate() {
         named.push((FormulaSymbol::new(format!("Delta_{}", k + 1)), *id));
         let inverse = graph.pow(*id, -1);
@@ -353,6 +364,7 @@ const AXES: [&str; 3] = ["x", "y", "z"];
 /// These are the equations of the forward recursion (Newton and Euler), in the axes of the frame.
 fn link_quantities(graph: &mut Graph, derivation: &Derivation) -> Vec<(FormulaSymbol, ExprId)> {
     let mechanism = &derivation.mechanism;
+    // The links of the open tree.
     let tree = &derivation.equations.tree;
     let Ok(gravity) = mechanism
         .gravity
@@ -368,6 +380,7 @@ fn link_quantities(graph: &mut Graph, derivation: &Derivation) -> Vec<(FormulaSy
         vector::ZERO,
         std::array::from_fn(|i| graph.neg(gravity[i])),
     );
+    // Angular velocity, angular acceleration and acceleration of each link.
     let mut motions: Vec<(SymbolicVector, SymbolicVector, SymbolicVector)> = Vec::new();
     // Acceleration of the point where the joint acts, in the axes of the parent.
     let mut before: Vec<SymbolicVector> = Vec::new();
@@ -379,6 +392,7 @@ fn link_quantities(graph: &mut Graph, derivation: &Derivation) -> Vec<(FormulaSy
         let tangential = graph.cross(&alpha_p, &link.position);
         let a = graph.add_vectors(&[a_p, tangential, centripetal]);
         before.push(a);
+        // The motion of the parent in the axes of the link.
         let mut omega = tree.to_link(graph, i, &omega_p);
         let mut alpha = tree.to_link(graph, i, &alpha_p);
         let mut a = tree.to_link(graph, i, &a);
@@ -455,6 +469,7 @@ fn wrench_quantities(graph: &mut Graph, derivation: &Derivation) -> Vec<(Formula
     let tree = &equations.tree;
     let base = crate::programs::base_parameter_atoms(graph, &derivation.reduction);
     let value = |product: &ParameterMonomial| base.get(product).copied().unwrap_or(Graph::ZERO);
+    // The plain form of the recursion.
     let plain = TotalForm::PLAIN;
     let frames = RecursionFrames::new(graph, tree, &equations.gravity, plain.style, false);
     let wrenches = plain.wrenches(graph, &equations.inertia, tree, &frames, &value);
@@ -463,6 +478,7 @@ fn wrench_quantities(graph: &mut Graph, derivation: &Derivation) -> Vec<(Formula
         wrench,
         until: None,
     });
+    // Sums of the wrenches from the ends to the base.
     let through = joint_wrenches(graph, tree, loads.collect());
     let mut named = Vec::new();
     for (frame, link) in mechanism.frames.iter().zip(&tree.of_frame) {
@@ -515,9 +531,11 @@ fn point_quantities(graph: &mut Graph, derivation: &Derivation) -> Vec<(FormulaS
             named.push((FormulaSymbol::new(format!("{start}_{axis}")), id));
         }
     };
+    // From the origin of the base.
     for (point, place) in mechanism.points.iter().zip(&places) {
         name(format!("r_{}", point.name), *place);
     }
+    // From the origin of the frame.
     for (point, place) in mechanism.points.iter().zip(&places).take(n_points) {
         let frame = &mechanism.frames[point.frame.0];
         let from = graph.sub_vectors(place, &places[n_points + point.frame.0]);
@@ -530,6 +548,7 @@ fn point_quantities(graph: &mut Graph, derivation: &Derivation) -> Vec<(FormulaS
         let names = [a, b].map(|f| &*mechanism.frames[f].name);
         name(format!("r_{}_{}", names[0], names[1]), between);
     }
+    // Along the linear drives.
     for drive in &mechanism.drives {
         if let DriveKind::Linear { from, to } = drive.kind {
             let along = graph.sub_vectors(&places[to.0], &places[from.0]);

@@ -44,6 +44,7 @@ impl PrecomputedValues {
             match statement {
                 // The same value under another name is reused.
                 CodeStatement::Let { name, value, note } => {
+                    // A statement with the same value.
                     let known = self.statements.iter().find_map(|other| match other {
                         CodeStatement::Let { name, value: v, .. } if *v == value => {
                             Some(name.clone())
@@ -67,6 +68,7 @@ impl PrecomputedValues {
                     angle,
                     requested: asked,
                 } => {
+                    // Sines and cosines are not compared with earlier ones.
                     let [sine, cosine] = [sine, cosine].map(|name| {
                         name.map(|name| {
                             let new = self.unique_name(&name);
@@ -108,6 +110,7 @@ impl PrecomputedValues {
 
     /// The wanted name, or a similar one that is free. Generated names are numbered anew.
     fn unique_name(&mut self, name: &str) -> String {
+        // Whether the name was generated.
         let numbered = name
             .strip_prefix('k')
             .is_some_and(|rest| rest.chars().all(|c| c.is_ascii_digit()));

@@ -51,6 +51,7 @@ pub(in crate::emit) fn order(
 ) -> Vec<usize> {
     // Fixed operations and those in `first` keep their order.
     let of_state = |i: &usize| program.stages[*i] == ProgramStage::State;
+    // Operations that keep their place at the beginning.
     let early = |i: &usize| !of_state(i) || first[*i];
     let n = program.ops.len();
     let mut order: Vec<usize> = (0..n).filter(early).collect();
@@ -60,6 +61,7 @@ pub(in crate::emit) fn order(
         let of = statement.ops.iter().map(|i| sections[*i]);
         statement.section = of.max().unwrap_or(0);
     }
+    // All others in the order of the schedule.
     for statement in schedule_statements(&statements) {
         order.extend(&statements[statement].ops);
     }
@@ -77,6 +79,7 @@ fn statements(
     // The statement of each operation.
     let mut owner = vec![usize::MAX; n];
     for (i, op) in program.ops.iter().enumerate() {
+        // Inlined operations belong to the statement of their user.
         if !wanted(i) || fused[i] {
             continue;
         }
@@ -108,6 +111,7 @@ fn statements(
         statement.ops.sort_unstable();
         statement.needs.sort_unstable();
         statement.needs.dedup();
+        // The statement is known to its operands' statements as a reader.
         owner[i] = this;
         for need in &statement.needs {
             statements[*need].users.push(this);
@@ -128,6 +132,7 @@ fn statements(
     for k in (0..statements.len()).rev() {
         let longest = |users: &[usize]| users.iter().map(|u| statements[*u].height).max();
         let after = longest(&statements[k].users).unwrap_or(0);
+        // Sum of the latencies of its operations.
         let own = statements[k]
             .ops
             .iter()
@@ -161,6 +166,7 @@ fn schedule_statements(statements: &[SchedulerStatement]) -> Vec<usize> {
         missing[next] += 1;
     }
     let mut waiting: Vec<usize> = statements.iter().map(|s| s.users.len()).collect();
+    // Statements whose operands are available.
     let mut ready: Vec<usize> = (0..n).filter(|k| missing[*k] == 0).collect();
     // Number of values that are live now.
     let mut live = 0;
@@ -188,9 +194,11 @@ fn schedule_statements(statements: &[SchedulerStatement]) -> Vec<usize> {
                 k,
             )
         });
+        // Everything is written.
         let Some(best) = best else {
             break;
         };
+        // The order of the ready statements has no meaning.
         let k = ready.swap_remove(best);
         order.push(k);
         // Operands whose last reader this was are no longer live.

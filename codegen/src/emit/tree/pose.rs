@@ -36,6 +36,7 @@ impl SharedPose {
     /// of its values are added to `scope`.
     pub(super) fn new(derivation: &Derivation, scope: &mut NameScope) -> Option<Self> {
         let programs = &derivation.programs;
+        // Programs that need a pose of which they may share a part.
         let programs = [
             &programs.regressor,
             &programs.inverse_dynamics,
@@ -62,9 +63,11 @@ impl SharedPose {
         let (_, _, first) = &numbered[0];
         let others = numbered[1..].iter();
         let shared = others.map(|(_, _, guards)| common(first, guards));
+        // Programs without common guards are left out.
         let n = shared.filter(|n| *n > 0).min()?;
         let guards = first[..n].to_vec();
         let is_client = |k: usize| numbered[k].2.starts_with(&guards);
+        // The programs that share the pose.
         let clients: Vec<usize> = (0..programs.len()).filter(|k| is_client(*k)).collect();
         if clients.len() < 2 {
             return None;
@@ -79,6 +82,7 @@ impl SharedPose {
                 let is_its = plain[*k][*i] && program.stages[*i] == ProgramStage::State;
                 is_its && !is_leaf(op) && !matches!(op, ProgramOp::Neg(_))
             });
+            // A value counts once per program.
             let distinct: BTreeSet<ValueId> = moving.map(|i| values[i]).collect();
             for value in distinct {
                 *uses.entry(value).or_insert(0) += 1;
@@ -107,6 +111,7 @@ impl SharedPose {
         let (program, places) = shared_program(parts, &shared, &guards, &read);
         // Every result gets a name, because programs bind results by name.
         let mut routine = StatementRoutine::with_result_names(&program, scope, &[], true);
+        // Values at the state by which quantities are named.
         let values = operation_values(&program, &scope.meanings.atoms);
         let mut once = PrecomputedValues::new(scope);
         once.absorb(&mut routine);
@@ -141,6 +146,7 @@ impl SharedPose {
             .iter()
             .map(|guard| guard.map_values(&values))
             .collect();
+        // The guards are part of what is shared.
         if !guards.starts_with(&self.guards) {
             return None;
         }
@@ -176,6 +182,7 @@ fn numbers_of(
 ) -> Vec<ValueId> {
     let mut values: Vec<ValueId> = Vec::with_capacity(program.ops.len());
     for op in &program.ops {
+        // The operation on numbered operands.
         let op = match op.clone().map_operands(|v| values[v.index()]) {
             ProgramOp::Add(a, b) if b < a => ProgramOp::Add(b, a),
             ProgramOp::Mul(a, b) if b < a => ProgramOp::Mul(b, a),
@@ -224,11 +231,13 @@ fn shared_program<'a>(
             // The negative of a shared value is kept, because another shared value may need it.
             let of_known =
                 matches!(op, ProgramOp::Neg(v) if places.contains_key(&values[v.index()]));
+            // Fixed values and leaves are added as well; those without a use are removed at the end.
             let fixed = part.stages[i] == ProgramStage::Fixed;
             let wanted = fixed || is_leaf(op) || of_known || shared(&values[i]);
             if !wanted || !plain[i] || places.contains_key(&values[i]) {
                 continue;
             }
+            // The operation on operands of the new program.
             let place = ValueId(u32::try_from(program.ops.len()).expect("below 4G operations"));
             let op = op.clone().map_operands(|v| places[&values[v.index()]]);
             program.ops.push(op);

@@ -105,6 +105,7 @@ impl NameScope {
             scope.add_name(Atom::Rate(i), &format!("{}_d", c.name));
             scope.add_name(Atom::Acceleration(i), &format!("{}_dd", c.name));
         }
+        // Base parameters are called as on the page.
         for k in 0..derivation.reduction.retained.len() {
             scope.add_name(Atom::Base(k), &format!("p{}_min", k + 1));
         }
@@ -131,6 +132,7 @@ impl NameScope {
     /// Adds a shared value as an input of programs; `number` is its value at the state of [`Self::meanings`], by which
     /// it is recognised.
     pub(super) fn add_shared(&mut self, atom: Atom, value: &CodeExpression, number: f64) {
+        // The name may stand for the negative.
         let (name, turned) = match value {
             CodeExpression::Neg(a) => (&**a, true),
             a => (a, false),
@@ -163,6 +165,7 @@ impl NameScope {
     /// Whether a name is that of a coordinate, a rate or an acceleration.
     pub(super) fn is_input(&self, name: &str) -> bool {
         self.atoms.iter().any(|(atom, other)| {
+            // Inputs of the state only.
             let of_state = matches!(
                 atom,
                 Atom::Coordinate(_) | Atom::Rate(_) | Atom::Acceleration(_)
@@ -214,6 +217,7 @@ fn value_notes(derivation: &Derivation) -> BTreeMap<String, String> {
         tag += 1;
         notes.insert(format!("l_{}", drive.name), format!("eq. (D{tag})"));
         let (active, _) = derivation.coordinates();
+        // The row of the Jacobian of this drive.
         let index = mechanism.drives.iter().position(|d| d.name == drive.name);
         let slopes = index.and_then(|d| projection.drive_jacobian.get(d));
         for (a, slope) in active.iter().zip(slopes.into_iter().flatten()) {

@@ -36,6 +36,7 @@ impl CodeSections {
             headings: vec![String::new()],
             names: BTreeMap::new(),
         };
+        // Loops come first, with the positions of all points.
         let closes = sections.add(closure_heading(derivation));
         for k in 0..derivation.equations.projection.determinants.len() {
             sections.names.insert(format!("Delta_{}", k + 1), closes);
@@ -52,6 +53,7 @@ impl CodeSections {
             let DriveKind::Linear { from, to } = drive.kind else {
                 continue;
             };
+            // First and last equation of the drive on the page.
             let first = tag + 1;
             let slopes = derivation.equations.projection.drive_jacobian[d].iter();
             tag += 1 + slopes.filter(|s| **s != crate::expr::Graph::ZERO).count();
@@ -80,6 +82,7 @@ impl CodeSections {
         // Names of motions, by what they are.
         let rates = sections.add("Rates of the links.".to_owned());
         let accelerations = sections.add("Accelerations of the links, minus gravity.".to_owned());
+        // Motion of each frame.
         for frame in &mechanism.frames {
             sections.assign_section("omega", &frame.name, "", rates);
             sections.assign_section("omega", &frame.name, "_sq", rates);
@@ -89,6 +92,7 @@ impl CodeSections {
             let along = format!("{}_{parent}", frame.name);
             sections.assign_section("a", &along, "", accelerations);
         }
+        // Computed coordinates: positions, sines and cosines with the loops, rates and accelerations with the links.
         for coordinate in &mechanism.coordinates {
             for name in ["", "c_", "s_"].map(|letter| format!("{letter}{}", coordinate.name)) {
                 sections.names.insert(name, closes);
@@ -115,6 +119,7 @@ impl CodeSections {
                 }
             }
         }
+        // The forces are the last section.
         sections.add("Forces of the drives.".to_owned());
         sections
     }
@@ -160,16 +165,19 @@ impl CodeSections {
         // Backwards: each value belongs to the earliest section that needs it. A value without users follows its
         // operands.
         let mut sections: Vec<Option<usize>> = vec![None; n];
+        // Outputs belong to the last section.
         for value in &program.outputs {
             sections[value.index()] = last;
         }
         for guard in &program.guards {
+            // Radicands belong to the loops.
             if let PoseGuard::Reachable(value) = guard {
                 sections[value.index()] = Some(LOOPS);
             }
         }
         let earlier = |a: Option<usize>, b: Option<usize>| a.into_iter().chain(b).min();
         for i in (0..n).rev() {
+            // The section of its name, if it has one.
             let own = named.get(&i).and_then(|named| self.names.get(&named.name));
             // Divisions have a long latency, so they start as early as possible.
             let quotient = matches!(program.ops[i], ProgramOp::Div(..)) && !named.contains_key(&i);

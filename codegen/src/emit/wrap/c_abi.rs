@@ -38,6 +38,7 @@ pub(super) const STATUS: [(&str, &str); 9] = [
 /// The files of the crate, without reactions and self-test. The caller copies `modelmill-runtime` into the folder of
 /// that name next to the manifest.
 pub(in crate::emit) fn emit_c(from: &EmissionRequest<'_>) -> Vec<EmittedFile> {
+    // The library is named after the model.
     let face = LanguageBinding::new(from, &RESERVED);
     let doc = "The model for C: see the header in `include`. All `unsafe` code is here. It only reads and writes the memory that \
                the caller's pointers point to.";
@@ -102,9 +103,11 @@ pub(super) fn storage_words(face: &LanguageBinding<'_>) -> usize {
         &programs.passive,
         &programs.inverse_dynamics,
     ];
+    // Loops without closed form store the solution at the nominal pose.
     if let crate::programs::PassivePosition::Newton(loops) = &programs.passive_position {
         all.extend([&loops.residual, &loops.scales]);
     }
+    // The equation of motion is a struct of its own.
     if let Some(d) = face.dynamics {
         all.extend([&d.mass_matrix, &d.coriolis, &d.gravity, &d.effects, &d.bias]);
     }
@@ -112,6 +115,7 @@ pub(super) fn storage_words(face: &LanguageBinding<'_>) -> usize {
     let fixed: usize = all.iter().map(|p| p.ops.len().min(fixed_values(p))).sum();
     // The model itself, and once more in the inverse dynamics and in the equation of motion.
     let parts = 2 + usize::from(face.dynamics.is_some());
+    // Constants are stored by the model and by the shared pose.
     let geometry = 2 * face.constants().len();
     parts * (fixed + face.n_passive() + geometry + face.n_base() + 16)
 }
@@ -127,6 +131,7 @@ fn fixed_values(program: &crate::StraightLineProgram) -> usize {
 /// The items of `src/lib.rs`: structs, conversions of pointers, and the exported functions.
 #[allow(clippy::too_many_lines, reason = "one text from top to bottom")]
 fn items(face: &LanguageBinding<'_>) -> TokenStream {
+    // Exported names begin with the name of the library.
     let function = |name: &str| format_ident!("{}_{name}", face.name);
     let (dynamics, words) = (function("dynamics"), storage_words(face));
     let (n_base, n_drives) = (face.n_base(), face.n_drives());
@@ -165,6 +170,7 @@ fn items(face: &LanguageBinding<'_>) -> TokenStream {
         })
         .flatten()
         .collect();
+    // Numbers of a regressor.
     let n_entries = n_drives * n_base;
     // Loops without closed form also export the solution for the passive coordinates.
     let passive_position = face.newton.then(|| {
@@ -269,16 +275,19 @@ fn items(face: &LanguageBinding<'_>) -> TokenStream {
             room: [u64; #words],
         }
 
+        // What the storage contains; C knows only its size.
         struct PreparedModel {
             model: model::Model<f64>,
             dynamics: model::InverseDynamics<f64>,
             #equation_field
         }
 
+        // The size was estimated when this file was written, so the compiler checks it.
         const _: () = assert!(core::mem::size_of::<PreparedModel>() <= #words * 8 && core::mem::align_of::<PreparedModel>() <= 8);
 
         #(#records)*
 
+        // The status of a pose without a solution.
         fn status(error: PoseError) -> i32 {
             match error {
                 PoseError::OutOfReach => OUT_OF_REACH,
@@ -288,6 +297,7 @@ fn items(face: &LanguageBinding<'_>) -> TokenStream {
             }
         }
 
+        // Writes a result and returns OK, or returns the status of the error.
         fn answer<T>(found: Result<T, PoseError>, write: impl FnOnce(T)) -> i32 {
             match found {
                 Ok(found) => {
@@ -298,21 +308,25 @@ fn items(face: &LanguageBinding<'_>) -> TokenStream {
             }
         }
 
+        // The array behind a pointer; `None` for a null pointer.
         unsafe fn array<'a, const N: usize>(from: *const f64) -> Option<&'a [f64; N]> {
             // Nothing is read of an array of length zero, so any pointer is allowed for it.
             let from = if N == 0 { core::ptr::NonNull::<[f64; N]>::dangling().as_ptr().cast_const() } else { from.cast() };
             unsafe { from.as_ref() }
         }
 
+        // The same for an array that is written.
         unsafe fn array_mut<'a, const N: usize>(to: *mut f64) -> Option<&'a mut [f64; N]> {
             let to = if N == 0 { core::ptr::NonNull::<[f64; N]>::dangling().as_ptr() } else { to.cast() };
             unsafe { to.as_mut() }
         }
 
+        // Columns of `n` numbers that follow each other in memory.
         unsafe fn columns<'a, const N: usize>(from: *const f64, n: usize) -> [&'a [f64]; N] {
             core::array::from_fn(|k| unsafe { core::slice::from_raw_parts(from.wrapping_add(k * n), n) })
         }
 
+        // The same for columns that are written; without states nothing is borrowed.
         unsafe fn columns_mut<'a, const N: usize>(to: *mut f64, n: usize) -> [&'a mut [f64]; N] {
             core::array::from_fn(|k| {
                 if n == 0 {
@@ -323,6 +337,7 @@ fn items(face: &LanguageBinding<'_>) -> TokenStream {
             })
         }
 
+        // All numbers of a result; `None` if their count overflows.
         unsafe fn all_mut<'a>(to: *mut f64, n: usize, columns: usize) -> Option<&'a mut [f64]> {
             if n == 0 {
                 return Some(Default::default());
@@ -330,12 +345,14 @@ fn items(face: &LanguageBinding<'_>) -> TokenStream {
             Some(unsafe { core::slice::from_raw_parts_mut(to, n.checked_mul(columns)?) })
         }
 
+        // The prepared model, if the structure was filled.
         unsafe fn prepared_model<'a>(dynamics: *const #dynamics) -> Option<&'a PreparedModel> {
             let dynamics = unsafe { dynamics.as_ref() }?;
             (dynamics.ready == READY).then(|| unsafe { &*dynamics.room.as_ptr().cast::<PreparedModel>() })
         }
 
         #[unsafe(no_mangle)]
+        // Fills the array with the constants of the model file.
         pub unsafe extern "C" fn #default_geometry(geometry: *mut f64) -> i32 {
             let Some(geometry) = (unsafe { array_mut::<#n_constants>(geometry) }) else {
                 return NULL_POINTER;
@@ -345,6 +362,7 @@ fn items(face: &LanguageBinding<'_>) -> TokenStream {
         }
 
         #[unsafe(no_mangle)]
+        // Fills the array with the nominal parameters of the model file.
         pub unsafe extern "C" fn #nominal_parameters(parameters: *mut f64) -> i32 {
             let Some(parameters) = (unsafe { array_mut::<#n_parameters>(parameters) }) else {
                 return NULL_POINTER;
@@ -354,6 +372,7 @@ fn items(face: &LanguageBinding<'_>) -> TokenStream {
         }
 
         #[unsafe(no_mangle)]
+        // Base parameters from physical parameters, eq. (16).
         pub unsafe extern "C" fn #base_parameters(
             geometry: *const f64, parameters: *const f64, base: *mut f64,
         ) -> i32 {
@@ -372,6 +391,7 @@ fn items(face: &LanguageBinding<'_>) -> TokenStream {
         }
 
         #[unsafe(no_mangle)]
+        // Computes everything that does not depend on the state.
         pub unsafe extern "C" fn #prepare(
             dynamics: *mut #dynamics, geometry: *const f64, base: *const f64,
         ) -> i32 {
@@ -390,6 +410,7 @@ fn items(face: &LanguageBinding<'_>) -> TokenStream {
                 #equation_init
             };
             unsafe {
+                // The first word is written last, so that an incomplete structure is not taken for a prepared one.
                 (&raw mut (*dynamics).room).cast::<PreparedModel>().write(prepared);
                 (&raw mut (*dynamics).ready).write(READY);
             }
@@ -417,6 +438,7 @@ fn single_state_function(
     one: &WrappedFunction,
     near: bool,
 ) -> TokenStream {
+    // Names as in the emitted module.
     let suffix = if near { "_near" } else { "" };
     let name = format_ident!("{}_{}{suffix}", face.name, one.name);
     let dynamics = format_ident!("{}_dynamics", face.name);
@@ -431,6 +453,7 @@ fn single_state_function(
         .then(|| (format_ident!("forces"), face.n_drives()));
     let inputs: Vec<_> = state.iter().chain(&given).collect();
     let (names, sizes): (Vec<_>, Vec<usize>) = inputs.iter().map(|(name, n)| (name, *n)).unzip();
+    // The state as a struct of the module.
     let fields = state.iter().map(|(name, _)| name);
     let forces = one.takes_forces.then(|| quote! { , forces });
     let n_passive = face.n_passive();
@@ -461,6 +484,7 @@ fn single_state_function(
                 let n = count.n;
                 quote! { [#inner; #n] }
             });
+        // Offset of this array in the output.
         let place = at;
         at += part.n_entries();
         quote! { output.add(#place).cast::<#kind>().write(#value); }

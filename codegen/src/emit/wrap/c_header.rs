@@ -15,7 +15,9 @@ pub(super) fn header(face: &LanguageBinding<'_>) -> String {
     let name = &face.name;
     let upper = name.to_uppercase();
     let mechanism = &face.derivation.mechanism;
+    // Text of the model file may contain the end of a comment.
     let title = comment(mechanism.title.as_deref().unwrap_or(&mechanism.name));
+    // Sizes by the names of their constants.
     let count = |name, n| ArrayDimension { name, n };
     let [active, passive, drives, base, constants, parameters] = [
         count("ACTIVE", face.n_active()),
@@ -73,7 +75,9 @@ pub(super) fn header(face: &LanguageBinding<'_>) -> String {
             .map(|i| mechanism.coordinates[*i].name.as_str());
         named.collect()
     };
+    // Names of the drives.
     let of_drives = mechanism.drives.iter().map(|d| d.name.as_str());
+    // One list of positions per array.
     for (what, prefix, names) in [
         ("Coordinates", "COORDINATE", coordinates(&of_active)),
         ("Passive coordinates", "PASSIVE", coordinates(&of_passive)),
@@ -94,6 +98,7 @@ pub(super) fn header(face: &LanguageBinding<'_>) -> String {
     }
     // Base parameters as a comment: name, expression, unit.
     text.push_str("\n/* Base parameters, in order:\n");
+    // One line per base parameter.
     for base in face.derivation.base_parameters() {
         let line = format!("{} = {} ({})", base.name, base.expression, base.unit);
         _ = writeln!(text, " * {}", comment(&line));
@@ -140,6 +145,7 @@ int32_t {name}_prepare({name}_dynamics *dynamics, const double *geometry, const 
         );
     }
     for one in &functions {
+        // The state always has accelerations; the comment states where they are not read.
         let unread = if one.reads_accelerations {
             ""
         } else {
@@ -151,6 +157,7 @@ int32_t {name}_prepare({name}_dynamics *dynamics, const double *geometry, const 
             _ = writeln!(text, "{}", declaration(face, one, true));
         }
     }
+    // Solution for the passive coordinates only.
     if face.newton {
         text.push_str("\n/* Passive coordinates of a pose; `_near`: from those of a nearby pose, which are replaced. */\n");
         for suffix in ["", "_near"] {
@@ -219,6 +226,7 @@ fn declaration(face: &LanguageBinding<'_>, one: &WrappedFunction, near: bool) ->
         0 => format!("double *{result}"),
         _ => format!("double {result}[{sizes}]"),
     });
+    // Names as in `c_abi`.
     let suffix = if near { "_near" } else { "" };
     format!(
         "int32_t {name}_{}{suffix}({});",

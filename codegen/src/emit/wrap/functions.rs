@@ -51,6 +51,7 @@ impl WrappedFunction {
 
     /// The expression of one array, if the method's result is named `found`.
     pub(super) fn part_tokens(&self, part: &ResultPart) -> TokenStream {
+        // A single array is returned as it is, several as fields of a struct.
         if self.parts.len() == 1 {
             return quote! { found };
         }
@@ -91,6 +92,7 @@ pub(super) fn wrapped_functions(face: &LanguageBinding<'_>) -> Vec<WrappedFuncti
     let follows = |program| reads_passive(face.derivation, program);
     let mut all = vec![
         WrappedFunction {
+            // tau = H_min p_min.
             name: "inverse_dynamics",
             owner: "dynamics",
             method: "forces",
@@ -101,6 +103,7 @@ pub(super) fn wrapped_functions(face: &LanguageBinding<'_>) -> Vec<WrappedFuncti
             parts: vec![ResultPart::new("forces", &[drives])],
         },
         WrappedFunction {
+            // H_min, for identification.
             name: "regressor",
             owner: "model",
             method: "regressor",
@@ -111,6 +114,7 @@ pub(super) fn wrapped_functions(face: &LanguageBinding<'_>) -> Vec<WrappedFuncti
             parts: vec![ResultPart::new("regressor", &[drives, base])],
         },
         WrappedFunction {
+            // Kinematics of the drives.
             name: "drives",
             owner: "model",
             method: "drives",
@@ -145,6 +149,7 @@ pub(super) fn wrapped_functions(face: &LanguageBinding<'_>) -> Vec<WrappedFuncti
     let Some(dynamics) = face.dynamics else {
         return all;
     };
+    // Results of the equation of motion: a matrix or a vector of generalised forces.
     let matrix = || vec![ResultPart::new("matrix", &[active, active])];
     let forces = || vec![ResultPart::new("forces", &[active])];
     let equation = [

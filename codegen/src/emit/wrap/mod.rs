@@ -43,6 +43,7 @@ impl<'a> LanguageBinding<'a> {
     /// The model with its library name; a name in `reserved` gets the suffix `_model`.
     pub(super) fn new(source: &EmissionRequest<'a>, reserved: &[&str]) -> Self {
         let derivation = source.derivation;
+        // A raw identifier is no name of a file or a C function.
         let module = module_identifier(&derivation.mechanism.name).to_string();
         let mut name = module.trim_start_matches("r#").to_owned();
         if reserved.contains(&name.as_str()) {
@@ -96,6 +97,7 @@ impl<'a> LanguageBinding<'a> {
     pub(super) fn state_parts(&self) -> Vec<(Ident, usize)> {
         let n = self.n_active();
         let mut parts = vec![("q", n), ("qd", n), ("qdd", n)];
+        // Loads are part of the state only if an effect reads them.
         if self.load {
             parts.push(("load", self.n_drives()));
         }
@@ -107,6 +109,7 @@ impl<'a> LanguageBinding<'a> {
 
     /// The emitted module as a file, with the equation of motion if it is requested.
     pub(super) fn emitted_module(&self) -> EmittedFile {
+        // Reactions and self-test are not part of interfaces.
         let mut emitted = emit(self.derivation);
         if let Some(dynamics) = self.dynamics {
             emitted = emitted.with_dynamics(self.derivation, dynamics);

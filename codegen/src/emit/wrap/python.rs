@@ -25,6 +25,7 @@ pub(in crate::emit) fn emit_python(from: &EmissionRequest<'_>) -> Vec<EmittedFil
     let name = &face.name;
     // A package name may not begin with an underscore.
     let package = name.trim_start_matches('_');
+    // The manifest for cargo.
     let cargo = format!(
         "# Written by modelmill. `maturin build --release` builds a wheel; without maturin, `cargo build --release` builds
 # target/release/lib{name}.so, which Python imports under the name {name}.so.
@@ -46,6 +47,7 @@ pyo3 = {{ version = \"0.30\", features = [\"extension-module\", \"abi3-py39\"] }
 [workspace]
 "
     );
+    // The manifest for maturin.
     let pyproject = format!(
         "[build-system]
 requires = [\"maturin>=1.7,<2\"]
@@ -89,6 +91,7 @@ fn items(face: &LanguageBinding<'_>) -> TokenStream {
     let title = doc_lines(&title, false);
     let (constants, parameters) = (face.constants(), face.parameters());
     let (n_active, n_drives, n_base) = (face.n_active(), face.n_drives(), face.n_base());
+    // Conversions between arrays and the structs of the module.
     let records = [
         LanguageBinding::record_functions("geometry", "Geometry", &constants),
         LanguageBinding::record_functions("parameters", "Parameters", &parameters),
@@ -105,8 +108,10 @@ fn items(face: &LanguageBinding<'_>) -> TokenStream {
     // Forces and regressor have a vector form for many states, which the text below calls.
     // Everything else is computed state by state.
     let of_blocks = ["inverse_dynamics", "regressor"];
+    // All other functions of a state.
     let singles = wrapped_functions(face);
     let singles = singles.iter().filter(|one| !of_blocks.contains(&one.name));
+    // Their names, for the registration in the module.
     let called: Vec<Ident> = singles
         .clone()
         .map(|one| format_ident!("{}", python_name(one)))
@@ -148,15 +153,18 @@ fn items(face: &LanguageBinding<'_>) -> TokenStream {
             Ok(values)
         }
 
+        // Constants of the model file with some replaced by name.
         fn geometry_of(by: Option<BTreeMap<String, f64>>) -> PyResult<model::Geometry<f64>> {
             let names = model::CONSTANTS.map(|c| c.name);
             Ok(geometry(&with_replacements(geometry_values(), &names, by)?))
         }
 
+        // A ValueError with a text.
         fn value_error(text: String) -> PyErr {
             PyValueError::new_err(text)
         }
 
+        // The error of a pose without a solution.
         fn pose_error(error: PoseError) -> PyErr {
             value_error(error.to_string())
         }
@@ -168,6 +176,7 @@ fn items(face: &LanguageBinding<'_>) -> TokenStream {
         }
 
         impl BatchShape {
+            // Checks that all arrays have the shape that the first one implies.
             fn from_arrays(arrays: &[(&PyReadonlyArrayDyn<'_, f64>, &str, usize)]) -> PyResult<Self> {
                 let shape = arrays.first().map_or(&[][..], |a| a.0.shape());
                 let axis = shape.len() == 2;
@@ -183,12 +192,14 @@ fn items(face: &LanguageBinding<'_>) -> TokenStream {
                 Ok(Self { n, axis })
             }
 
+            // Shape of a result, with an axis for the states if the arguments have one.
             fn shape(&self, first: &[usize]) -> Vec<usize> {
                 let mut shape = first.to_vec();
                 shape.extend(self.axis.then_some(self.n));
                 shape
             }
 
+            // The error of a state; its number is stated only if there are several.
             fn error(&self, error: BlockError) -> PyErr {
                 match error {
                     BlockError::At { reason, .. } if !self.axis => pose_error(reason),
@@ -197,6 +208,7 @@ fn items(face: &LanguageBinding<'_>) -> TokenStream {
             }
         }
 
+        // The numbers of a row-major array.
         fn slice<'a>(array: &'a PyReadonlyArrayDyn<'_, f64>, name: &str) -> PyResult<&'a [f64]> {
             // `as_slice` alone would also accept a column-major array, and read it in the wrong order.
             let rows = array.is_c_contiguous().then(|| array.as_slice().ok()).flatten();
@@ -205,10 +217,12 @@ fn items(face: &LanguageBinding<'_>) -> TokenStream {
             })
         }
 
+        // The rows of an array: one per coordinate, each with `n` numbers.
         fn columns<const N: usize>(all: &[f64], n: usize) -> [&[f64]; N] {
             std::array::from_fn(|k| all.get(k * n..(k + 1) * n).unwrap_or_default())
         }
 
+        // Base parameters; their number is checked.
         fn base_of(p: &PyReadonlyArray1<'_, f64>) -> PyResult<[f64; #n_base]> {
             let p = p.as_array();
             if p.len() != #n_base {
@@ -227,6 +241,7 @@ fn items(face: &LanguageBinding<'_>) -> TokenStream {
             #states
             let dynamics = model::InverseDynamics::new(&geometry_of(geometry)?, &base_of(&p)?);
             let forces = PyArray::zeros(py, many.shape(&[#n_drives]), false);
+            // Results are computed in place, without a copy.
             let mut to = forces.readwrite();
             let to = to.as_slice_mut().map_err(|error| value_error(error.to_string()))?;
             let done = py.detach(|| {
@@ -250,6 +265,7 @@ fn items(face: &LanguageBinding<'_>) -> TokenStream {
             #states
             let model = model::Model::new(&geometry_of(geometry)?);
             let regressor = PyArray::zeros(py, many.shape(&[#n_drives, #n_base]), false);
+            // Results are computed in place, without a copy.
             let mut to = regressor.readwrite();
             let to = to.as_slice_mut().map_err(|error| value_error(error.to_string()))?;
             let done = py.detach(|| {
@@ -311,6 +327,7 @@ fn items(face: &LanguageBinding<'_>) -> TokenStream {
             m.add_function(wrap_pyfunction!(regressor, m)?)?;
             m.add_function(wrap_pyfunction!(base_parameters, m)?)?;
             #(m.add_function(wrap_pyfunction!(#called, m)?)?;)*
+            // Names and values, so that scripts need no copy of the model file.
             m.add("COORDINATES", model::ACTIVE.to_vec())?;
             m.add("PASSIVE", model::PASSIVE.to_vec())?;
             m.add("DRIVES", model::DRIVES.to_vec())?;
@@ -361,6 +378,7 @@ fn single_state_function(face: &LanguageBinding<'_>, one: &WrappedFunction) -> T
         .chain(&forces)
         .cloned()
         .collect();
+    // Names of the arguments.
     let names: Vec<_> = given.iter().map(|(name, _)| name).collect();
     let arrays = arrays(&given);
     // Parts of the state that are no argument are zero.
@@ -392,6 +410,7 @@ fn single_state_function(face: &LanguageBinding<'_>, one: &WrappedFunction) -> T
             _ => quote! { #value.as_flattened() },
         }
     });
+    // Numbers per state.
     let entries = one.n_results();
     let mut at = 0;
     // Each array of the result is a range of the computed values.
@@ -401,6 +420,7 @@ fn single_state_function(face: &LanguageBinding<'_>, one: &WrappedFunction) -> T
         quote! { shape_results(py, &many, &values[#from * n..#at * n], &[#(#shape),*])? }
     });
     let results: Vec<TokenStream> = results.collect();
+    // The type of one array.
     let one_array = quote! { Bound<'py, PyArrayDyn<f64>> };
     // One array is returned as it is, several as a tuple.
     let (results, kind) = match results.as_slice() {
@@ -416,6 +436,7 @@ fn single_state_function(face: &LanguageBinding<'_>, one: &WrappedFunction) -> T
         format!("({}, n)", counts.collect::<Vec<String>>().join(", "))
     });
     let shapes = shapes.collect::<Vec<String>>().join(", ");
+    // The documentation states the shapes for many states.
     let doc = format!(
         "{}; shape for n states {shapes}. `geometry` as in `inverse_dynamics`.",
         one.doc

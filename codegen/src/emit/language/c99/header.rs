@@ -31,8 +31,10 @@ pub(super) fn header(unit: &TranslationUnit<'_>) -> String {
     let TranslationUnit { name, upper, .. } = unit;
     let derivation = unit.source.derivation;
     let mechanism = &derivation.mechanism;
+    // Names that C allows.
     let c = CSyntax { name, upper };
     let mut text = String::new();
+    // Text of the model file may contain the end of a comment.
     let title = comment(mechanism.title.as_deref().unwrap_or(&mechanism.name));
     _ = write!(
         text,
@@ -118,6 +120,7 @@ extern \"C\" {{
     // A struct of named quantities with their units as comments.
     let mut record = |what: &str, name: &str, fields: Vec<(&str, &str)>| {
         _ = writeln!(text, "\n/* {what} */\ntypedef struct {{");
+        // C has no empty structs.
         if fields.is_empty() {
             text.push_str("    double nothing;\n");
         }
@@ -241,6 +244,7 @@ int {name}_prepare_reactions({name}_reactions *reactions, const {name}_geometry 
             _ = writeln!(text, "{};", signature(unit, function, "reactions", true));
         }
     }
+    // The self-test, if it is requested.
     if unit.columns.is_some() {
         _ = writeln!(
             text,
@@ -259,6 +263,7 @@ int {name}_self_test(const {name}_geometry *geometry);"
 /// The meaning of each output of the reactions, with its axis.
 fn source_names(reactions: &crate::ReactionPrograms) -> Vec<String> {
     let mut names = vec![String::new(); reactions.program.outputs.len()];
+    // The three components of a vector.
     let mut name = |what: &str, of: &str, places: &[Option<usize>; 3]| {
         for (place, axis) in places.iter().zip(["x", "y", "z"]) {
             if let Some(name) = place.and_then(|k| names.get_mut(k)) {
@@ -270,6 +275,7 @@ fn source_names(reactions: &crate::ReactionPrograms) -> Vec<String> {
         name("force in joint", &joint.name, &joint.force);
         name("moment in joint", &joint.name, &joint.moment);
     }
+    // Loops follow the joints.
     for closed in &reactions.loops {
         name("force that closes loop", &closed.name, &closed.force);
     }
@@ -295,6 +301,7 @@ fn declaration(
     result: &str,
 ) -> String {
     let name = &unit.name;
+    // The guess is an argument that is overwritten.
     let (suffix, passive) = if near {
         ("_near", ", double *passive")
     } else {
@@ -308,6 +315,7 @@ fn declaration(
 
 /// Which forms the function `bias` has: without guess, and with a guess if its program follows the loops.
 pub(super) fn bias_variants(unit: &TranslationUnit<'_>) -> &'static [bool] {
+    // The program of the bias.
     let follows = |f: &CFunction<'_>| f.name == "bias_and_drives" && f.follows;
     if unit.functions.iter().any(follows) {
         &[false, true]

@@ -112,6 +112,7 @@ impl<'a> TranslationUnit<'a> {
         let derivation = source.derivation;
         let mechanism = &derivation.mechanism;
         let scope = NameScope::new(derivation);
+        // The unit is named after the model, with a suffix if the name is reserved.
         let module = module_identifier(&mechanism.name).to_string();
         let mut name = module.trim_start_matches("r#").to_owned();
         if RESERVED.contains(&name.as_str()) || statements::is_reserved(&name) {
@@ -152,6 +153,7 @@ impl<'a> TranslationUnit<'a> {
                     .map(|a| format!("J_{}_{}", drive.name, of_coordinate(a))),
             );
         }
+        // Functions that every model has.
         let mut functions = vec![
             function(
                 &programs.inverse_dynamics,
@@ -190,6 +192,7 @@ impl<'a> TranslationUnit<'a> {
                     .collect(),
             ));
         }
+        // The terms of the equation of motion.
         if let Some(dynamics) = source.dynamics {
             let accelerations = "accelerations are not read";
             for (program, name, doc, result) in [
@@ -250,6 +253,7 @@ impl<'a> TranslationUnit<'a> {
             once.absorb(&mut function.routine);
             (function, once)
         };
+        // Reactions read all parameters, and have precomputed values of their own.
         let reactions = source.reactions.map(|reactions| {
             alone(function(
                 &reactions.program,
@@ -259,6 +263,7 @@ impl<'a> TranslationUnit<'a> {
                 Vec::new(),
             ))
         });
+        // The self-test compares H_min with all columns.
         let columns = source.self_test.then(|| {
             let mut function = function(
                 &programs.full_regressor,
@@ -275,6 +280,7 @@ impl<'a> TranslationUnit<'a> {
         for function in &mut functions {
             once.absorb(&mut function.routine);
         }
+        // Constants are in capitals.
         let upper = name.to_uppercase();
         Self {
             source,
@@ -320,6 +326,7 @@ impl<'a> TranslationUnit<'a> {
     fn state_parts(&self) -> Vec<(&'static str, usize)> {
         let n = self.n_active();
         let mut parts = vec![("q", n), ("qd", n), ("qdd", n)];
+        // Loads are part of the state only if an effect reads them.
         if self.load {
             parts.push(("load", self.n_drives()));
         }

@@ -12,6 +12,7 @@ pub(super) fn newton(unit: &TranslationUnit<'_>, text: &mut String) {
     let TranslationUnit { name, upper, .. } = unit;
     let derivation = unit.source.derivation;
     let (active, passive) = derivation.coordinates();
+    // Coordinates that occur in the closure equations.
     let residual = &derivation.equations.projection.loops.residual;
     let in_loops = coordinates_of(&derivation.graph, residual);
     let has_scale = derivation.programs.scale.is_some();
@@ -29,6 +30,7 @@ pub(super) fn newton(unit: &TranslationUnit<'_>, text: &mut String) {
         text,
         "\nstatic void {name}_nominal_active(const {name}_dynamics *self, double *q)\n{{\n    (void)self;"
     );
+    // The pose from which all others are followed.
     for (k, i) in active.iter().enumerate() {
         _ = writeln!(text, "    q[{k}] = {};", nominal(i));
     }
@@ -44,6 +46,7 @@ pub(super) fn newton(unit: &TranslationUnit<'_>, text: &mut String) {
     // The scale of the geometry relative to the file's, or 1 if no coordinate of the loops is a length.
     let mut lines = Vec::new();
     if let Some(program) = &derivation.programs.scale {
+        // The scale is a program of the geometry only.
         let routine = StatementRoutine::new(program, &unit.scope, &[]);
         let read = routine.read_once.union(&routine.read).copied().collect();
         parameter_bindings(unit, &read, "self->geometry.", "", "", &mut lines);

@@ -12,6 +12,7 @@ use crate::emit::tree::StatementRoutine;
 #[allow(clippy::too_many_lines, reason = "one text from top to bottom")]
 pub(super) fn self_test(unit: &TranslationUnit<'_>, text: &mut String) {
     let TranslationUnit { name, upper, .. } = unit;
+    // Only if the self-test is requested.
     let Some((function, once)) = &unit.columns else {
         return;
     };
@@ -107,6 +108,7 @@ typedef struct {{
             scaled(i, 1.0)
         ));
     }
+    // Start from the nominal parameters.
     lines.push(format!("{name}_nominal_parameters(&parameters);"));
     // Parameters are random around their nominal values; a zero is replaced, so that every product counts.
     for parameter in &mechanism.parameters {
@@ -118,6 +120,7 @@ typedef struct {{
     // Values of the products p_g.
     for (k, product) in derivation.reduction.products.iter().enumerate() {
         let mut value = "1.0".to_owned();
+        // A power is a repeated product.
         for (p, n) in &product.0 {
             for _ in 0..*n {
                 _ = write!(
@@ -148,6 +151,7 @@ typedef struct {{
         at += n;
         _ = part;
     }
+    // The state as arguments of the public functions.
     let arguments = parts.join(", ");
     // Random loads if an effect depends on them.
     let load = if unit.load {

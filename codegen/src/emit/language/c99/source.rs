@@ -30,6 +30,7 @@ pub(super) fn source(unit: &TranslationUnit<'_>) -> String {
 
 "
     );
+    // Helpers: checks of inputs, sines and cosines, signs, linear systems.
     text.push_str(&unit.expand_template(include_str!("support.c")));
     if has_call(unit, "_sin_cos") {
         text.push('\n');
@@ -45,12 +46,14 @@ pub(super) fn source(unit: &TranslationUnit<'_>) -> String {
         text.push('\n');
         text.push_str(&unit.expand_template(include_str!("solve.c")));
     }
+    // Default values and base parameters.
     write_records(unit, &mut text);
     write_base_parameters(unit, &mut text);
     // Programs first, then preparation and inputs, then the public functions that use them.
     for function in &unit.functions {
         write_program(unit, function, &unit.once, "dynamics", &mut text);
     }
+    // The solution for the passive coordinates needs the programs above.
     if unit.newton {
         newton::newton(unit, &mut text);
     }
@@ -63,11 +66,13 @@ pub(super) fn source(unit: &TranslationUnit<'_>) -> String {
         write_bias(unit, &mut text);
         write_forward_dynamics(unit, &mut text);
     }
+    // Reactions are a struct of their own.
     if let Some((function, once)) = &unit.reactions {
         write_program(unit, function, once, "reactions", &mut text);
         write_reaction_preparation(unit, function, once, &mut text);
         write_public_function(unit, function, "reactions", &mut text);
     }
+    // The self-test is last, because it calls public functions.
     if unit.columns.is_some() {
         self_test::self_test(unit, &mut text);
     }
@@ -77,6 +82,7 @@ pub(super) fn source(unit: &TranslationUnit<'_>) -> String {
 /// Whether any statement calls a function whose name is that of the unit followed by `what`.
 fn has_call(unit: &TranslationUnit<'_>, what: &str) -> bool {
     let c = unit.syntax();
+    // All statements as they will be printed.
     let mut lines = Vec::new();
     let others = unit.reactions.iter().chain(&unit.columns);
     c.statements(&unit.once.statements(), &mut lines);
@@ -117,6 +123,7 @@ fn write_records(unit: &TranslationUnit<'_>, text: &mut String) {
     // A struct without fields has one that is not used, because C allows no empty struct.
     let mut record = |function: &str, of: &str, values: Vec<(&str, f64)>| {
         _ = writeln!(text, "\nvoid {name}_{function}({name}_{of} *{of})\n{{");
+        // One assignment per field.
         for (field, value) in &values {
             _ = writeln!(text, "    {of}->{} = {};", c.name(field), c.number(*value));
         }
@@ -189,6 +196,7 @@ pub(super) fn parameter_bindings(
     let c = unit.syntax();
     let mechanism = &unit.source.derivation.mechanism;
     for atom in read {
+        // Where the value comes from.
         let value = match atom {
             Atom::Constant(i) => format!("{geometry}{}", c.name(&mechanism.constants[*i].name)),
             Atom::Parameter(i) => {
@@ -260,6 +268,7 @@ pub(super) fn write_program(
     } else {
         inputs_of_state(derivation, function.follows)
     };
+    // Inputs that this program reads, by name.
     for (k, atom) in inputs.into_iter().enumerate() {
         if routine.read.contains(&atom) {
             lines.push(format!(
@@ -272,6 +281,7 @@ pub(super) fn write_program(
     for unused in ["self", "inputs", "outputs"] {
         lines.push(format!("(void){unused};"));
     }
+    // Outputs that are always zero have no statement.
     for k in routine.zero_outputs() {
         lines.push(format!("outputs[{k}] = 0.0;"));
     }
@@ -309,12 +319,14 @@ fn write_preparation(unit: &TranslationUnit<'_>, text: &mut String) {
         "\nint {name}_prepare({name}_dynamics *dynamics, const {name}_geometry *geometry, const double *base)\n{{\n    \
          {name}_dynamics *self = dynamics;"
     );
+    // Precomputed values.
     let mut lines = once_lines(unit, &unit.once, "geometry->", "", "base");
     lines.push("self->geometry = *geometry;".to_owned());
     lines.push(format!("self->input = {upper}_OK;"));
     for k in 0..unit.n_base() {
         lines.push(format!("self->base[{k}] = base[{k}];"));
     }
+    // C has no arrays of length zero.
     if unit.n_base() == 0 {
         lines.push("(void)base;".to_owned());
         lines.push("self->base[0] = 0.0;".to_owned());
@@ -342,6 +354,7 @@ fn write_state_inputs(unit: &TranslationUnit<'_>, text: &mut String) {
     let TranslationUnit { name, upper, .. } = unit;
     let mut lines = Vec::new();
     let mut next = 0;
+    // The parts of the state follow each other in the inputs.
     for (part, n) in unit.state_parts() {
         for k in 0..n {
             lines.push(format!("inputs[{next}] = {part}[{k}];"));
@@ -375,12 +388,15 @@ fn write_public_function(
         } else {
             0
         };
+    // Length of the result.
     let n_outputs = function.routine.n_outputs;
+    // The prepared model inside the struct.
     let model = if owner == "reactions" {
         "&reactions->dynamics"
     } else {
         "dynamics"
     };
+    // The status of the preparation.
     let input = if owner == "reactions" {
         "reactions->dynamics.input"
     } else {
@@ -399,6 +415,7 @@ fn write_public_function(
             format!("double inputs[{}];", n_inputs.max(1)),
             format!("int status = {input};"),
         ];
+        // Outputs of a program that may fail.
         if can_fail {
             lines.push(format!("double outputs[{}];", n_outputs.max(1)));
         }
@@ -410,6 +427,7 @@ fn write_public_function(
             "if (status == {upper}_OK) status = {name}_inputs({}, inputs);",
             unit.state_arguments()
         ));
+        // Passive coordinates follow the state in the inputs.
         match (function.follows, near) {
             (false, _) => {}
             (true, false) => lines.push(format!(
@@ -426,6 +444,7 @@ fn write_public_function(
             }
         }
         lines.push(format!("if (status != {upper}_OK) return status;"));
+        // A program that cannot fail writes to the caller's array.
         let results = if can_fail { "outputs" } else { function.result };
         lines.push(format!(
             "status = {name}_{}_program({owner}, inputs, {results});",
@@ -454,6 +473,7 @@ fn write_public_function(
 fn write_bias(unit: &TranslationUnit<'_>, text: &mut String) {
     let TranslationUnit { name, upper, .. } = unit;
     let arguments = unit.state_arguments();
+    // With and without a guess.
     for near in super::header::bias_variants(unit) {
         let (suffix, passive) = if *near {
             ("_near", ", passive")
@@ -539,6 +559,7 @@ int {name}_prepare_reactions({name}_reactions *reactions, const {name}_geometry 
         "(void){name}_prepare(&self->dynamics, geometry, base);"
     ));
     lines.push("self->parameters = *parameters;".to_owned());
+    // Checks of all parameters.
     for parameter in &unit.source.derivation.mechanism.parameters {
         lines.push(format!(
             "if (!{name}_all_fine(&parameters->{}, 1)) self->dynamics.input = {upper}_NOT_FINITE;",

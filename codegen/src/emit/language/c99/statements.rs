@@ -169,6 +169,7 @@ impl LanguageSyntax for CSyntax<'_> {
 /// Whether every parenthesis in the text is closed within it.
 fn is_balanced(text: &str) -> bool {
     let mut depth = 0_i32;
+    // A closing parenthesis before its opening one belongs to the surrounding text.
     for c in text.chars() {
         match c {
             '(' => depth += 1,
@@ -194,6 +195,7 @@ impl CSyntax<'_> {
     fn statement(&self, statement: &CodeStatement, lines: &mut Vec<String>) {
         match statement {
             CodeStatement::Section(text) => lines.push(format!("/* {} */", comment(text))),
+            // A named value, with its comment.
             CodeStatement::Let { name, value, note } => {
                 let note = note
                     .as_ref()
@@ -275,9 +277,11 @@ impl CSyntax<'_> {
                     self.upper
                 ),
             }),
+            // Outputs are elements of the caller's array.
             CodeStatement::Put { output, value } => {
                 lines.push(format!("outputs[{output}] = {};", self.operand_text(value)));
             }
+            // C needs no blocks, so groups are printed in place.
             CodeStatement::Group { statements, .. } => self.statements(statements, lines),
         }
     }

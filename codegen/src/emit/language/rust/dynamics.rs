@@ -31,6 +31,7 @@ pub(super) fn dynamics(
             .map(|name| format!("{letter}_{name}"))
             .collect()
     };
+    // Entries of the mass matrix, row by row.
     let entries = names
         .iter()
         .flat_map(|a| names.iter().map(move |b| format!("M_{a}_{b}")));
@@ -81,6 +82,7 @@ pub(super) fn dynamics(
             vector,
         ),
     ];
+    // The methods with their numbers of operations.
     let functions = functions.map(
         |([name, item], program, doc, outputs, output)| ProgramMethod {
             program,
@@ -120,6 +122,7 @@ pub(super) fn dynamics(
 /// The method `forward`: solves the equation of motion for the accelerations. It has a form with a guess if loops are
 /// followed.
 fn forward_dynamics(derivation: &Derivation, dynamics: &DynamicsPrograms) -> TokenStream {
+    // Both forms of the method have the same documentation.
     let doc = quote! {
         /// Forward dynamics: accelerations of the independent coordinates under given forces of the drives.
         ///

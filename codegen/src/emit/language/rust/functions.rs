@@ -19,6 +19,7 @@ pub(super) fn model(derivation: &Derivation, scope: &NameScope) -> TokenStream {
     let mechanism = &derivation.mechanism;
     let (active, passive) = derivation.coordinates();
     let name = |i: &usize| mechanism.coordinates[*i].name.as_str();
+    // H_min.
     let regressor = ProgramMethod {
         program: &programs.regressor,
         name: "regressor",
@@ -49,6 +50,7 @@ pub(super) fn model(derivation: &Derivation, scope: &NameScope) -> TokenStream {
                 .map(|a| format!("J_{}_{}", drive.name, name(a))),
         );
     }
+    // Kinematics of the drives.
     let drives = ProgramMethod {
         program: &programs.drives,
         name: "drives",
@@ -79,6 +81,7 @@ pub(super) fn model(derivation: &Derivation, scope: &NameScope) -> TokenStream {
     }
     // Loops without closed form add programs, fields and methods.
     let newton = newton(derivation, scope);
+    // Many states are evaluated in sequence if each follows from the one before.
     let followed = reads_passive(derivation, &programs.regressor);
     let (newton_items, more) = match newton {
         Some(newton) => {
@@ -87,6 +90,7 @@ pub(super) fn model(derivation: &Derivation, scope: &NameScope) -> TokenStream {
         }
         None => (TokenStream::new(), ExtraItems::default()),
     };
+    // The struct with its methods.
     let owner = ProgramStruct {
         derivation,
         scope,
@@ -123,6 +127,7 @@ pub(super) fn model(derivation: &Derivation, scope: &NameScope) -> TokenStream {
 pub(super) fn inverse_dynamics(derivation: &Derivation, scope: &NameScope) -> TokenStream {
     let program = &derivation.programs.inverse_dynamics;
     let drives = derivation.mechanism.drives.iter();
+    // The forces as the only method.
     let function = ProgramMethod {
         program,
         name: "forces",

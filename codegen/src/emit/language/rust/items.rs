@@ -26,6 +26,7 @@ pub(super) fn module_doc(derivation: &Derivation) -> String {
         doc.push_str(&text);
         doc.push('\n');
     };
+    // The first line is the summary that rustdoc shows in lists.
     let title = mechanism.title.as_deref().unwrap_or(&mechanism.name);
     line(format!("{}.", modelmill_boundary::text::comment(title)));
     line(String::new());
@@ -40,6 +41,7 @@ pub(super) fn module_doc(derivation: &Derivation) -> String {
     }
     line("# Dependent columns".to_owned());
     line(String::new());
+    // One list item per dependent column.
     for text in derivation.dependency_texts() {
         line(format!("- `{text}`"));
     }
@@ -66,12 +68,14 @@ pub(super) fn items(derivation: &Derivation, scope: &NameScope) -> TokenStream {
         .iter()
         .map(|p| (p.name.as_str(), p.nominal, p.unit.as_str()))
         .collect();
+    // Constants with the values of the file.
     let geometry = record_struct(
         "Geometry",
         "Known quantities; the default is the model file's.",
         "CONSTANTS",
         &constants,
     );
+    // Parameters with their nominal values.
     let parameters = record_struct(
         "Parameters",
         "Dynamic parameters; the default is nominal.",
@@ -102,6 +106,7 @@ pub(super) fn items(derivation: &Derivation, scope: &NameScope) -> TokenStream {
 fn tables(derivation: &Derivation) -> TokenStream {
     let mechanism = &derivation.mechanism;
     let (active, passive) = derivation.coordinates();
+    // Names of coordinates.
     let name_of = |i: &usize| mechanism.coordinates[*i].name.as_str();
     let (n_active, n_passive) = (active.len(), passive.len());
     let (active, passive) = (active.iter().map(name_of), passive.iter().map(name_of));
@@ -145,6 +150,7 @@ fn record_struct(name: &str, doc: &str, table: &str, fields: &[(&str, f64, &str)
     let mut text = format!("/// {doc}\n{name}, {table}:");
     for (field, value, unit) in fields {
         let ident = field_identifier(field).to_string();
+        // The original name is stated only where it differs.
         let called = if ident == *field {
             String::new()
         } else {
@@ -161,6 +167,7 @@ fn state(derivation: &Derivation) -> TokenStream {
     let mechanism = &derivation.mechanism;
     let (active, passive) = derivation.coordinates();
     let load = uses_load(derivation);
+    // A state with loads has another type.
     let alias = if load {
         quote! { ::modelmill_runtime::LoadedState<T, N_ACTIVE, N_DRIVES> }
     } else {
@@ -248,6 +255,7 @@ pub(super) fn nominal_values<'a>(
     let residual = &derivation.equations.projection.loops.residual;
     let in_loops = coordinates_of(&derivation.graph, residual);
     coordinates.iter().map(move |i| {
+        // Only lengths that occur in the loops are scaled.
         let coordinate = &derivation.mechanism.coordinates[*i];
         let value = signed(coordinate.nominal);
         let is_length = coordinate.motion.is_length() && in_loops.contains(i);
@@ -276,6 +284,7 @@ fn base_parameters(derivation: &Derivation, scope: &NameScope) -> TokenStream {
     let parameters = argument("parameters", |atom| matches!(atom, Atom::Parameter(_)));
     let given =
         super::program::parameter_bindings(derivation, scope, &read, &geometry, &parameters, "");
+    // Base parameters are variables first, then an array.
     let names: Vec<_> = (0..n_base)
         .map(|k| field_identifier(scope.input_name(Atom::Base(k))))
         .collect();
@@ -332,6 +341,7 @@ fn sum_lines(start: &str, value: &CodeExpression) -> Vec<String> {
     }
     let mut lines = vec![start.to_owned()];
     for (k, term) in terms.iter().rev().enumerate() {
+        // The first term follows the start directly.
         let space = if k == 0 { "" } else { " " };
         match lines.last_mut() {
             Some(line) if k == 0 || line.len() + term.len() < 95 => {

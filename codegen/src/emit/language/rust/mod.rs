@@ -38,6 +38,7 @@ pub struct EmittedModule {
 
 /// Writes the module of a derivation: regressor and inverse dynamics.
 pub fn emit(derivation: &Derivation) -> EmittedModule {
+    // Programs share the part of the pose that they have in common.
     let scope = NameScope::with_pose(derivation);
     EmittedModule {
         name: derivation.mechanism.name.clone(),
@@ -81,12 +82,14 @@ impl EmittedModule {
 
     /// The source as a file of its own, to be declared with `mod`.
     pub fn file(&self) -> String {
+        // Attributes of a file are inner ones.
         let (doc, items) = (doc_lines(&self.doc, true), &self.items);
         print_source(&quote! { #doc #![allow(#LINTS)] #items })
     }
 
     /// The source as a `pub mod` that can be included anywhere.
     pub fn module(&self) -> String {
+        // Attributes of a module are outer ones.
         let (doc, items) = (doc_lines(&self.doc, false), &self.items);
         let name = identifier::module_identifier(&self.name);
         print_source(&quote! { #doc #[allow(#LINTS)] pub mod #name { #items } })

@@ -38,16 +38,19 @@ pub(super) fn newton<'a>(derivation: &'a Derivation, scope: &NameScope) -> Optio
         output: None,
         results: None,
     };
+    // Residuals with their Jacobian, and scales.
     let functions = vec![
         function(&loops.residual, "gaps", "Gaps"),
         function(&loops.scales, "scales", "LoopScales"),
     ];
     // Nominal lengths in loops are scaled with the geometry.
     let scale = loop_scale(derivation, scope);
+    // The scale inside a method, and inside `new`.
     let of_self = scale.as_ref().map(|_| quote! { self.scale });
     let nominal_active = nominal_values(derivation, &active, of_self.as_ref());
     let of_model = scale.as_ref().map(|_| quote! { model.scale });
     let nominal_passive = nominal_values(derivation, &passive, of_model.as_ref());
+    // A field only if lengths are in the loops.
     let scale_field = scale.as_ref().map(|_| {
         quote! {
             /// Size of the loops relative to those of the file; it scales lengths of the nominal pose.
@@ -84,6 +87,7 @@ pub(super) fn newton<'a>(derivation: &'a Derivation, scope: &NameScope) -> Optio
             [#(#pose),*]
         }
 
+        // What Newton's method evaluates.
         impl<T: Real> Loops for Model<T> {
             type Number = T;
             type Active = [T; N_ACTIVE];
@@ -104,6 +108,7 @@ pub(super) fn newton<'a>(derivation: &'a Derivation, scope: &NameScope) -> Optio
             }
         }
 
+        // Where it starts.
         impl<T: Real> Assembly for Model<T> {
             const N_PASSIVE: usize = N_PASSIVE;
 

@@ -135,6 +135,7 @@ impl ProgramStruct<'_> {
         let mut routines = Vec::new();
         for function in &self.functions {
             let pose = self.scope.pose.as_deref();
+            // A program that does not begin with the common guards keeps its own pose.
             let rest = pose.and_then(|pose| pose.remaining_program(function.program));
             let program = rest.as_ref().unwrap_or(function.program);
             let mut routine = StatementRoutine::new(program, self.scope, &function.outputs);
@@ -149,9 +150,11 @@ impl ProgramStruct<'_> {
         // A field exists only if a program reads it.
         let reads =
             |wanted: fn(&Atom) -> bool| routines.iter().any(|(r, _)| r.read.iter().any(wanted));
+        // Whether any program shares the pose.
         let has_pose = routines.iter().any(|(_, pose)| pose.is_some());
         let pose_field = has_pose.then(|| quote! { pose: Pose<T>, });
         let pose_init = has_pose.then(|| quote! { pose: Pose::new(geometry), });
+        // Which inputs of the preparation are stored.
         let base = reads(|atom| matches!(atom, Atom::Base(_)));
         let physical = reads(|atom| matches!(atom, Atom::Parameter(_)));
         let base_field = base.then(|| quote! { base: [T; N_BASE], });
@@ -181,6 +184,7 @@ impl ProgramStruct<'_> {
             }
         });
         let given = self.input_bindings(&once.read, false);
+        // Statements of `new` before the struct is built.
         let begin = has_once.then(|| {
             let statements = statements(&once.statements());
             quote! { let n = &ScalarNumbers::<T>::new(); #given #statements }
@@ -219,6 +223,7 @@ impl ProgramStruct<'_> {
                 format_ident!("{}", function.item),
                 format_ident!("{}_program", function.name),
             );
+            // Inputs of the program and the table of their names.
             let (inputs, names) = self.inputs(function, routine);
             let n_inputs = Literal::usize_unsuffixed(inputs.len());
             let n_outputs = Literal::usize_unsuffixed(routine.n_outputs);
@@ -266,6 +271,7 @@ impl ProgramStruct<'_> {
         let program = format_ident!("{}_program", function.name);
         let (inputs, _) = self.inputs(function, routine);
         let n_inputs = Literal::usize_unsuffixed(inputs.len());
+        // Bindings in front of the statements: constants and parameters, precomputed values, inputs, pose.
         let given = self.input_bindings(&routine.read, true);
         let once = precomputed_bindings(once, routine);
         let pose = pose.map(|pose| self.pose_bindings(pose, routine));
@@ -288,6 +294,7 @@ impl ProgramStruct<'_> {
 
     /// The statement that binds the values of the common pose that a program reads.
     fn pose_bindings(&self, pose: &SharedPose, routine: &StatementRoutine) -> TokenStream {
+        // Results that are not read are not bound.
         let called = (0..pose.routine.results.len()).map(|k| {
             let atom = Atom::Shared(k);
             if routine.read.contains(&atom) {
@@ -314,6 +321,7 @@ impl ProgramStruct<'_> {
         let (method, at_passive) = (format_ident!("{name}"), format_ident!("{name}_at"));
         let item = format_ident!("{}", function.item);
         let doc = format!(" {}", function.doc);
+        // Every method of a state has these errors.
         let errors = quote! {
             ///
             /// # Errors
@@ -331,6 +339,7 @@ impl ProgramStruct<'_> {
             },
         };
         let visible = self.is_public.then(|| quote! { pub });
+        // Without passive coordinates to solve for, the state is enough.
         if !reads_passive(self.derivation, function.program) {
             let run = run(quote! { inputs(state) });
             return quote! {
@@ -393,6 +402,7 @@ impl ProgramStruct<'_> {
         function: &ProgramMethod<'_>,
         routine: &StatementRoutine,
     ) -> (Vec<TokenStream>, TokenStream) {
+        // Whether the inputs contain passive coordinates.
         let newton = function.inputs == ProgramStateInputs::Motion
             && reads_passive(self.derivation, function.program);
         let atoms = match function.inputs {
@@ -403,6 +413,7 @@ impl ProgramStruct<'_> {
                 all.map(Atom::Coordinate).collect()
             }
         };
+        // The table by which messages name an input.
         let names = match (function.inputs, newton) {
             (ProgramStateInputs::Motion, false) => quote! { INPUTS },
             (ProgramStateInputs::Motion, true) => quote! { INPUTS_WITH_PASSIVE },
@@ -473,6 +484,7 @@ pub(super) fn parameter_bindings(
                 quote! { #field: #name }
             }
         });
+        // Fields that are not read are skipped.
         let rest = (wanted.len() < names.len()).then(|| quote! { , .. });
         let record = format_ident!("{record}");
         quote! { let #record { #(#fields),* #rest } = #from.as_variables(n); }
@@ -505,6 +517,7 @@ fn array_bindings(entries: impl Iterator<Item = (Ident, usize)>, array: &str) ->
 /// Bindings of the precomputed values that a program reads.
 fn precomputed_bindings(once: &PrecomputedValues, routine: &StatementRoutine) -> TokenStream {
     let places = once.kept.iter().enumerate();
+    // Positions in the array of precomputed values.
     let read = places.filter(|(_, name)| routine.kept.contains(name));
     array_bindings(
         read.map(|(k, name)| (field_identifier(name), k)),
@@ -554,6 +567,7 @@ pub(super) fn pose(derivation: &Derivation, scope: &NameScope) -> TokenStream {
     let n_results = Literal::usize_unsuffixed(pose.routine.results.len());
     // Results are returned as an array and not put into outputs.
     let state = pose.routine.state.iter();
+    // The pose returns its results, so it stores no outputs.
     let state = state.filter(|statement| !matches!(statement, CodeStatement::Put { .. }));
     let state = statements(&state.cloned().collect::<Vec<CodeStatement>>());
     let results =

@@ -29,6 +29,7 @@ pub(super) fn reactions(
         });
         quote! { [#(#components),*] }
     };
+    // One wrench per joint, one force per loop.
     let joints = reactions.joints.iter().map(|joint| {
         let (force, moment) = (three(&joint.force), three(&joint.moment));
         quote! { ::modelmill_runtime::Wrench { force: #force, moment: #moment } }
@@ -53,6 +54,7 @@ pub(super) fn reactions(
             conversion: made,
         }),
     };
+    // Names, axes and counts as constants.
     let tables = tables(reactions);
     let owner = ProgramStruct {
         derivation,
@@ -102,10 +104,12 @@ fn names(reactions: &ReactionPrograms) -> Vec<String> {
             }
         }
     };
+    // Force and moment of each joint.
     for joint in &reactions.joints {
         name("F", &joint.name, &joint.force);
         name("M", &joint.name, &joint.moment);
     }
+    // The force of each loop.
     for closed in &reactions.loops {
         name("F", &closed.name, &closed.force);
     }
@@ -118,6 +122,7 @@ fn tables(reactions: &ReactionPrograms) -> TokenStream {
     let n_loops = Literal::usize_unsuffixed(reactions.loops.len());
     let joints = reactions.joints.iter().map(|joint| {
         let (name, coordinates) = (&joint.name, &joint.coordinates);
+        // The axis of the joint as a letter.
         let axis = ['x', 'y', 'z'][joint.axis as usize];
         quote! {
             ::modelmill_runtime::Joint { name: #name, coordinates: &[#(#coordinates),*], axis: #axis }

@@ -19,6 +19,7 @@ pub(super) fn self_test(derivation: &Derivation, scope: &NameScope) -> TokenStre
     let products = &derivation.reduction.products;
     let n_products = Literal::usize_unsuffixed(products.len());
     let program = &derivation.programs.full_regressor;
+    // H for all products is not part of the model, so it has a struct of its own.
     let function = ProgramMethod {
         program,
         name: "all_columns",
@@ -62,6 +63,7 @@ pub(super) fn self_test(derivation: &Derivation, scope: &NameScope) -> TokenStre
     let scale = loop_scale(derivation, scope);
     let scaled = scale.as_ref().map(|_| quote! { scale });
     let nominal = nominal_values(derivation, &active, scaled.as_ref());
+    // Range of each coordinate around its nominal value.
     let reach = active
         .iter()
         .zip(self_test_reach(derivation))
@@ -100,19 +102,23 @@ pub(super) fn self_test(derivation: &Derivation, scope: &NameScope) -> TokenStre
         /// The condition that fails, with numbers. The rank is smaller at special geometries, for example if a length is
         /// zero that is not zero in the model file.
         pub fn self_test(geometry: &Geometry<f64>) -> Result<(), ::modelmill_runtime::SelfTestError> {
+            // Expressions of the scale are written for a number `T`.
             type T = f64;
             #scale
             let nominal: [f64; N_ACTIVE] = [#(#nominal),*];
             let reaches: [f64; N_ACTIVE] = [#(#reach),*];
             let units: [f64; N_ACTIVE] = [#(#units),*];
+            // Both regressors for the same geometry.
             let (model, all) = (Model::new(geometry), AllColumns::new(geometry));
             let mut draw = ::modelmill_runtime::Random::new(2);
             #[allow(unused_mut)]
             let mut parameters = Parameters::<f64>::default();
             #(parameters.#fields = draw.perturb(parameters.#fields);)*
+            // p_g and p_min from the same parameters.
             let products = [#(#values),*];
             let base = base_parameters(geometry, &parameters)?;
             let dynamics = InverseDynamics::new(geometry, &base);
+            // The runtime draws states and compares ranks and forces.
             ::modelmill_runtime::self_test::<N_PRODUCTS, N_BASE>(&products, &base, |random, reach, show| {
                 let state = State {
                     q: ::core::array::from_fn(|k| nominal[k] + reach * reaches[k] * random.uniform(-1.0, 1.0)),

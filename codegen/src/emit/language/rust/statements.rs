@@ -53,6 +53,7 @@ impl LanguageSyntax for RustSyntax {
 
 /// Statements as tokens that [`restore_lines`] turns into lines.
 pub(super) fn statements(statements: &[CodeStatement]) -> TokenStream {
+    // Lines first, then tokens.
     let mut written = Vec::new();
     for statement in statements {
         write(statement, 0, &mut written);
@@ -76,6 +77,7 @@ pub(super) fn fill_lines(
     let mut items = items.peekable();
     while let Some(mut item) = items.next() {
         item.push_str(if items.peek().is_some() { "," } else { end });
+        // The first item follows `start` without a blank.
         let space = if lines.len() == 1 && lines[0] == start {
             ""
         } else {
@@ -144,6 +146,7 @@ fn write(statement: &CodeStatement, depth: usize, lines: &mut Vec<String>) {
     let indent = "    ".repeat(depth);
     let mut line = |text: String| lines.push(format!("{indent}{text}"));
     match statement {
+        // Headings become comments.
         CodeStatement::Section(text) => line(format!("// {text}")),
         CodeStatement::Let { name, value, note } => {
             let note = note
@@ -157,6 +160,7 @@ fn write(statement: &CodeStatement, depth: usize, lines: &mut Vec<String>) {
         }
         // Sines and cosines of all angles of a program are computed together, in vectors.
         CodeStatement::Angles(angles) => {
+            // The list takes variables; an expression is made one first.
             let values = angles.iter().map(|angle| {
                 let value = RustSyntax.operand_text(&angle.value);
                 if angle.plain {
@@ -178,10 +182,12 @@ fn write(statement: &CodeStatement, depth: usize, lines: &mut Vec<String>) {
             angle,
             requested: asked,
         } => {
+            // A value that is not needed is not bound.
             let name = |name: &Option<String>| match name {
                 Some(name) => RustSyntax.name(name),
                 None => "_".to_owned(),
             };
+            // From the list of angles, or computed here.
             let value = match asked {
                 Some(k) => format!("n.sin_cos_of(&angles, {k})"),
                 None => format!("n.sin_cos({})", RustSyntax.operand_text(angle)),
@@ -212,6 +218,7 @@ fn write(statement: &CodeStatement, depth: usize, lines: &mut Vec<String>) {
             statements,
             exported: handed,
         } => {
+            // The names that the block returns.
             let names: Vec<String> = handed.iter().map(|name| RustSyntax.name(name)).collect();
             let names = names.join(", ");
             if handed.is_empty() {
