@@ -11,6 +11,7 @@ const FUNCTION: usize = 10;
 
 /// Estimated cost in additions. Equal expressions count once, and fixed expressions cost nothing.
 pub(crate) fn cost(graph: &Graph, roots: &[ExprId]) -> usize {
+    // What is fixed is computed once, outside of the measured program.
     let fixed = fixed_nodes(graph, roots);
     let mut total = 0;
     // Nodes are in topological order, so a node's operands have been classified before it.

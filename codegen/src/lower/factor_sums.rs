@@ -15,6 +15,7 @@ pub(crate) fn factor_sums(graph: &mut Graph, roots: &[ExprId]) -> Vec<ExprId> {
             Node::Sum(terms) if terms.len() > 1 => factor_terms(graph, terms, &shared),
             _ => rebuild(graph, id, &node),
         };
+        // Whether the new node is used more than once, for the sums above it.
         let many = uses[id.index()] > 1;
         shared
             .entry(value)
@@ -36,6 +37,7 @@ fn factor_terms(
     let open: Vec<FactoredTerm> = terms
         .iter()
         .map(|(id, k)| {
+            // The number of a term is split off.
             let (base, inner) = graph.split_factor(*id);
             let k = k * &inner;
             match graph.node(base) {
@@ -88,6 +90,7 @@ fn gather_terms(graph: &mut Graph, terms: Vec<FactoredTerm>) -> ExprId {
             (k, factors)
         })
         .collect();
+    // The quotient may have common factors of its own.
     let inner = gather_terms(graph, inner);
     let product = graph.mul(common, inner);
     if without.is_empty() {

@@ -54,6 +54,7 @@ pub(crate) fn rewrite(
             Node::Unary(f, c) => Node::Unary(f, rewritten(&new, c)),
             leaf => leaf,
         };
+        // The rule may replace the node by anything of equal value.
         let value = rule(graph, id, node);
         new[i] = Some(value);
     }
@@ -77,6 +78,7 @@ pub(crate) fn flatten(graph: &mut Graph, roots: &[ExprId]) -> Vec<ExprId> {
     // The rule sees rewritten operands; whether they are used once is known of the nodes that they came from.
     let mut once: FxHashMap<ExprId, bool> = FxHashMap::default();
     rewrite(graph, roots, |graph, id, node| {
+        // Whether an operand may be merged into its user.
         let open = |graph: &Graph, child: ExprId| {
             once.get(&child).copied().unwrap_or(false) && graph.node(child).is_open()
         };

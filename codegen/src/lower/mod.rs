@@ -94,6 +94,7 @@ pub(crate) fn lower_with_passes(
             (graph, roots) = (pass.run)(graph, &roots);
         }
         let program = schedule::schedule(&graph, &roots, request);
+        // A round that gains nothing ends the search.
         if program.weight() >= best.weight() {
             break;
         }

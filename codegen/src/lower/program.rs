@@ -233,6 +233,7 @@ impl StraightLineProgram {
                 self.ops[i].for_each_operand(|operand| needed[operand.index()] = true);
             }
         }
+        // The order of the remaining operations does not change.
         let kept: Vec<usize> = (0..self.ops.len()).filter(|i| needed[*i]).collect();
         self.reorder(&kept)
     }
@@ -248,6 +249,7 @@ impl StraightLineProgram {
 
     /// The same program with the operations of `order`, in that order; operands must come before their users.
     pub(crate) fn reorder(&self, order: &[usize]) -> Self {
+        // Position of each old value in the new program.
         let mut places: Vec<Option<ValueId>> = vec![None; self.ops.len()];
         let mut ordered = Self::default();
         for i in order {
@@ -261,6 +263,7 @@ impl StraightLineProgram {
             ordered.ops.push(op);
             ordered.stages.push(self.stages[*i]);
         }
+        // Outputs and guards refer to the new positions.
         let new = |value: &ValueId| {
             places[value.index()].expect("outputs and guarded values are in the order")
         };
@@ -286,6 +289,7 @@ impl StraightLineProgram {
     /// Counts the operations of one stage; sine and cosine of the same angle count as one.
     pub fn count_operations(&self, stage: ProgramStage) -> OperationCount {
         let mut count = OperationCount::default();
+        // Angles whose sine or cosine is computed, each counted once.
         let mut angles = std::collections::BTreeSet::new();
         for (op, s) in self.ops.iter().zip(&self.stages) {
             if *s != stage {

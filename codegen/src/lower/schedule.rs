@@ -66,6 +66,7 @@ pub(crate) fn schedule(
     roots: &[ExprId],
     request: &LoweringRequest<'_>,
 ) -> StraightLineProgram {
+    // The roots are in the order in which the passes were given them.
     let (outputs, rest) = roots.split_at(request.outputs.len());
     let (reachable, rest) = rest.split_at(request.reachable.len());
     let (regular, defined) = rest.split_at(2 * request.regular.len());
@@ -95,6 +96,7 @@ pub(crate) fn schedule(
             .guards
             .push(PoseGuard::Regular(value, size));
     }
+    // Outputs after guards.
     let outputs: Vec<ValueId> = outputs.iter().map(|id| scheduler.value(*id)).collect();
     // Only values of a state may become undefined; fixed ones are checked elsewhere.
     if request.may_be_undefined {
@@ -166,6 +168,7 @@ struct ProgramScheduler<'a> {
 impl ProgramScheduler<'_> {
     /// The value of an operation, which is appended if it is new. It is as late as its latest operand.
     fn push_op(&mut self, op: ProgramOp) -> ValueId {
+        // An equal operation exists already.
         if let Some(value) = self.known.get(&op) {
             return *value;
         }
@@ -320,6 +323,7 @@ impl ProgramScheduler<'_> {
             .iter()
             .cloned()
             .partition(|(id, _)| self.fixed[id.index()]);
+        // Terms with their signs, which become additions and subtractions.
         let mut signed: Vec<(bool, ValueId)> = Vec::new();
         for (id, factor) in fixed.iter().chain(&moving) {
             // The sum of the fixed terms is complete before the first other term is added.
@@ -339,6 +343,7 @@ impl ProgramScheduler<'_> {
 
     /// Adds signed values. Returns whether the sum has to be negated, and its value.
     fn add_signed(&mut self, signed: &[(bool, ValueId)]) -> (bool, ValueId) {
+        // The sum begins with a positive term, so that no change of sign is needed.
         let start = signed
             .iter()
             .position(|(negative, _)| !negative)
@@ -425,6 +430,7 @@ impl ProgramScheduler<'_> {
                 Some(product) => self.commutative(ProgramOp::Mul, product, power),
             });
         }
+        // All denominators that are not shared.
         let divisor = divisors
             .into_iter()
             .reduce(|a, b| self.commutative(ProgramOp::Mul, a, b));

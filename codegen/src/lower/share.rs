@@ -12,6 +12,7 @@ use crate::expr::{ExprId, Graph, Node, Rational};
 pub(crate) fn share_pairs(graph: &Graph, roots: &[ExprId]) -> (Graph, Vec<ExprId>) {
     let (mut graph, mut roots) = graph.compacted(roots);
     let mut live = graph.len();
+    // Each round replaces the most frequent pairs; new nodes may form further pairs.
     for _ in 0..200 {
         let pairs = common_pairs(&graph, &roots);
         if pairs.is_empty() {
@@ -58,6 +59,7 @@ fn pairs_of(node: &Node, fixed: &[bool], mut visit: impl FnMut(OperandPair)) {
             }
         }
         Node::Product(factors) if factors.len() > 2 => {
+            // Only factors with exponent 1 form pairs; fixed ones are multiplied once anyway.
             let simple: Vec<_> = factors
                 .iter()
                 .filter(|(id, n)| *n == 1 && !fixed[id.index()])
@@ -99,6 +101,7 @@ fn common_pairs(graph: &Graph, roots: &[ExprId]) -> BTreeSet<OperandPair> {
             });
         }
     }
+    // Pairs with their counts.
     let mut found: Vec<(usize, OperandPair)> = counts
         .into_iter()
         .filter(|(_, n)| *n > 1)
@@ -153,6 +156,7 @@ fn replace_pairs(
                     && terms[j].1 == &terms[i].1 * *ratio
                 {
                     let k = terms[i].1.clone();
+                    // The pair becomes one term with the coefficient of its first operand.
                     let joined = graph.sum(&[(a, Rational::ONE), (*b, (*ratio).clone())]);
                     terms.retain(|(t, _)| *t != a && t != b);
                     terms.push((joined, k));
@@ -170,6 +174,7 @@ fn replace_pairs(
                 };
                 let has = |id: ExprId| factors.contains(&(id, 1));
                 if factors.len() > 2 && has(a) && has(*b) {
+                    // The pair becomes one factor.
                     let joined = graph.mul(a, *b);
                     factors.retain(|(f, _)| *f != a && f != b);
                     factors.push((joined, 1));

@@ -90,6 +90,7 @@ fn dynamics(
     // Generalised forces of the effects, on the independent coordinates.
     let weight = equations.gravity;
     let none = crate::expr::vector::ZERO;
+    // Effects act on the tree and along the drives.
     let effects = equations.effect_forces(graph, mechanism, value)?;
     let effects = equations.project_on_active(graph, &effects.on_tree, &effects.on_drives);
     // Generalised forces of the bodies under a gravity, with some motions replaced by zero, in the cheapest form;
@@ -125,6 +126,7 @@ fn dynamics(
     let mut bias = bodies(graph, weight, &unaccelerated, &effects)?;
     bias.extend(projection.drive_jacobian.iter().flatten());
     let mass_matrix = mass_matrix(graph, mechanism, equations, value, &effects);
+    // Each program is lowered with the motions that it does not read set to zero.
     let mut program = |outputs: &[ExprId], frozen: &BTreeMap<ExprId, ExprId>| {
         closing.program_at(graph, equations, outputs, frozen)
     };

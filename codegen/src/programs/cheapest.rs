@@ -37,10 +37,12 @@ fn search_cheapest_form<F: Copy>(
     weigh: CostFunction<'_>,
     mut write: impl FnMut(&mut Graph, F) -> Result<Vec<ExprId>, DeriveError>,
 ) -> Result<Vec<ExprId>, DeriveError> {
+    // The best form so far with its outputs and cost.
     let (mut form, mut best) = (plain, write(graph, plain)?);
     let mut least = weigh(graph, &best);
     for pass in steps {
         for family in pass {
+            // All changes of a family apply to the same form.
             let before = form;
             let mut last = usize::MAX;
             for change in family {
@@ -54,6 +56,7 @@ fn search_cheapest_form<F: Copy>(
                 if cost < least {
                     (form, best, least) = (changed, outputs, cost);
                 }
+                // The family has passed its minimum.
                 if cost > last {
                     break;
                 }
@@ -106,6 +109,7 @@ pub(crate) fn cheapest_columns(
     weigh: CostFunction<'_>,
 ) -> Result<Vec<Vec<ExprId>>, DeriveError> {
     let tree = &equations.tree;
+    // Depth of the tree, in links.
     let depths = (0..tree.links.len()).map(|i| tree.path_to(Some(i)).len());
     let deepest = depths.max().unwrap_or(0);
     // A change of style only.
@@ -135,6 +139,7 @@ pub(crate) fn cheapest_columns(
         axial: true,
         ..form
     })]]);
+    // Depths to which moments and forces are carried.
     let to = |moments, forces| -> ColumnChange {
         Box::new(move |form| ColumnForm {
             depths: CarryDepths { moments, forces },
@@ -157,6 +162,7 @@ pub(crate) fn cheapest_columns(
     }
     steps.truncate(n_passes);
     let mut written = FrameCache::default();
+    // Outputs are searched as one list, and then cut into columns.
     let n_drives = mechanism.drives.len();
     let outputs = search_cheapest_form(graph, ColumnForm::PLAIN, &steps, weigh, |graph, form| {
         let key = (form.style, form.fixed_axes);

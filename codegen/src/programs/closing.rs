@@ -109,6 +109,7 @@ impl PassiveClosure {
                 step.solved.angles.iter().flat_map(|(_, cs)| *cs).collect();
             roots.extend(step.solved.values.iter().map(|(_, value)| *value));
             roots.extend(step.solved.root.iter().map(|root| root.radicand));
+            // Angles, then values, then the radicand, in this order.
             let closed = closing.close_position(graph, &roots);
             let n_angles = step.solved.angles.len();
             let first = closing.solved.len();
@@ -128,6 +129,7 @@ impl PassiveClosure {
             closing
                 .reachable
                 .extend(step.solved.root.iter().map(|_| closed[closed.len() - 1]));
+            // The sums of angles that the step solves for.
             let angles: Vec<AtomAngleSum> = step
                 .solved
                 .angles
@@ -158,6 +160,7 @@ impl PassiveClosure {
                     continue;
                 }
                 let [cosine, sine] = closing.cos_sin(graph, &AtomAngleSum::new([(atom, 1)]));
+                // The angle is computed relative to the quarter turn of the nominal pose.
                 let quarters = quarter_turns(mechanism.coordinates[*p].nominal);
                 let back = graph.cos_sin(&AtomAngleSum::NONE, -6 * quarters);
                 let [cosine, sine] = rotate_vector(graph, [back.0, back.1], [cosine, sine]);
@@ -262,6 +265,7 @@ impl PassiveClosure {
         let parts = self.resolve_sum(sum, 0);
         let (c, s) = graph.cos_sin(&parts.known, parts.pi12);
         let mut total = [c, s];
+        // Solved sums are added one after the other.
         for (piece, n) in parts.solved {
             let turned = multiply_angle(graph, self.solved[piece], n.into());
             total = rotate_vector(graph, total, turned);
@@ -300,6 +304,7 @@ impl PassiveClosure {
     /// The definitions of atoms that some expressions need, directly or through other definitions.
     fn definitions(&self, graph: &Graph, roots: &[ExprId]) -> Vec<AtomDefinition> {
         let mut used = graph.atoms(roots);
+        // Guards may need definitions too.
         used.extend(graph.atoms(&self.reachable));
         let (mut found, mut left): (Vec<AtomDefinition>, _) =
             (Vec::new(), self.definitions.clone());

@@ -85,6 +85,7 @@ pub(crate) fn programs(
             .flat_map(|d| columns.iter().map(move |column| column[d]))
             .collect()
     };
+    // Motion of loops and drives.
     let projection = &equations.projection;
     // Columns of p_g as they were derived, before any search for cheaper forms.
     let all: Vec<Vec<ExprId>> = reduction
@@ -95,6 +96,7 @@ pub(crate) fn programs(
             equations.columns[position.expect("a product of p_g is a candidate")].clone()
         })
         .collect();
+    // Outputs of the passive motion, then of the drives.
     let mut passive: Vec<ExprId> = projection
         .loops
         .passive
@@ -121,6 +123,7 @@ pub(crate) fn programs(
             scales: plain_program(graph, &scales),
         }))
     };
+    // Base parameters, and the cheapest forms of regressor and inverse dynamics.
     let base_expressions = base::base_expressions(graph, reduction);
     let base_parameters = plain_program(graph, &base_expressions);
     let nothing = BTreeMap::new();
@@ -139,6 +142,7 @@ pub(crate) fn programs(
             .relative_scale(graph);
         plain_program(graph, &[scale])
     });
+    // Expressions are closed over the active coordinates and lowered.
     let n_motion = drives.len();
     let together = [drives.as_slice(), &inverse_dynamics].concat();
     let mut program = |outputs: &[ExprId]| closing.program(graph, equations, outputs);

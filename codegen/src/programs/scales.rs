@@ -29,6 +29,7 @@ pub(crate) fn residual_scales(
         .iter()
         .map(|r| coordinates_of(graph, &[*r]))
         .collect();
+    // Residuals first, then coordinates.
     let mut scales = residuals.clone();
     for i in loops.passive.iter().chain(&loops.active) {
         let rows = residuals.iter().zip(&of).filter(|(_, of)| of.contains(i));

@@ -48,6 +48,7 @@ impl ColumnForm {
         product: &ParameterMonomial,
         products: &[ParameterMonomial],
     ) -> Vec<(usize, JointSide, SymbolicWrench)> {
+        // Links to which the product contributes.
         let bodies: Vec<(usize, InertiaFactors)> = inertia
             .link_inertias(product)
             .map(|(link, inertia)| (link, *inertia))
@@ -73,6 +74,7 @@ impl ColumnForm {
                     let body = frames.rotate_body(graph, *link, &body);
                     let flat = motion.wrench(graph, *link, &body);
                     let axial = motion.axial_moment(graph, *link);
+                    // Minus the moment about the joint's axis, whose column exists anyway.
                     let less = axial.map(|m| graph.neg(m));
                     // Deep in the tree both parts are added at once, on the fixed side of the joint.
                     let depth = tree.path_to(Some(*link)).len();
@@ -128,6 +130,7 @@ impl TotalForm {
         frames: &RecursionFrames,
         value: &dyn Fn(&ParameterMonomial) -> ExprId,
     ) -> Vec<(usize, JointSide, SymbolicWrench)> {
+        // All products together.
         let inertia = inertia.total_inertias(graph, value);
         let mut bodies: BTreeMap<usize, BodyInertia> = inertia
             .iter()
@@ -168,6 +171,7 @@ impl RecursionFrames {
         } else {
             (tree.clone(), Vec::new())
         };
+        // Velocities and accelerations from the base to the ends.
         let motion = newton_euler::forward_recursion(graph, &tree, gravity, style);
         Self {
             tree,

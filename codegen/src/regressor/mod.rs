@@ -51,6 +51,7 @@ pub(crate) fn unreduced_equations(
     graph: &mut Graph,
     mechanism: &Mechanism,
 ) -> Result<UnreducedEquations, DeriveError> {
+    // Kinematics and inertia of the open tree, then loops and drives.
     let tree = KinematicTree::new(graph, mechanism)?;
     let gravity = [
         expressions::expression(graph, &mechanism.gravity[0])?,
@@ -70,6 +71,7 @@ pub(crate) fn unreduced_equations(
             effect,
         )?);
     }
+    // Products of bodies and parameters of effects, in the order of eq. (5).
     let mut products: BTreeSet<ParameterMonomial> = inertia.products();
     // The bodies of effects are part of the inertia already.
     let all = mechanism.effects.iter().zip(&of_mechanics);
@@ -114,6 +116,7 @@ impl UnreducedEquations {
         products
             .iter()
             .map(|product| {
+                // Wrenches of the links, carried to the joints.
                 let wrenches = form.wrenches(graph, &self.inertia, frames, product, products);
                 let on_tree =
                     newton_euler::carry_wrench(graph, tree, style, n, form.depths, wrenches);
@@ -153,12 +156,14 @@ impl UnreducedEquations {
         on_tree: &[ExprId],
         value: &dyn Fn(&ParameterMonomial) -> ExprId,
     ) -> Result<Vec<ExprId>, DeriveError> {
+        // Effects on the tree join the bodies; those along drives are added at the end.
         let effects = self.effect_forces(graph, mechanism, value)?;
         let on_tree: Vec<ExprId> = on_tree
             .iter()
             .zip(effects.on_tree)
             .map(|(a, b)| graph.add(*a, b))
             .collect();
+        // Constraint forces are eliminated here.
         let forces = self.projection.drive_forces(graph, &on_tree)?;
         Ok(forces
             .into_iter()
@@ -174,6 +179,7 @@ impl UnreducedEquations {
         on_tree: &[ExprId],
         on_drives: &[ExprId],
     ) -> Vec<ExprId> {
+        // Forces along drives act through the Jacobian.
         let projected = self.projection.project(graph, on_tree);
         projected
             .into_iter()
@@ -216,6 +222,7 @@ impl UnreducedEquations {
             for (p, place) in effect.places.iter().enumerate() {
                 for term in &effect.terms {
                     let value = value(term);
+                    // A parameter of zero adds nothing.
                     if value == Graph::ZERO {
                         continue;
                     }
@@ -253,6 +260,7 @@ impl UnreducedEquations {
             [_, _] => Some(effect.places[1 - at]),
             _ => effect.other,
         };
+        // Quantities of the place and of the other place.
         let here = self.quantities(graph, place);
         let there = other.map_or([None; 4], |other| self.quantities(graph, other));
         // An angle is inserted as a coordinate, so that its sine is that of the joint.
@@ -318,6 +326,7 @@ fn rotation_coordinate(mechanism: &Mechanism, place: EffectPlace) -> Option<Coor
             return None;
         }
     };
+    // Lengths have no sine.
     let motion = mechanism.coordinates[coordinate.0].motion;
     motion.is_angle().then_some(coordinate)
 }

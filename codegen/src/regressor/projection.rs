@@ -63,6 +63,7 @@ impl LoopProjection {
         tree: &KinematicTree,
     ) -> Result<Self, DeriveError> {
         let n = mechanism.coordinates.len();
+        // Derivatives of the residuals by all coordinates.
         let loops = KinematicLoops::new(graph, mechanism, tree)?;
         let (active, passive, residual) = (&loops.active, &loops.passive, &loops.residual);
         let rates_of = passive_rate_map(tree, passive, n);
@@ -101,6 +102,7 @@ impl LoopProjection {
             })
             .collect();
         let solution = linear::solve(graph, &loop_p, &rhs, "the passive rates")?;
+        // The solution: passive rates per active rate, and the drift of the accelerations.
         let transmission: Vec<Vec<ExprId>> = solution
             .values
             .iter()
@@ -126,6 +128,7 @@ impl LoopProjection {
             rates_of,
             transmission,
         };
+        // Rates have no drift.
         projection.passive_rates = projection.passive_motion(graph, Atom::Rate, None);
         let drift: Vec<ExprId> = solution
             .values
@@ -140,6 +143,7 @@ impl LoopProjection {
 
     /// Second time derivative of the residuals at zero acceleration.
     fn residual_drift(graph: &mut Graph, residual: &[ExprId]) -> Vec<ExprId> {
+        // The derivative of the velocities along the rates only.
         let velocity = graph.time_derivative(residual);
         let only_rates = |graph: &mut Graph, atom: Atom| match atom {
             Atom::Coordinate(i) => graph.atom(Atom::Rate(i)),
@@ -157,6 +161,7 @@ impl LoopProjection {
         drift: Option<&[ExprId]>,
     ) -> Vec<ExprId> {
         let n = self.rates_of.len();
+        // Active rates are inputs, passive ones follow by the transmission.
         let mut y = vec![Graph::ZERO; n];
         for a in &self.loops.active {
             y[*a] = graph.atom(order(*a));
@@ -188,6 +193,7 @@ impl LoopProjection {
     /// Generalised forces of all coordinates of the open tree, projected on the active ones.
     pub(crate) fn project(&self, graph: &mut Graph, forces: &[ExprId]) -> Vec<ExprId> {
         let n = self.rates_of.len();
+        // Forces on the rates `y`.
         let in_y: Vec<ExprId> = (0..n)
             .map(|j| {
                 let terms: Vec<_> = (0..n)
@@ -217,6 +223,7 @@ impl LoopProjection {
         graph: &mut Graph,
         forces: &[ExprId],
     ) -> Result<Vec<ExprId>, DeriveError> {
+        // Generalised forces on the active coordinates, which the drives have to balance.
         let projected = self.project(graph, forces);
         let n_drives = self.drive_jacobian.len();
         let transposed: Vec<Vec<ExprId>> = self
@@ -274,6 +281,7 @@ impl LoopProjection {
         let transposed: Vec<Vec<ExprId>> = (0..n)
             .map(|p| jacobian.iter().map(|row| row[p]).collect())
             .collect();
+        // The transposed system is solved directly if it is small enough.
         let rhs: Vec<Vec<ExprId>> = in_y.iter().map(|x| vec![*x]).collect();
         match linear::solve(graph, &transposed, &rhs, what) {
             // Systems of independent legs can be split by columns only, so the inverse of the untransposed matrix is
@@ -314,11 +322,13 @@ impl LoopProjection {
             let coordinate = match drive.kind {
                 DriveKind::Joint(i) => graph.atom(Atom::Coordinate(i.0)),
                 DriveKind::Linear { from, to } => {
+                    // The length of a linear drive.
                     let square = distance_squared(graph, mechanism, tree, [to.0, from.0])?;
                     let length = graph.unary(Unary::Sqrt, square);
                     signed_length(graph, mechanism, length)
                 }
             };
+            // The row of the Jacobian by virtual power.
             let by_coordinate: Vec<ExprId> = (0..n)
                 .map(|i| graph.differentiate(&[coordinate], Atom::Coordinate(i))[0])
                 .collect();
@@ -329,6 +339,7 @@ impl LoopProjection {
                 rate_terms.push(graph.mul(*slope, rate));
             }
             let rate = graph.add_all(&rate_terms);
+            // The acceleration is written with the rates of the tree, which are closed later.
             let tree_rate = graph.time_derivative(&[coordinate]);
             let acceleration = graph.time_derivative(&tree_rate)[0];
             self.drives.push(DriveMotion {
@@ -338,6 +349,7 @@ impl LoopProjection {
             });
             self.drive_jacobian.push(row);
         }
+        // The Jacobian must be square.
         let n = self.freedoms.len();
         if self.drives.len() != n {
             return Err(DeriveError::DriveCount {
@@ -376,6 +388,7 @@ fn signed_length(graph: &mut Graph, mechanism: &Mechanism, length: ExprId) -> Ex
     let Node::Unary(Unary::Abs, inner) = *graph.node(base) else {
         return length;
     };
+    // The sign at the nominal pose.
     let positive = nominal_value(graph, mechanism, inner).is_none_or(|x| x >= 0.0);
     graph.scale(inner, &if positive { factor } else { -&factor })
 }

@@ -93,6 +93,7 @@ fn reactions(
     closing: &PassiveClosure,
 ) -> Result<ReactionPrograms, DeriveError> {
     let tree = &equations.tree;
+    // Links without a joint that could transmit anything, and the cuts of the loops.
     let free = free_links(mechanism, equations);
     let cuts = loads::cut_loops(graph, mechanism, equations, &free)?;
     let value = product_values(graph, equations);
@@ -254,6 +255,7 @@ fn loop_closure_forces(
     // Generalised forces that the drives do not supply.
     let left: Vec<ExprId> = (0..mechanism.coordinates.len())
         .map(|i| {
+            // What the drives supply, by the transposed derivative of their lengths.
             let slopes = graph.differentiate(&coordinates, Atom::Coordinate(i));
             let driven: Vec<ExprId> = slopes
                 .iter()

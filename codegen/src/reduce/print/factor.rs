@@ -33,6 +33,7 @@ pub(super) fn factor_polynomial(p: &TrigonometricPolynomial) -> FactoredPolynomi
             factors: Vec::new(),
         };
     };
+    // The leading term of the remaining polynomial is positive.
     if leading.is_negative() {
         number = -&number;
     }
@@ -48,6 +49,7 @@ pub(super) fn factor_polynomial(p: &TrigonometricPolynomial) -> FactoredPolynomi
         .collect();
     // Each candidate is divided out as often as possible.
     let mut factors: Vec<(TrigonometricPolynomial, u32)> = Vec::new();
+    // Variables that the remaining polynomial contains.
     let names: BTreeSet<FactorVariable> = rest.keys().flatten().map(|(v, _)| *v).collect();
     if rest.len() <= MOST_TERMS && names.len() <= MOST_VARIABLES {
         for divisor in linear_form_candidates(&names.into_iter().collect::<Vec<_>>()) {
@@ -212,7 +214,9 @@ pub(super) fn find_squares(p: &TrigonometricPolynomial) -> Vec<SumSquare> {
         if linear.len() < 2 || !whole {
             continue;
         }
+        // A variable belongs to one square only.
         variables.retain(|v| linear.iter().all(|(u, _)| u != v));
+        // Terms that the square replaces.
         let mut terms = Vec::new();
         for (i, (u, _)) in linear.iter().enumerate() {
             terms.push(vec![(*u, 2)]);

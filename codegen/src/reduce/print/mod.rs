@@ -63,6 +63,7 @@ impl RationalFunction {
 
     /// The function factored as far as is cheap: numbers and powers in front, linear factors, sums of squares.
     pub fn formula(&self, mechanism: &Mechanism) -> PrintedFormula {
+        // Numerator and denominator are factored separately.
         let (number, above) = polynomial_factors(&self.numerator, mechanism);
         let (divisor, below) = polynomial_factors(&self.denominator, mechanism);
         if number.is_zero() {
@@ -76,6 +77,7 @@ impl RationalFunction {
         let Some((_, leading)) = ordered_terms(&self.numerator).into_iter().next() else {
             return (Rational::ZERO, Self::constant(Rational::ONE));
         };
+        // The number has the sign of the leading term.
         let mut content = content(&self.numerator);
         if leading.is_negative() {
             content = -&content;
@@ -130,6 +132,7 @@ fn compare_powers(a: &PowerProduct, b: &PowerProduct) -> Ordering {
             (None, Some(_)) => return Ordering::Greater,
             (Some(_), None) => return Ordering::Less,
             (Some(&&(v, n)), Some(&&(w, m))) => {
+                // Variables in the order of declaration, then higher powers first.
                 let order = v.cmp(&w).then(Reverse(n).cmp(&Reverse(m)));
                 if order != Ordering::Equal {
                     return order;
@@ -189,6 +192,7 @@ fn gather_squares(p: &TrigonometricPolynomial, mechanism: &Mechanism) -> Printed
             rest.remove(used);
         }
     }
+    // Squares first, then all other terms.
     let terms = ordered_terms(&rest)
         .into_iter()
         .map(|(powers, k)| PrintedFormula::product(k.clone(), power_factors(powers, mechanism)));

@@ -56,6 +56,7 @@ fn forces_along_rod(
     gravity: &SymbolicVector,
     n: usize,
 ) -> Vec<Vec<ExprId>> {
+    // The vector along the rod, and its inverse lengths.
     let d: SymbolicVector = std::array::from_fn(|i| graph.sub(end[i], a[i]));
     let per_length = graph.pow(length, -1);
     let per_square = graph.pow(length, -2);
@@ -64,6 +65,7 @@ fn forces_along_rod(
         let of = graph.time_derivative(v);
         [of[0], of[1], of[2]]
     };
+    // First and second time derivative.
     let d1 = derivative(graph, &d);
     let d2 = derivative(graph, &d1);
     // `across` is l u' and `turning` is l u''; neither contains a root.
@@ -99,6 +101,7 @@ fn forces_along_rod(
             [slopes[0], slopes[1], slopes[2]]
         };
         let (by_d, by_a) = (by(graph, &d), by(graph, &a));
+        // l dl/dq
         let radial = graph.dot(&by_d, &d);
         // Coefficients of the second moment, the first moment and the mass.
         let second = {
@@ -163,6 +166,7 @@ fn end_forces(
     };
     let d = graph.sub_vectors(&b, &a);
     let u = graph.scale_vector(per_length, &d);
+    // u'' and the acceleration of the first point.
     let turning = twice_derived(graph, &u);
     let pivot = twice_derived(graph, &a);
     let lifted = graph.sub_vectors(&pivot, gravity);
@@ -175,8 +179,10 @@ fn end_forces(
     let swung = sum(graph, [second, first]);
     let along = graph.dot(&u, &swung);
     let along = graph.scale_vector(along, &u);
+    // The part perpendicular to the rod.
     let square = graph.sub_vectors(&swung, &along);
     let at_second = graph.scale_vector(per_length, &square);
+    // The balance of forces of the rod.
     let total = sum(graph, [first, mass]);
     [graph.sub_vectors(&total, &at_second), at_second]
 }

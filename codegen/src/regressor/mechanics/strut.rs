@@ -36,6 +36,7 @@ fn strut_line(
     let a = position_in_base(graph, mechanism, tree, from.0)?;
     let b = position_in_base(graph, mechanism, tree, to.0)?;
     let across = graph.sub_vectors(&b, &a);
+    // The length as a root.
     let square = graph.dot(&across, &across);
     let length = graph.unary(Unary::Sqrt, square);
     Ok(Some(StrutLine {
@@ -61,6 +62,7 @@ pub(super) fn generalised_forces(
     let mut forces = vec![Vec::new(); 3];
     for coordinate in 0..mechanism.coordinates.len() {
         let slopes = graph.differentiate(&line.across, Atom::Coordinate(coordinate));
+        // l dl/dq
         let stretched = graph.dot(&[slopes[0], slopes[1], slopes[2]], &line.across);
         forces[0].push(graph.mul(stretched, per_length));
         forces[1].push(stretched);
@@ -85,6 +87,7 @@ pub(super) fn point_forces(
     let rate = distance_rate(graph, &line);
     let by_distance = graph.mul(stiffness, line.length);
     let by_rate = graph.mul(damping, rate);
+    // F0 + k l + Fv l'
     let pull = graph.add(constant, by_distance);
     let pull = graph.add(pull, by_rate);
     let per_length = graph.pow(line.length, -1);
