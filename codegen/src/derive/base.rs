@@ -36,6 +36,7 @@ impl Derivation {
         let reduction = &self.reduction;
         (0..reduction.retained.len())
             .map(|k| {
+                // Unit and name are those of the retained product.
                 let product = &reduction.products[reduction.retained[k]];
                 BaseParameterEntry {
                     name: base::base_parameter_name(k),
@@ -63,6 +64,7 @@ impl Derivation {
             )
         };
         let lines = self.reduction.dependencies.iter().map(|line| {
+            // Retained products first, then dependent ones.
             let retained = line.equals.iter();
             let retained = retained.map(|(k, factor)| (self.reduction.retained[*k], factor));
             let via = line.via.iter().map(|(product, factor)| (*product, factor));
@@ -111,6 +113,7 @@ impl Derivation {
         let mut polynomials: Vec<Vec<(ParameterMonomial, BigRational)>> = retained
             .map(|k| vec![(product(*k), BigRational::one())])
             .collect();
+        // Factors by exact values of the constants.
         let factors = reduction.factors_by(&|factor| Some(factor.value_exact(constants)));
         let factors = factors.expect("numbers have a value for everything");
         for (line, factors) in reduction.dependencies.iter().zip(factors) {

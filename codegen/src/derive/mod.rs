@@ -50,6 +50,7 @@ fn derive_with(
 ) -> Result<Derivation, DeriveError> {
     check_values(mechanism)?;
     let mut graph = Graph::new();
+    // Equations, reduction, closed loops, programs.
     let equations = unreduced_equations(&mut graph, mechanism)?;
     let reduction = reduce(&mut graph, &equations)?;
     let closing = PassiveClosure::new(&mut graph, mechanism, &equations)?;

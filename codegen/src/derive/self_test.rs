@@ -9,6 +9,7 @@ pub(crate) fn self_test_reach(derivation: &Derivation) -> Vec<f64> {
     let mechanism = &derivation.mechanism;
     let residual = &derivation.equations.projection.loops.residual;
     let mut graph = derivation.graph.clone();
+    // Size of the loops, m.
     let size = magnitude::nominal_magnitude(&mut graph, mechanism, residual);
     let (active, _) = derivation.coordinates();
     let is_open = residual.is_empty();

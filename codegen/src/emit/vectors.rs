@@ -99,6 +99,7 @@ pub fn vectors_c(derivation: &Derivation, program: &StraightLineProgram, width: 
         };
     }
     // Results go to lines like those of the inputs.
+    // The caller may want the first outputs only.
     for (k, output) in program.outputs.iter().take(width).enumerate() {
         let value = vector_operand(*output, &is_fixed);
         let _ = writeln!(of_state, "            found[{k} * LINES] = {value};");

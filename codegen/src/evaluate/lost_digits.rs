@@ -73,6 +73,7 @@ fn largest_digit_loss(derivation: &Derivation) -> Result<Option<DigitLoss>, Deri
         return Ok(None);
     };
     let n_drives = mechanism.drives.len();
+    // The largest error of all drives decides.
     let errors = (0..n_drives).map(|d| (d, sampled.relative_force_error(d, n_drives, &values)));
     let worst = errors.max_by(|a, b| a.1.total_cmp(&b.1));
     Ok(worst.map(|(drive, error)| DigitLoss {
@@ -120,9 +121,11 @@ impl ForceSamples {
         // Numbers of usable states and of states with infinite forces, and the current distance.
         let (mut n_states, mut n_infinite, mut reach) = (0, 0, REACH);
         for _ in 0..TRIES {
+            // Enough states have been found.
             if n_states == STATES {
                 break;
             }
+            // H and both forces at the same state.
             let state = NearbyState::random_near_nominal(mechanism, reach, &mut stream);
             let states = state.as_motion_states();
             let found = evaluator.full_regressor(&states).and_then(|h| {
@@ -178,6 +181,7 @@ impl ForceSamples {
     fn relative_force_error(&self, drive: usize, n_drives: usize, values: &[f64]) -> f64 {
         let (mut errors, mut size) = ([0.0; 2], 0.0);
         for state in 0..self.n_states() {
+            // The force from p_g, as a sum of terms.
             let row = self.full.row(state * n_drives + drive);
             let terms = row.iter().zip(values).map(|(h, p)| h * p);
             let (sum, sizes) = terms.fold((0.0, 0.0), |(sum, size), term| {
@@ -213,6 +217,7 @@ struct NearbyState {
 impl NearbyState {
     /// Draws a state; lengths scale with their nominal value.
     fn random_near_nominal(mechanism: &Mechanism, reach: f64, stream: &mut RandomStream) -> Self {
+        // Passive coordinates follow from the loops.
         let active: Vec<_> = (mechanism.coordinates.iter())
             .filter(|c| !c.passive)
             .collect();
@@ -284,6 +289,7 @@ fn lost_digits_error(derivation: &Derivation, found: &DigitLoss) -> DeriveError 
     let worst = lines
         .iter()
         .filter(|(_, terms)| largest(terms) >= NEARLY_LARGEST * all);
+    // Names for the message.
     let dependent: Vec<String> = worst.clone().map(|(product, _)| name(*product)).collect();
     let mut retained: Vec<usize> = worst
         .flat_map(|(_, terms)| terms)

@@ -38,6 +38,7 @@ impl<'a> SingleStateProgram<'a> {
         read: impl FnOnce(&dyn Fn(usize) -> f64) -> R,
     ) -> R {
         let mut values = self.values.borrow_mut();
+        // Only operations of the state are computed.
         let ops = self.program.ops.iter().zip(&self.program.stages);
         for (i, (op, stage)) in ops.enumerate() {
             if *stage == ProgramStage::State {
@@ -205,14 +206,17 @@ impl<'a> RegisterMachine<'a> {
                 _ => &[],
             })
             .collect();
+        // Slots that are never written stay zero.
         let mut memory = vec![[0.0; BLOCK]; self.n_slots];
         // Fixed values fill their slots once for all blocks.
         for (slot, value) in &self.kept {
             memory[*slot] = [*value; BLOCK];
         }
+        // The vector width of this processor.
         let arch = Arch::new();
         let mut start = 0;
         while start < n {
+            // The last block may be shorter.
             let len = BLOCK.min(n - start);
             arch.dispatch(BlockExecution {
                 steps: &self.steps,
@@ -229,6 +233,7 @@ impl<'a> RegisterMachine<'a> {
                 let sample = start + k;
                 return Err(PoseFault { sample, reason }.into());
             }
+            // Results are borrowed, not copied.
             let columns = self.outputs.iter().map(|slot| &memory[*slot][..len]);
             visit(&OutputBlock {
                 len,
@@ -243,6 +248,7 @@ impl<'a> RegisterMachine<'a> {
     /// is the one that emitted code checks first.
     fn first_fault(&self, len: usize, memory: &[[f64; BLOCK]]) -> Option<(usize, PoseGuard)> {
         let failing = self.program.guards.iter().filter_map(|guard| {
+            // All states of the block are checked at once.
             let values = self.block_values(guard.value(), memory);
             let size = guard
                 .reference_size()

@@ -394,6 +394,7 @@ impl<'a> ModelEvaluator<'a> {
                 fault = Some(earlier);
             }
         }
+        // Fixed values of the program are computed here, outputs that are not wanted are skipped.
         let machine =
             RegisterMachine::for_outputs(program, wanted, |atom| self.fixed_value(atom, base));
         let input = |atom| match atom {
@@ -426,6 +427,7 @@ impl<'a> ModelEvaluator<'a> {
             let reason = PoseReason::NotFinite { input };
             Some(PoseFault { sample, reason })
         };
+        // Without a state there is no fault.
         if states.is_empty() {
             return None;
         }
@@ -436,6 +438,7 @@ impl<'a> ModelEvaluator<'a> {
         if let Some(k) = base.iter().position(|x| !x.is_finite()) {
             return fault(0, format!("p{}_min", k + 1));
         }
+        // Names as in messages: coordinate, `_d` for its rate, `_dd` for its acceleration.
         let name = |k: usize| &self.mechanism.coordinates[self.active[k]].name;
         let motion = [(&states.q, ""), (&states.qd, "_d"), (&states.qdd, "_dd")];
         let mut columns: Vec<(&[f64], String)> = Vec::new();
@@ -515,7 +518,9 @@ impl<'a> ModelEvaluator<'a> {
         // Active and passive coordinates of the last state.
         let mut last: Option<(Vec<f64>, Vec<f64>)> = None;
         for sample in 0..n {
+            // The pose of this state.
             let active: Vec<f64> = states.q.iter().map(|q| q[sample]).collect();
+            // From the state before, which is usually close.
             let near = last.and_then(|(at, passive)| follow(&loops, &at, &passive, &active).ok());
             let found = near.map_or_else(
                 || {

@@ -7,6 +7,7 @@ use crate::expr::{ExprId, Graph, Node};
 
 /// Number of uses of each node by `roots` and by nodes that these need.
 pub(crate) fn use_counts(graph: &Graph, roots: &[ExprId]) -> Vec<usize> {
+    // Roots count as uses.
     let mut uses = vec![0; graph.len()];
     for root in roots {
         uses[root.index()] += 1;
@@ -38,6 +39,7 @@ pub(crate) fn rewrite(
             continue;
         }
         let id = ExprId(u32::try_from(i).expect("graph below 4G nodes"));
+        // The node with its operands replaced.
         let node = match graph.node(id).clone() {
             Node::Sum(terms) => Node::Sum(
                 terms

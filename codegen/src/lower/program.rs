@@ -151,6 +151,7 @@ impl StraightLineProgram {
     /// Which operations are needed by the guards and by those outputs whose index is `wanted`.
     pub(crate) fn needed_operations(&self, wanted: &dyn Fn(usize) -> bool) -> Vec<bool> {
         let mut needed = vec![false; self.ops.len()];
+        // Outputs that are wanted, and all guards.
         let outputs = self.outputs.iter().enumerate();
         let outputs = outputs.filter(|(k, _)| wanted(*k)).map(|(_, value)| *value);
         let guards = self.guards.iter().flat_map(|guard| guard.values());

@@ -71,6 +71,7 @@ pub(crate) fn schedule(
     let (reachable, rest) = rest.split_at(request.reachable.len());
     let (regular, defined) = rest.split_at(2 * request.regular.len());
     let mut defined = defined.iter().copied();
+    // Tables of the expressions, and an empty program.
     let mut scheduler = ProgramScheduler {
         graph,
         fixed: fixed_nodes(graph, roots),
@@ -113,6 +114,7 @@ pub(crate) fn schedule(
 
 /// For each node, whether it depends only on geometry and parameters.
 pub(crate) fn fixed_nodes(graph: &Graph, roots: &[ExprId]) -> Vec<bool> {
+    // Operands come before their users, so one pass is enough.
     let reachable = graph.reachable(roots);
     let mut fixed = vec![false; reachable.len()];
     for (i, needed) in reachable.into_iter().enumerate() {
@@ -299,6 +301,7 @@ impl ProgramScheduler<'_> {
     /// The value of a sum of angles with integer factors.
     fn angle(&mut self, angle: &AtomAngleSum) -> ValueId {
         let mut total: Option<ValueId> = None;
+        // Terms with a factor other than one are multiplied.
         for (atom, n) in angle.terms() {
             let value = self.atom(*atom);
             let term = if n.abs() == 1 {
@@ -319,6 +322,7 @@ impl ProgramScheduler<'_> {
 
     /// A linear combination: fixed terms first, then all others from left to right.
     fn sum(&mut self, terms: &[(ExprId, Rational)]) -> ValueId {
+        // Terms of a state come after the fixed ones.
         let (fixed, moving): (Vec<_>, Vec<_>) = terms
             .iter()
             .cloned()
@@ -413,6 +417,7 @@ impl ProgramScheduler<'_> {
             // A denominator of several products is inverted once and then multiplied.
             let shared = *n < 0 && self.uses.get(&(*id, *n)).is_some_and(|u| *u > 1);
             let base = self.scheduled_value(*id);
+            // Powers by repeated multiplication.
             let mut power = base;
             for _ in 1..n.abs() {
                 power = self.commutative(ProgramOp::Mul, power, base);

@@ -91,6 +91,7 @@ fn pairs_of(node: &Node, fixed: &[bool], mut visit: impl FnMut(OperandPair)) {
 
 /// Pairs that occur most often and at least twice. No operand is in two of them, so that they can be replaced together.
 fn common_pairs(graph: &Graph, roots: &[ExprId]) -> BTreeSet<OperandPair> {
+    // Fixed nodes are computed once, so their pairs are not worth sharing.
     let fixed = fixed_nodes(graph, roots);
     let mut counts: FxHashMap<OperandPair, usize> = FxHashMap::default();
     for (i, needed) in graph.reachable(roots).into_iter().enumerate() {
@@ -112,6 +113,7 @@ fn common_pairs(graph: &Graph, roots: &[ExprId]) -> BTreeSet<OperandPair> {
     let Some(most) = found.first().map(|f| f.0) else {
         return BTreeSet::new();
     };
+    // Operands of pairs that have been chosen.
     let mut taken: BTreeSet<ExprId> = BTreeSet::new();
     found
         .into_iter()

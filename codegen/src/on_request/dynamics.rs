@@ -155,6 +155,7 @@ fn check_affine_in_accelerations(
                 Graph::ZERO
             }
         };
+        // The forces of this effect alone.
         let forces = equations.effect_forces(graph, mechanism, &only)?;
         let forces: Vec<ExprId> = forces.on_tree.into_iter().chain(forces.on_drives).collect();
         if degree_in_accelerations(graph, &forces) > 1 {
@@ -210,6 +211,7 @@ fn mass_matrix(
 ) -> Vec<ExprId> {
     let projection = &equations.projection;
     let n = mechanism.coordinates.len();
+    // Size of M.
     let n_active = projection.loops.active.len();
     // Acceleration of every coordinate per acceleration of each independent one.
     let motion: Vec<Vec<ExprId>> = projection
@@ -251,6 +253,7 @@ fn mass_matrix(
             .iter()
             .map(|(link, inertia)| (*link, BodyInertia::new(inertia)))
             .collect();
+        // The cheapest style for composite bodies.
         let style = RecursionStyle {
             offset_after_turn: true,
             ..RecursionStyle::PLAIN
@@ -303,6 +306,7 @@ fn mass_matrix(
         .map(|i| graph.differentiate(&forces, Atom::Acceleration(i)))
         .collect();
     for a in 0..n_active {
+        // Derivatives of one generalised force by all accelerations.
         let row: Vec<ExprId> = slopes.iter().map(|column| column[a]).collect();
         for b in 0..n_active {
             let more = combined(graph, &row, &motion[b]);

@@ -80,6 +80,7 @@ impl FrameCache {
         gravity: &vector::SymbolicVector,
         key: (RecursionStyle, bool),
     ) -> &RecursionFrames {
+        // Few frames are written, so a list is searched.
         let at = self.0.iter().position(|(k, _)| *k == key);
         let at = at.unwrap_or_else(|| {
             let frames = RecursionFrames::new(graph, &equations.tree, gravity, key.0, key.1);
@@ -234,6 +235,7 @@ fn has_parallel_axes(tree: &KinematicTree) -> bool {
 
 /// The passes for inverse dynamics, in the order of [`PASSES`].
 fn total_form_steps(tree: &KinematicTree) -> Vec<ChangeFamilies<TotalForm>> {
+    // A change of style only.
     let styled = |change: fn(RecursionStyle) -> RecursionStyle| -> TotalChange {
         Box::new(move |form| TotalForm {
             style: change(form.style),

@@ -166,6 +166,7 @@ impl RecursionFrames {
         style: RecursionStyle,
         fixed_axes: bool,
     ) -> Self {
+        // In fixed axes, links with parallel joints share the axes of the first one.
         let (tree, turns) = if fixed_axes {
             tree.to_fixed_axes(graph)
         } else {

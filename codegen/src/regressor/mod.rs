@@ -74,6 +74,7 @@ pub(crate) fn unreduced_equations(
     // Products of bodies and parameters of effects, in the order of eq. (5).
     let mut products: BTreeSet<ParameterMonomial> = inertia.products();
     // The bodies of effects are part of the inertia already.
+    // Effects of expressions always have columns, those of mechanics only if they have forces.
     let all = mechanism.effects.iter().zip(&of_mechanics);
     for (effect, _) in all.filter(|(e, forces)| e.mechanics.is_none() || !forces.is_empty()) {
         products.extend(
@@ -201,6 +202,7 @@ impl UnreducedEquations {
         mechanism: &Mechanism,
         value: &dyn Fn(&ParameterMonomial) -> ExprId,
     ) -> Result<EffectForces, DeriveError> {
+        // Sums over all effects.
         let mut on_tree = vec![Graph::ZERO; mechanism.coordinates.len()];
         let mut on_drives = vec![Graph::ZERO; mechanism.drives.len()];
         let value = |term: &EffectTerm| value(&ParameterMonomial(vec![(term.parameter.0, 1)]));

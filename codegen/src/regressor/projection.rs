@@ -295,6 +295,7 @@ impl LoopProjection {
                 (0..n).map(one).collect()
             })
             .collect();
+        // The inverse, multiplied by the forces.
         let mut solution = linear::solve(graph, &jacobian, &identity, what)?;
         let inverse = std::mem::take(&mut solution.values);
         solution.values = (0..n)
@@ -342,6 +343,7 @@ impl LoopProjection {
             // The acceleration is written with the rates of the tree, which are closed later.
             let tree_rate = graph.time_derivative(&[coordinate]);
             let acceleration = graph.time_derivative(&tree_rate)[0];
+            // Kinematics and row of the Jacobian.
             self.drives.push(DriveMotion {
                 coordinate,
                 rate,

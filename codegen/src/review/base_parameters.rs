@@ -256,6 +256,7 @@ pub(super) fn base_parameters(
     line.push(text("."));
     // The numeric check, if the caller has made it.
     if let Some(n) = numeric {
+        // A smaller numeric rank means a special geometry.
         let verdict = if n.rank == rank {
             ", as derived"
         } else {

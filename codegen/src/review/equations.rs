@@ -130,6 +130,7 @@ pub struct ProgramOperations {
 /// Pairs as a JSON object, in their order.
 #[cfg(any(test, feature = "json"))]
 fn as_map<S: Serializer>(pairs: &[(String, String)], serializer: S) -> Result<S::Ok, S::Error> {
+    // The order of the pairs is kept.
     let mut map = serializer.serialize_map(Some(pairs.len()))?;
     for (key, value) in pairs {
         map.serialize_entry(key, value)?;

@@ -56,6 +56,7 @@ pub(super) fn frames(page: &mut PageDocument, mechanism: &Mechanism) {
         .map(|frame| {
             let mut steps: TextLine = Vec::new();
             for step in &frame.steps {
+                // Kind, axis and amount of one step.
                 let (letter, axis, by) = match step {
                     // A floating body is described in words.
                     FrameStep::Free(body) => {
@@ -111,6 +112,7 @@ pub(super) fn frames(page: &mut PageDocument, mechanism: &Mechanism) {
 
 /// The coordinates of a floating body and the axes in which its velocities and forces are given.
 fn free_body_motion(mechanism: &Mechanism, body: &FreeBody) -> TextLine {
+    // Names of the coordinates as a list.
     let names = |all: &[CoordinateIdx]| {
         let names = all.iter().map(|i| mechanism.coordinates[i.0].name.as_str());
         names.collect::<Vec<_>>().join(", ")
@@ -224,6 +226,7 @@ pub(super) fn bodies(page: &mut PageDocument, mechanism: &Mechanism) {
                 inertia,
             } => (&mut linear, mass, first_moment, inertia),
         };
+        // Mass, centre or first moment, and inertia.
         let mut row = start;
         row.push(cell(InlineSpan::Math(exact_formula(mechanism, mass))));
         row.push(vector(mechanism, place));

@@ -200,6 +200,7 @@ impl ListingBuilder<'_> {
         } else {
             "c"
         };
+        // The name of an angle is the same for its sine and cosine.
         if !self.angles.contains_key(&angle) {
             let name = angle_name(&self.formulas[angle])
                 .unwrap_or_else(|| format!("angle{}", self.angles.len() + 1));

@@ -243,6 +243,7 @@ pub(super) fn drives(page: &mut PageDocument, derivation: &Derivation) {
     } = derivation;
     let projection = &equations.projection;
     page.heading("Drives");
+    // Whether the paragraph on lengths is needed.
     let mut any_linear = false;
     let rows = mechanism
         .drives

@@ -58,6 +58,7 @@ pub(super) fn quantities(page: &mut PageDocument, mechanism: &Mechanism) {
             ]
         })
         .collect();
+    // A model without constants has no table.
     let head = vec!["symbol", "value", "unit", "meaning"];
     page.table("constants", PageTable { head, rows });
     // Gravity is a vector of expressions in the model's constants.
@@ -69,6 +70,7 @@ pub(super) fn quantities(page: &mut PageDocument, mechanism: &Mechanism) {
     if gravity.iter().all(PrintedFormula::is_zero) {
         page.paragraph([text("Gravity does not act.")]);
     } else {
+        // The vector in the axes of the base.
         let [x, y, z] = gravity.map(InlineSpan::Math);
         page.paragraph([
             text("Gravity in the base frame: ("),

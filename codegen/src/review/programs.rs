@@ -142,6 +142,7 @@ pub(super) fn listings(derivation: &Derivation) -> Vec<ListedProgram<'_>> {
     let is_linear = |d: &ModelDrive| matches!(d.kind, DriveKind::Linear { .. });
     if mechanism.drives.iter().any(is_linear) {
         let mut outputs: Vec<FormulaSymbol> = Vec::new();
+        // Lengths, then their rates.
         for order in 0..2 {
             let lengths = mechanism
                 .drives
@@ -220,6 +221,7 @@ const LETTERS: [(&[&str], &str); 10] = [
 fn add_legend(page: &mut PageDocument, listings: &[ListedProgram<'_>]) {
     // The beginning of a name: the part before the first underscore, without digits.
     let mut used = BTreeSet::new();
+    // Symbols on the left of all equations.
     for (_, _, _, listing) in listings {
         for equation in listing.fixed.iter().chain(&listing.state) {
             if let PrintedFormula::Symbol(symbol) = &equation.left {
@@ -232,6 +234,7 @@ fn add_legend(page: &mut PageDocument, listings: &[ListedProgram<'_>]) {
     let rows = LETTERS
         .iter()
         .filter_map(|(letters, says)| {
+            // Symbols that share a meaning are listed together.
             let mut line = TextLine::new();
             for letter in letters.iter().filter(|l| used.contains(**l)) {
                 if !line.is_empty() {

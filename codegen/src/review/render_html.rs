@@ -73,6 +73,7 @@ fn blocks(out: &mut String, blocks: &[PageBlock]) {
                 }
                 out.push_str("</tbody>\n</table></div>\n");
             }
+            // Equations are a grid: left side, right side, tag.
             PageBlock::Equations(equations) => {
                 out.push_str("<div class=\"equations\">\n");
                 for equation in equations {
@@ -110,6 +111,7 @@ fn write_equation(out: &mut String, equation: &PageEquation) {
 /// A unit with raised exponents; `^` ends at the first character that is no digit or minus.
 fn unit(text: &str) -> String {
     let mut out = String::new();
+    // Whether an exponent is open.
     let mut raised = false;
     for c in text.chars() {
         // The exponent begins after the caret.

@@ -69,6 +69,7 @@ fn write_table(out: &mut String, table: &PageTable) {
             .is_some_and(|cell| super::render_text::plain_text(cell).len() > 40)
     });
     let mut columns = "l".repeat(n);
+    // A column of fixed width, in which lines are broken.
     if wide {
         columns.truncate(n - 1);
         columns.push_str("p{75mm}");

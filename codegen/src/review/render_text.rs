@@ -100,6 +100,7 @@ fn write_table(out: &mut String, table: &PageTable) {
                 .unwrap_or(0)
         })
         .collect();
+    // Head, rule, then the rows.
     for row in [&head, &rule].into_iter().chain(&rows) {
         let mut line = String::new();
         for (i, width) in widths.iter().enumerate() {
@@ -125,6 +126,7 @@ pub(super) fn equation_lines(equations: &[PageEquation]) -> String {
     let mut out = String::new();
     for equation in equations {
         let tag = format!("({})", equation.tag);
+        // Continued lines begin below the first term.
         let start = format!("  {tag:>widest$}  {} = ", equation.left);
         let indent = start.chars().count();
         // The unit follows the equation in brackets.

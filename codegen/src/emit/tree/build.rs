@@ -142,6 +142,7 @@ fn name_values(
     taken: &mut BTreeSet<String>,
 ) -> BTreeMap<usize, NamedValue> {
     let mut named = BTreeMap::new();
+    // Names of the inputs that this program reads.
     let read: BTreeSet<&str> = (program.ops.iter())
         .filter_map(|op| match op {
             ProgramOp::Input(atom) => Some(scope.input_name(*atom)),
@@ -155,6 +156,7 @@ fn name_values(
             taken.remove(name);
         }
         let i = v.index();
+        // Numbers, inputs and their negatives need no name.
         let plain = is_leaf(&program.ops[i]) || matches!(program.ops[i], ProgramOp::Neg(_));
         if !plain && !named.contains_key(&i) {
             let name = unique_name(name, taken);
@@ -208,6 +210,7 @@ fn inlined_values(
             }
             ProgramOp::Add(..) | ProgramOp::Sub(..) | ProgramOp::Mul(..) | ProgramOp::Div(..) => 3,
         };
+        // Operands that are inlined here, for the case that the formula is too wide.
         let mut open = Vec::new();
         // The name of the formula stands on the same line.
         let widest = WIDEST - named.get(&i).map_or(3, |n| n.name.len()).min(50);
@@ -446,6 +449,7 @@ impl Builder<'_> {
             ProgramOp::Atan2(y, x) => {
                 CodeExpression::atan2(self.operand_expression(*y), self.operand_expression(*x))
             }
+            // Sines and cosines are written in pairs.
             ProgramOp::Sin(a) => return self.write_sine(i, *a, statements),
             // A cosine without a sine is written here; otherwise the sine writes both.
             ProgramOp::Cos(a) => {
@@ -526,6 +530,7 @@ impl Builder<'_> {
                 .any(|start| name.starts_with(start));
         // A sign that cannot be absorbed gives the value a generated name instead.
         match meant.normalize_sign() {
+            // The name would stand for the negative.
             CodeExpression::Neg(other) if !keeps => (self.next_name(i), *other, !negative),
             meant => (name, meant, negative),
         }
@@ -653,6 +658,7 @@ fn without_unread(
             continue;
         }
         statement.for_each_name_read(&mut |name| {
+            // Names that the kept statement reads.
             read.insert(name.to_owned());
         });
         kept.push(statement);

@@ -79,6 +79,7 @@ impl CodeExpression {
     /// `a * b`, as `b * a` where that reads better; the result is the same number. Signs are moved outwards.
     pub(in crate::emit) fn mul(a: Self, b: Self) -> Self {
         match (a, b) {
+            // Signs of both operands move outwards.
             (Self::Neg(a), b) => Self::neg(Self::mul(*a, b)),
             (a, Self::Neg(b)) => Self::neg(Self::mul(a, *b)),
             (a, b) => Self::product(a, b),
@@ -218,6 +219,7 @@ impl CodeExpression {
             }
             PrintedFormula::Sum(terms) => {
                 // The terms of a sum are added in order, with their signs as operators.
+                // The first term may be negative, all others are added or subtracted.
                 let mut sum: Option<Self> = None;
                 for term in terms {
                     let (negative, term) = if term.is_negative() {
@@ -251,6 +253,7 @@ impl CodeExpression {
                     })
                 };
                 let above = product(number.into_iter().chain(above.iter().map(of)).collect());
+                // Numerator and denominator as products.
                 let below = product(below.iter().map(of).collect());
                 let above = above.unwrap_or(Self::Number(1.0));
                 let value = match below {

@@ -116,6 +116,7 @@ fn generic_state(
     };
     let q: Vec<f64> = active.iter().map(|i| near(i, stream)).collect();
     // Rates, accelerations, loads and parameters are away from zero, so that no quantity vanishes by chance.
+    // Rates and accelerations between 0.3 and 2.3.
     let [qd, qdd] = [(); 2].map(|()| {
         active
             .iter()
@@ -152,6 +153,7 @@ fn generic_state(
         atoms.insert(Atom::Rate(*i), qd[k]);
         atoms.insert(Atom::Acceleration(*i), qdd[k]);
     }
+    // Passive motion comes as coordinates, rates, accelerations.
     let n = passive.len();
     for (k, i) in passive.iter().enumerate() {
         atoms.insert(Atom::Coordinate(*i), motion[k][0]);
@@ -189,6 +191,7 @@ pub(crate) fn operation_values(
             ProgramOp::Div(a, b) => at(a) / at(b),
             ProgramOp::Neg(a) => -at(a),
             ProgramOp::Unary(Unary::Sqrt, a) => at(a).sqrt(),
+            // The same functions as for expressions, so that the values agree.
             ProgramOp::Unary(function, a) => FloatDomain(|_| 0.0)
                 .unary(*function, &at(a))
                 .unwrap_or(f64::NAN),
@@ -217,6 +220,7 @@ fn evaluate_quantities(
     let atom = |a: Atom| atoms.get(&a).copied().unwrap_or(f64::NAN);
     // A name of the model file is not used for another quantity.
     let reserved = reserved_names(&derivation.mechanism);
+    // Quantities with a value of their own.
     let mut known: Vec<(FormulaSymbol, f64)> = Vec::new();
     let ids: Vec<ExprId> = named.iter().map(|(_, id)| *id).collect();
     let together = EvaluationTape::new(&graph, &ids).evaluate(&FloatDomain(atom));
@@ -327,6 +331,7 @@ fn motion_quantities(graph: &mut Graph, derivation: &Derivation) -> Vec<(Formula
         if matches!(drive.kind, DriveKind::Joint(_)) {
             continue;
         }
+        // Length, rate and acceleration of the drive.
         let motion = &projection.drives[d];
         let name = format!("l_{}", drive.name);
         named.push((FormulaSymbol::new(&*name), motion.coordinate));
@@ -429,6 +434,7 @@ fn link_quantities(graph: &mut Graph, derivation: &Derivation) -> Vec<(FormulaSy
     for (frame, link) in mechanism.frames.iter().zip(&tree.of_frame) {
         let Some(link) = link else { continue };
         let (omega, alpha, a) = &motions[*link];
+        // Components of angular velocity and accelerations.
         for (axis, name) in AXES.iter().enumerate() {
             let of = |letter: &str| format!("{letter}_{}_{name}", frame.name);
             named.push((FormulaSymbol::new(of("omega")), omega[axis]));
@@ -484,6 +490,7 @@ fn wrench_quantities(graph: &mut Graph, derivation: &Derivation) -> Vec<(Formula
     for (frame, link) in mechanism.frames.iter().zip(&tree.of_frame) {
         let Some(link) = link else { continue };
         let SymbolicWrench { force, moment } = through[*link];
+        // Rotation to the axes before the parallel ones.
         let turn = tree.links[*link].absolute.clone();
         // Links with parallel axes share axes up to a rotation about z; the last frame of the parent names the axes.
         let first = tree.links[tree.links[*link].first_parallel].parent;

@@ -110,6 +110,7 @@ impl SharedPose {
         // The shared part as a program of its own, and its statements.
         let (program, places) = shared_program(parts, &shared, &guards, &read);
         // Every result gets a name, because programs bind results by name.
+        // Its statements, with names for all results.
         let mut routine = StatementRoutine::with_result_names(&program, scope, &[], true);
         // Values at the state by which quantities are named.
         let values = operation_values(&program, &scope.meanings.atoms);
@@ -223,6 +224,7 @@ fn shared_program<'a>(
     guards: &[PoseGuard],
     read: &BTreeSet<ValueId>,
 ) -> (StraightLineProgram, BTreeMap<ValueId, usize>) {
+    // Built operation by operation, with positions by value number.
     let mut program = StraightLineProgram::default();
     let mut places: BTreeMap<ValueId, ValueId> = BTreeMap::new();
     // Values are appended in the order of the programs; those that are there already are skipped.

@@ -41,6 +41,7 @@ impl CodeSections {
         for k in 0..derivation.equations.projection.determinants.len() {
             sections.names.insert(format!("Delta_{}", k + 1), closes);
         }
+        // Positions of points, from the base and from their frames.
         for point in &mechanism.points {
             let frame = &mechanism.frames[point.frame.0].name;
             for of in [point.name.clone(), format!("{frame}_{}", point.name)] {
@@ -55,6 +56,7 @@ impl CodeSections {
             };
             // First and last equation of the drive on the page.
             let first = tag + 1;
+            // Only entries that are not zero have an equation.
             let slopes = derivation.equations.projection.drive_jacobian[d].iter();
             tag += 1 + slopes.filter(|s| **s != crate::expr::Graph::ZERO).count();
             let along = sections.add(format!(
@@ -157,6 +159,7 @@ impl CodeSections {
         named: &BTreeMap<usize, NamedValue>,
         last: Option<usize>,
     ) -> Option<Vec<usize>> {
+        // Long programs are ordered for speed.
         let n = program.ops.len();
         let moving = |i: &usize| program.stages[*i] == ProgramStage::State;
         if (0..n).filter(moving).filter(|i| !inside[*i]).count() > MOST_STATEMENTS {
@@ -209,6 +212,7 @@ impl CodeSections {
 fn closure_heading(derivation: &Derivation) -> String {
     let loops = &derivation.equations.projection.loops;
     let mechanism = &derivation.mechanism;
+    // Number of closure equations of loops, without couplings.
     let n_gaps = loops.n_gap_equations(mechanism);
     let names: Vec<String> = mechanism
         .loops

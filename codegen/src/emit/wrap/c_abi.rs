@@ -451,6 +451,7 @@ fn single_state_function(
     let given = one
         .takes_forces
         .then(|| (format_ident!("forces"), face.n_drives()));
+    // Pointers with the lengths of their arrays.
     let inputs: Vec<_> = state.iter().chain(&given).collect();
     let (names, sizes): (Vec<_>, Vec<usize>) = inputs.iter().map(|(name, n)| (name, *n)).unzip();
     // The state as a struct of the module.

@@ -198,6 +198,7 @@ int32_t {name}_regressor_many(const {name}_dynamics *dynamics, size_t n, {states
 fn declaration(face: &LanguageBinding<'_>, one: &WrappedFunction, near: bool) -> String {
     let name = &face.name;
     let upper = name.to_uppercase();
+    // Arguments in the order of the exported function.
     let mut arguments = vec![format!("const {name}_dynamics *dynamics")];
     for (part, n) in face.state_parts() {
         arguments.push(format!("const double {part}[{n}]"));

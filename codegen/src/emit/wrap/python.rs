@@ -144,6 +144,7 @@ fn items(face: &LanguageBinding<'_>) -> TokenStream {
             mut values: [f64; N], names: &[&str], by: Option<BTreeMap<String, f64>>,
         ) -> PyResult<[f64; N]> {
             for (name, value) in by.unwrap_or_default() {
+                // An unknown name is an error.
                 let place = names.iter().position(|n| *n == name);
                 let place = place.and_then(|k| values.get_mut(k)).ok_or_else(|| {
                     PyKeyError::new_err(format!("the model has no `{name}`; it has {}", names.join(", ")))
@@ -181,6 +182,7 @@ fn items(face: &LanguageBinding<'_>) -> TokenStream {
                 let shape = arrays.first().map_or(&[][..], |a| a.0.shape());
                 let axis = shape.len() == 2;
                 let n = if axis { shape[1] } else { 1 };
+                // Every array must have the same number of states.
                 for (array, name, rows) in arrays {
                     let expected: &[usize] = if axis { &[*rows, n] } else { &[*rows] };
                     if array.shape() != expected {

@@ -54,6 +54,7 @@ pub(super) fn determined_components(
     // First the unknowns that no geometry determines, at random constants and coordinates.
     for free in unconstrained_unknowns(cuts) {
         for _ in 0..POSES {
+            // The same seed for all atoms of a pose, so that each keeps its value.
             let seed = stream.next_bits();
             let drawn = |atom: Atom| match atom {
                 Atom::Pi => std::f64::consts::PI,
@@ -96,6 +97,7 @@ pub(super) fn determined_components(
             Atom::Coordinate(i) => q[i],
             _ => 0.0,
         };
+        // Contribution of every unknown to every component at this pose.
         let found: Option<Vec<Vec<f64>>> = unknowns.iter().map(|of| reach(*of, &at)).collect();
         let (Some(found), Some(slopes)) = (found, jacobian.evaluate(&FloatDomain(at))) else {
             continue;

@@ -71,6 +71,7 @@ fn paths_from_common_link(
     let points = points.map(|p| &mechanism.points[p.0]);
     let of_points = points.map(|p| tree.link_of(p.frame));
     let [a, b] = of_points.map(|link| tree.path_to(link));
+    // Links that both paths have in common.
     let shared = a.iter().zip(&b).take_while(|(x, y)| x == y).count();
     Ok(CutPaths {
         common: shared.checked_sub(1).map(|last| a[last]),
@@ -123,6 +124,7 @@ pub(super) fn cut_loops(
     let tree = &equations.tree;
     let mut cuts = Vec::new();
     for (l, closed) in mechanism.loops.iter().enumerate() {
+        // Both sides of the loop, from the last common link.
         let paths = paths_from_common_link(graph, mechanism, tree, closed.joins)?;
         let [first, second] = &paths.links;
         // The axes of the cut are those after the first constant rotations of a path, in which planar loops have no gap
@@ -157,6 +159,7 @@ pub(super) fn cut_loops(
             turns: rotations_along(tree, &start, &paths.links[k]),
             at: paths.at[k],
         };
+        // Both ends of the cut.
         let sides = [side(0), side(1)];
         // Planar: points stay in a plane, and their frames rotate about its normal only.
         let is_planar =
@@ -194,6 +197,7 @@ impl CutLoop {
                 let v = if k == 0 { v.map(|x| graph.neg(x)) } else { v };
                 rotate_into_inner(graph, &side.turns, &v)
             });
+            // The force acts at the point, the moment is added.
             let wrench = force_through_point(graph, &side.at, force);
             let moment = graph.add_vectors(&[wrench.moment, moment]);
             loads.push(JointLoad {
@@ -291,6 +295,7 @@ pub(super) fn effect_loads(
     let projection = &equations.projection;
     let mut loads = Vec::new();
     for effect in &mechanism.effects {
+        // Values of the effect's parameters.
         let values: Vec<ExprId> = effect
             .terms
             .iter()
@@ -298,6 +303,7 @@ pub(super) fn effect_loads(
             .collect();
         let forces = point_forces(graph, mechanism, tree, projection, gravity, effect, &values)?;
         for (point, force) in forces {
+            // A force on the base loads no joint.
             let point = &mechanism.points[point.0];
             let Some(link) = tree.link_of(point.frame) else {
                 continue;

@@ -147,6 +147,7 @@ fn reactions(
             next - 1
         })
     });
+    // The next three positions.
     let mut three = || [(); 3].map(|()| place_of.next().flatten());
     let joints = places.iter().map(|place| JointReaction {
         name: place.name.clone(),
@@ -208,6 +209,7 @@ fn required_forces(
     bodies: &[JointLoad],
 ) -> Result<Vec<ExprId>, DeriveError> {
     let n = mechanism.coordinates.len();
+    // Wrenches of the bodies, projected on the joints.
     let wrenches: Vec<_> = bodies
         .iter()
         .map(|load| (load.link, newton_euler::JointSide::Moving, load.wrench))
@@ -360,6 +362,7 @@ fn link_names(mechanism: &Mechanism, tree: &KinematicTree) -> Vec<String> {
     (0..tree.links.len())
         .map(|i| {
             let frame = &mechanism.frames[frames[i]].name;
+            // Other moving links of the same frame.
             let others = (0..tree.links.len()).filter(|k| frames[*k] == frames[i]);
             if others.filter(moving).count() < 2 {
                 return frame.clone();
@@ -392,6 +395,7 @@ fn free_links(mechanism: &Mechanism, equations: &UnreducedEquations) -> BTreeSet
     let tree = &equations.tree;
     let frames = link_frames(tree);
     let driven = |i: usize| {
+        // Drives and effects on the coordinate.
         let by_drive = mechanism
             .drives
             .iter()

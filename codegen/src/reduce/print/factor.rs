@@ -94,6 +94,7 @@ fn common_powers(p: &TrigonometricPolynomial) -> PowerProduct {
 
 /// The quotient of two monomials, if it is a monomial.
 fn divide_powers(powers: &PowerProduct, by: &PowerProduct) -> Option<PowerProduct> {
+    // Exponents that remain.
     let mut left: BTreeMap<FactorVariable, u32> = powers.iter().copied().collect();
     for (v, n) in by {
         let there = left.get_mut(v)?;
@@ -146,6 +147,7 @@ fn exact_quotient(
     p: &TrigonometricPolynomial,
     by: &TrigonometricPolynomial,
 ) -> Option<TrigonometricPolynomial> {
+    // Polynomial long division by leading terms.
     let (lead, k) = leading_term(by)?;
     let inverse = k.recip();
     let mut rest = p.clone();
@@ -195,6 +197,7 @@ pub(super) fn find_squares(p: &TrigonometricPolynomial) -> Vec<SumSquare> {
     while !variables.is_empty() {
         // The first variable fixes the coefficients of all others by its mixed terms.
         let first = variables.remove(0);
+        // The number in front of the square.
         let number = coefficient(&vec![(first, 2)]);
         let half = (&number * &Rational::integer(2)).recip();
         let mut linear = vec![(first, Rational::ONE)];

@@ -163,6 +163,7 @@ fn polynomial_factors(
         monomial,
         factors,
     } = factor::factor_polynomial(p);
+    // Monomial first, then the polynomials.
     let mut formulas = power_factors(&monomial, mechanism);
     for (base, n) in factors {
         let n = i32::try_from(n).unwrap_or(i32::MAX);
@@ -173,6 +174,7 @@ fn polynomial_factors(
 
 /// A sum whose quadratic terms are written as squares where they form some: `(r2 + r3)^2 + d3^2`.
 fn gather_squares(p: &TrigonometricPolynomial, mechanism: &Mechanism) -> PrintedFormula {
+    // Terms that belong to no square.
     let mut rest = p.clone();
     let mut squares: BTreeMap<FactorVariable, PrintedFormula> = BTreeMap::new();
     // Each square takes its terms out of the sum.

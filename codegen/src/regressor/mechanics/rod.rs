@@ -40,6 +40,7 @@ pub(super) fn generalised_forces(
     let n = mechanism.coordinates.len();
     let mut all = Vec::new();
     for (drive, [from, to]) in drive_lines(mechanism, effect) {
+        // Both points in the axes of the base.
         let a = position_in_base(graph, mechanism, tree, from.0)?;
         let end = position_in_base(graph, mechanism, tree, to.0)?;
         let length = projection.drives[drive.0].coordinate;
@@ -104,12 +105,14 @@ fn forces_along_rod(
         // l dl/dq
         let radial = graph.dot(&by_d, &d);
         // Coefficients of the second moment, the first moment and the mass.
+        // du' u''
         let second = {
             let turned = graph.dot(&by_d, &turning);
             let inward = graph.mul(radial, centripetal);
             let moment = graph.add(turned, inward);
             graph.mul(moment, per_square)
         };
+        // du'(a'' - g) + da' u''
         let first = {
             let carried = graph.dot(&by_d, &lifted);
             let inward = graph.mul(radial, lifted_along);
@@ -118,6 +121,7 @@ fn forces_along_rod(
             let force = graph.add(carried, reaction);
             graph.mul(force, per_length)
         };
+        // da'(a'' - g)
         let mass = graph.dot(&by_a, &lifted);
         for (column, force) in forces.iter_mut().zip([second, first, mass]) {
             column.push(force);

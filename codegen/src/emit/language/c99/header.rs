@@ -79,6 +79,7 @@ extern \"C\" {{
     for (k, (status, meaning)) in STATUS.iter().enumerate() {
         _ = writeln!(text, "#define {upper}_{status} {k} /* {meaning} */");
     }
+    // Coordinates in the order of `q` and of the passive ones.
     let (active, passive) = derivation.coordinates();
     let coordinate = |i: &usize| mechanism.coordinates[*i].name.as_str();
     // One constant per name: its position in the array.
@@ -107,6 +108,7 @@ extern \"C\" {{
         mechanism.drives.iter().map(|d| d.name.as_str()).collect(),
     );
     text.push_str("\n/* Base parameters, in order, eq. (16).\n");
+    // One line per base parameter: name, expression and unit.
     for base in derivation.base_parameters() {
         _ = writeln!(
             text,
@@ -124,6 +126,7 @@ extern \"C\" {{
         if fields.is_empty() {
             text.push_str("    double nothing;\n");
         }
+        // The unit of each field is its comment.
         for (field, measure) in fields {
             _ = writeln!(
                 text,
@@ -181,6 +184,7 @@ int {name}_base_parameters(const {name}_geometry *geometry, const {name}_paramet
  * status. */
 int {name}_prepare({name}_dynamics *dynamics, const {name}_geometry *geometry, const double *base);"
     );
+    // The solution for the passive coordinates is a function of its own.
     if unit.newton {
         _ = writeln!(
             text,
@@ -271,6 +275,7 @@ fn source_names(reactions: &crate::ReactionPrograms) -> Vec<String> {
             }
         }
     };
+    // Each joint has a force and a moment.
     for joint in &reactions.joints {
         name("force in joint", &joint.name, &joint.force);
         name("moment in joint", &joint.name, &joint.moment);

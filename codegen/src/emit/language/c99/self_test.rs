@@ -42,6 +42,7 @@ typedef struct {{
 
     let (active, _) = derivation.coordinates();
     // Lengths are scaled with the geometry, so that the states stay near the nominal pose of a larger machine.
+    // Whether lengths are in the loops.
     let has_scale = derivation.programs.scale.is_some();
     let is_length = |i: &usize| mechanism.coordinates[*i].motion.is_length();
     let scaled = |i: &usize, value: f64| {

@@ -42,6 +42,7 @@ pub(super) fn source(unit: &TranslationUnit<'_>) -> String {
             "\nstatic double {name}_sign(double x)\n{{\n    return x > 0.0 ? 1.0 : x < 0.0 ? -1.0 : x;\n}}"
         );
     }
+    // Newton's method and forward dynamics solve linear systems.
     if unit.newton || unit.source.dynamics.is_some() {
         text.push('\n');
         text.push_str(&unit.expand_template(include_str!("solve.c")));
@@ -84,6 +85,7 @@ fn has_call(unit: &TranslationUnit<'_>, what: &str) -> bool {
     let c = unit.syntax();
     // All statements as they will be printed.
     let mut lines = Vec::new();
+    // Programs with precomputed values of their own.
     let others = unit.reactions.iter().chain(&unit.columns);
     c.statements(&unit.once.statements(), &mut lines);
     for (function, once) in others {
@@ -169,6 +171,7 @@ fn write_base_parameters(unit: &TranslationUnit<'_>, text: &mut String) {
             comment(&divisor.text)
         ));
     }
+    // Sums before the base parameters that refer to them.
     for (name, value) in &sums {
         lines.push(format!("const double {name} = {};", c.operand_text(value)));
     }
@@ -229,6 +232,7 @@ pub(super) fn write_program(
     text: &mut String,
 ) {
     let (name, c) = (&unit.name, unit.syntax());
+    // Statements and inputs of the program.
     let routine = &function.routine;
     _ = writeln!(
         text,
@@ -285,6 +289,7 @@ pub(super) fn write_program(
     for k in routine.zero_outputs() {
         lines.push(format!("outputs[{k}] = 0.0;"));
     }
+    // All other outputs are written by the statements.
     c.statements(&routine.state, &mut lines);
     lines.push(format!("return {}_OK;", unit.upper));
     write_body(&lines, text);
@@ -353,6 +358,7 @@ fn write_preparation(unit: &TranslationUnit<'_>, text: &mut String) {
 fn write_state_inputs(unit: &TranslationUnit<'_>, text: &mut String) {
     let TranslationUnit { name, upper, .. } = unit;
     let mut lines = Vec::new();
+    // Index of the next input.
     let mut next = 0;
     // The parts of the state follow each other in the inputs.
     for (part, n) in unit.state_parts() {
@@ -382,6 +388,7 @@ fn write_public_function(
 ) {
     let TranslationUnit { name, upper, .. } = unit;
     let n_state: usize = unit.state_parts().iter().map(|(_, n)| n).sum();
+    // The state, and passive coordinates behind it.
     let n_inputs = n_state
         + if function.follows {
             unit.n_passive()
@@ -419,6 +426,7 @@ fn write_public_function(
         if can_fail {
             lines.push(format!("double outputs[{}];", n_outputs.max(1)));
         }
+        // The guess is copied, so that it changes only if the status is OK.
         if *near {
             lines.push("int i;".to_owned());
             lines.push(format!("double found[{upper}_N_PASSIVE];"));
@@ -451,6 +459,7 @@ fn write_public_function(
             function.name
         ));
         lines.push(format!("if (status != {upper}_OK) return status;"));
+        // The passive coordinates of this state replace the guess.
         if *near {
             lines.push(format!(
                 "for (i = 0; i < {upper}_N_PASSIVE; i++) passive[i] = found[i];"

@@ -109,6 +109,7 @@ pub(super) fn is_reserved(name: &str) -> bool {
 impl LanguageSyntax for CSyntax<'_> {
     fn name(&self, name: &str) -> String {
         // Names with the prefix of the unit could collide with its functions and constants.
+        // Letters first, then letters, digits and underscores.
         let plain = name.starts_with(|c: char| c.is_ascii_alphabetic())
             && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
             && !is_reserved(name)
@@ -259,6 +260,7 @@ impl CSyntax<'_> {
                 ));
             }
             // A check that fails ends the program with its status.
+            // The condition is negated, so that NaN fails it.
             CodeStatement::Guard(check) => lines.push(match check {
                 PoseCheck::Reachable(value) => format!(
                     "if (!({} >= 0.0)) return {}_OUT_OF_REACH;",

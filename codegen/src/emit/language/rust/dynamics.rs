@@ -138,6 +138,7 @@ fn forward_dynamics(derivation: &Derivation, dynamics: &DynamicsPrograms) -> Tok
         return quote! {
             #doc
             pub fn forward(&self, state: &State<T>, forces: &[T; N_DRIVES]) -> Result<[T; N_ACTIVE], PoseError> {
+                // The matrix, and the bias together with the Jacobian.
                 let matrix = self.mass_matrix(state)?;
                 let bias: Linearisation<T, N_ACTIVE, N_DRIVES> = run_checked(&Bias(self), inputs(state))?;
                 accelerations(matrix, &bias, forces, &DRIVES)
@@ -174,6 +175,7 @@ fn forward_dynamics(derivation: &Derivation, dynamics: &DynamicsPrograms) -> Tok
         ) -> Result<[T; N_ACTIVE], PoseError> {
             self.input?;
             check_finite(&inputs(state), &INPUTS)?;
+            // The guess changes only if everything succeeds.
             let found = self.model.passive_position_near(&state.q, passive)?;
             let result = self.forward_at(state, forces, &found)?;
             *passive = found;

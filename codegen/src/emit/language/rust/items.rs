@@ -112,6 +112,7 @@ fn tables(derivation: &Derivation) -> TokenStream {
     let (active, passive) = (active.iter().map(name_of), passive.iter().map(name_of));
     let drives: Vec<&str> = mechanism.drives.iter().map(|d| d.name.as_str()).collect();
     let n_drives = drives.len();
+    // Texts of the base parameters.
     let bases = derivation.base_parameters();
     let n_base = bases.len();
     // The table passes the printer as text, one entry per line.
@@ -186,6 +187,7 @@ fn state(derivation: &Derivation) -> TokenStream {
     let n_inputs = Literal::usize_unsuffixed(inputs.len());
     let names = inputs.into_iter().map(|atom| format!("{:?}", name(atom)));
     let names = verbatim_tokens(&fill_lines("[", names, "];").join("\n"));
+    // Fields of the state with their lengths.
     let mut fields = vec![
         ("q", active.len()),
         ("qd", active.len()),
@@ -253,6 +255,7 @@ pub(super) fn nominal_values<'a>(
     scale: Option<&'a TokenStream>,
 ) -> impl Iterator<Item = TokenStream> + use<'a> {
     let residual = &derivation.equations.projection.loops.residual;
+    // Coordinates that occur in the loops.
     let in_loops = coordinates_of(&derivation.graph, residual);
     coordinates.iter().map(move |i| {
         // Only lengths that occur in the loops are scaled.

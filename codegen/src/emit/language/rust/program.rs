@@ -138,6 +138,7 @@ impl ProgramStruct<'_> {
             // A program that does not begin with the common guards keeps its own pose.
             let rest = pose.and_then(|pose| pose.remaining_program(function.program));
             let program = rest.as_ref().unwrap_or(function.program);
+            // The statements of the rest, without precomputed ones.
             let mut routine = StatementRoutine::new(program, self.scope, &function.outputs);
             once.absorb(&mut routine);
             let pose = pose.filter(|_| rest.is_some());
@@ -157,6 +158,7 @@ impl ProgramStruct<'_> {
         // Which inputs of the preparation are stored.
         let base = reads(|atom| matches!(atom, Atom::Base(_)));
         let physical = reads(|atom| matches!(atom, Atom::Parameter(_)));
+        // Fields and initial values come in pairs.
         let base_field = base.then(|| quote! { base: [T; N_BASE], });
         let base_init = base.then(|| quote! { base: *base, });
         let physical_field = physical.then(|| quote! { parameters: Parameters<T>, });
@@ -194,6 +196,7 @@ impl ProgramStruct<'_> {
             self.preparation.parameter_tokens(),
             format!(" {}", self.prepares),
         );
+        // Invalid inputs are stored, and reported by every method.
         let check = self.preparation.check_tokens();
         let ExtraItems {
             fields,
@@ -303,6 +306,7 @@ impl ProgramStruct<'_> {
                 "_".to_owned()
             }
         });
+        // Coordinates are the arguments of the pose.
         let inputs = pose
             .inputs
             .iter()
@@ -351,6 +355,7 @@ impl ProgramStruct<'_> {
                 }
             };
         }
+        // The form with a guess.
         let near = format_ident!("{name}_near");
         let cost = " Cost: in addition, that of solving for the passive coordinates.";
         let same = format!(
@@ -473,6 +478,7 @@ pub(super) fn parameter_bindings(
         if wanted.is_empty() {
             return TokenStream::new();
         }
+        // A field with another name in the scope is renamed in the pattern.
         let fields = wanted.iter().map(|i| {
             let (field, name) = (
                 field_identifier(names[*i]),
@@ -558,6 +564,7 @@ pub(super) fn pose(derivation: &Derivation, scope: &NameScope) -> TokenStream {
         &TokenStream::new(),
         "",
     );
+    // Bindings of the pose itself.
     let kept = precomputed_bindings(&pose.once, &pose.routine);
     let called = |atom: &Atom| field_identifier(scope.input_name(*atom));
     let n_inputs = Literal::usize_unsuffixed(pose.inputs.len());
@@ -614,6 +621,7 @@ pub(super) fn single_value(
     let read: BTreeSet<Atom> = routine.read_once.union(&routine.read).copied().collect();
     let given = parameter_bindings(derivation, scope, &read, &geometry, &nothing, "");
     let once = statements(&routine.once);
+    // The program has one output.
     let result = routine
         .results
         .first()

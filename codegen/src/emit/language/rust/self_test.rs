@@ -44,6 +44,7 @@ pub(super) fn self_test(derivation: &Derivation, scope: &NameScope) -> TokenStre
         more: ExtraItems::default(),
     };
     let owner = owner.tokens();
+    // Names of the parameters in the struct.
     let fields: Vec<_> = mechanism
         .parameters
         .iter()

@@ -34,6 +34,7 @@ impl LanguageSyntax for RustSyntax {
     }
 
     fn call(&self, function: Unary, argument: &str) -> String {
+        // Sine and cosine are computed together; the unused one is dropped by the compiler.
         let name = match function {
             Unary::Sqrt => "sqrt",
             Unary::Sign => "sign",
@@ -226,6 +227,7 @@ fn write(statement: &CodeStatement, depth: usize, lines: &mut Vec<String>) {
             } else {
                 line(format!("let ({names},) = {{"));
             }
+            // The statements of the block.
             for statement in statements {
                 write(statement, depth + 1, lines);
             }
