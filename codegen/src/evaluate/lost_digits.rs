@@ -330,7 +330,7 @@ mod tests {
             .mechanism
     }
 
-    /// What makes a file ask for the masses instead of the body's own products.
+    /// A line of the model file that retains the masses instead of the body's own products.
     const MASSES: &str = "retain = [\"m1\", \"m2\"]";
 
     /// A pendulum whose masses at `a` and `a + gap` are declared before the body that carries them.
@@ -376,8 +376,8 @@ mod tests {
         ))
     }
 
-    /// Error of the pendulum's torque by p_min beside the formula of a textbook, relative to its size; p_min as the evaluator
-    /// and as emitted code adds it up.
+    /// Error of the pendulum's torque from p_min compared with the textbook formula, relative to its size. p_min is summed
+    /// as in the evaluator and as in emitted code.
     fn errors_by_hand(derivation: &Derivation) -> [f64; 2] {
         let [a, b] = [0, 1].map(|k| derivation.mechanism.constants[k].value);
         let evaluator = ModelEvaluator::new(derivation);
@@ -408,8 +408,8 @@ mod tests {
         })
     }
 
-    /// From gaps that cost nothing to gaps that leave nothing: refused is what loses more than a millionth, by a formula
-    /// that knows nothing of the reduction.
+    /// From gaps without loss to gaps that lose all digits: a base that loses more than a millionth is refused. The formula
+    /// of the comparison does not use the reduction.
     #[test]
     fn a_base_is_refused_where_its_forces_are_wrong_and_only_there() {
         for exponent in 1..=16 {
@@ -465,8 +465,8 @@ mod tests {
         assert_eq!(dependent, ["ZZ1", "MX1"]);
     }
 
-    /// The body's own products are retained, and those of masses follow without quotients; so with numbers that a reader
-    /// takes for one, as a spreadsheet writes 3 * 0.1.
+    /// The body's own products are retained, and those of masses depend on them without quotients. So it is with numbers
+    /// that differ only by rounding, such as 0.3 and 3 * 0.1.
     #[test]
     fn masses_that_coincide_do_not_stand_for_their_body() {
         for b in [0.3, 0.300_000_000_000_000_04, 0.3 + 1e-9, 0.31, 0.9] {
@@ -499,7 +499,7 @@ mod tests {
         ))
     }
 
-    /// Two of the masses make up all others: those are retained that differ.
+    /// All masses depend on two of them: two whose positions differ are retained.
     #[test]
     fn columns_that_coincide_are_not_retained_together() {
         for gap in [0.0, 1e-16, 1e-12, 1e-7, 1e-3] {
@@ -587,7 +587,7 @@ mod tests {
         }
     }
 
-    /// What parameters are worth does not hide what factors lose.
+    /// Values of parameters do not hide the digits that factors lose.
     #[test]
     fn parameters_without_values_stand_for_those_of_their_unit() {
         let mut mechanism = pendulum(1e-14, MASSES);
@@ -601,7 +601,7 @@ mod tests {
         );
     }
 
-    /// Numbers in, digits out: sound models lose next to none.
+    /// Consistent models lose almost no digits.
     #[test]
     fn sound_models_are_far_from_the_threshold() {
         for name in [

@@ -334,7 +334,7 @@ impl WithSimd for BlockExecution<'_, '_> {
     type Output = ();
 
     // The vector width is chosen by the caller, so everything below must be inlined.
-    #[allow(clippy::inline_always, reason = "the trait's manual asks for it")]
+    #[allow(clippy::inline_always, reason = "the trait's manual requires it")]
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
         let memory = self.memory;

@@ -590,7 +590,7 @@ impl LoopEvaluator<'_> {
     /// The value of a coordinate at a pose.
     fn atom_value(&self, atom: Atom, active: &[f64], passive: &[f64]) -> f64 {
         let Atom::Coordinate(i) = atom else {
-            unreachable!("a loop's residual depends on coordinates alone")
+            unreachable!("a loop's residual depends on coordinates only")
         };
         match self.evaluator.coordinate_source(i) {
             CoordinateSource::Active(k) => active[k],

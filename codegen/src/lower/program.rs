@@ -191,7 +191,7 @@ pub struct OperationCount {
 #[cfg(any(test, feature = "json"))]
 #[expect(
     clippy::trivially_copy_pass_by_ref,
-    reason = "serde asks for a reference"
+    reason = "serde requires a reference"
 )]
 fn is_zero(n: &usize) -> bool {
     *n == 0

@@ -1,4 +1,4 @@
-//! Every pass keeps the value of each output; what is printed as cost equals a recount.
+//! Every pass keeps the value of each output, and printed numbers of operations equal a count in the source.
 
 use std::path::Path;
 
@@ -18,7 +18,7 @@ fn derivation(model: &str) -> Derivation {
     derive(&loaded.mechanism).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// Values of some expressions at a random point of the field, with all atoms free.
+/// Values of some expressions at a random point of the field, with independent values of all atoms.
 fn values(graph: &Graph, roots: &[ExprId], seed: u64) -> Vec<FieldElement> {
     let mut stream = RandomStream::new(seed);
     loop {
@@ -64,7 +64,7 @@ fn every_pass_keeps_the_value_of_each_output() {
             values(&graph, &now, 11) == expected,
             "compacting changes a value of {model}"
         );
-        // Twice, since passes meet what the others have made of the expressions.
+        // Twice, because each pass also meets the results of the others.
         for pass in PASSES.iter().chain(&PASSES) {
             (graph, now) = (pass.run)(graph, &now);
             assert!(
@@ -115,7 +115,7 @@ fn the_printed_count_equals_a_recount_of_the_emitted_source() {
             ("regressor", &derivation.programs.regressor),
             ("forces", &derivation.programs.inverse_dynamics),
         ] {
-            // What closes loops stands once, in a function of its own, for all programs.
+            // Loop closure is a function of its own, shared by all programs.
             let [own, pose] = [&format!("{method}_program"), "at"].map(|m| recount(&file, m));
             let recount = (own.0 + pose.0, own.1 + pose.1, own.2 + pose.2);
             let count = program.count_operations(ProgramStage::State);

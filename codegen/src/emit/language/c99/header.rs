@@ -210,7 +210,7 @@ int {name}_passive_position_near(const {name}_dynamics *dynamics, const double *
     }
     // The equation of motion, if it is requested.
     if unit.source.dynamics.is_some() {
-        text.push_str("\n/* c + g + e alone. */\n");
+        text.push_str("\n/* c + g + e only. */\n");
         for near in bias_variants(unit) {
             _ = writeln!(text, "{};", bias_declaration(unit, *near));
         }
