@@ -376,8 +376,8 @@ mod tests {
         ))
     }
 
-    /// Error of the pendulum's torque from p_min compared with the textbook formula, relative to its size. p_min is summed
-    /// as in the evaluator and as in emitted code.
+    /// Error of the pendulum's torque from p_min compared with the textbook formula, relative to its size. p_min is
+    /// summed as in the evaluator and as in emitted code.
     fn errors_by_hand(derivation: &Derivation) -> [f64; 2] {
         let [a, b] = [0, 1].map(|k| derivation.mechanism.constants[k].value);
         let evaluator = ModelEvaluator::new(derivation);
@@ -408,8 +408,8 @@ mod tests {
         })
     }
 
-    /// From gaps without loss to gaps that lose all digits: a base that loses more than a millionth is refused. The formula
-    /// of the comparison does not use the reduction.
+    /// From gaps without loss to gaps that lose all digits: a base that loses more than a millionth is refused. The
+    /// formula of the comparison does not use the reduction.
     #[test]
     fn a_base_is_refused_where_its_forces_are_wrong_and_only_there() {
         for exponent in 1..=16 {
@@ -435,8 +435,8 @@ mod tests {
         }
     }
 
-    /// The evaluator's base parameters lose one rounding per growth of the factors, not two: the differences that they are
-    /// divided by are exact.
+    /// The evaluator's base parameters lose one rounding per growth of the factors, not two: the differences that they
+    /// are divided by are exact.
     #[test]
     fn differences_in_denominators_are_exact() {
         for exponent in [4, 6, 8] {
@@ -465,8 +465,8 @@ mod tests {
         assert_eq!(dependent, ["ZZ1", "MX1"]);
     }
 
-    /// The body's own products are retained, and those of masses depend on them without quotients. So it is with numbers
-    /// that differ only by rounding, such as 0.3 and 3 * 0.1.
+    /// The body's own products are retained, and those of masses depend on them without quotients. So it is with
+    /// numbers that differ only by rounding, such as 0.3 and 3 * 0.1.
     #[test]
     fn masses_that_coincide_do_not_stand_for_their_body() {
         for b in [0.3, 0.300_000_000_000_000_04, 0.3 + 1e-9, 0.31, 0.9] {

@@ -209,7 +209,8 @@ pub(super) fn dependencies(page: &mut PageDocument, derivation: &Derivation) {
              At further states the residual of eq. (6) is at most {residual:.1e} of a column."
         ),
     })]);
-    // One equation per dependent column: factors times retained columns, or times dependent ones with lines of their own.
+    // One equation per dependent column: factors times retained columns, or times dependent ones with lines of their
+    // own.
     let lines = reduction
         .dependencies
         .iter()

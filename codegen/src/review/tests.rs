@@ -1,4 +1,5 @@
-//! Page and JSON agree with the derivation: their text, parsed again, has the values of the reduction and of the programs.
+//! Page and JSON agree with the derivation: their text, parsed again, has the values of the reduction and of the
+//! programs.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;

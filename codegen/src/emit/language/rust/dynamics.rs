@@ -162,8 +162,8 @@ fn forward_dynamics(derivation: &Derivation, dynamics: &DynamicsPrograms) -> Tok
             self.forward_at(state, forces, &self.model.passive_position(&state.q)?)
         }
 
-        /// The same as [`Self::forward`], starting from the passive coordinates of a nearby pose, such as those of the last
-        /// step; they are replaced by those of this state.
+        /// The same as [`Self::forward`], starting from the passive coordinates of a nearby pose, such as those of the
+        /// last step; they are replaced by those of this state.
         ///
         /// # Errors
         /// As [`Self::forward`].

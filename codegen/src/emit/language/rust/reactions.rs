@@ -61,11 +61,12 @@ pub(super) fn reactions(
         scope,
         name: "Reactions",
         doc: quote! {
-            /// Forces and moments that the joints transmit, for one geometry and one set of parameters. All parameters are
-            /// needed: bearings carry loads that no drive carries, and that base parameters therefore do not contain.
+            /// Forces and moments that the joints transmit, for one geometry and one set of parameters. All parameters
+            /// are needed: bearings carry loads that no drive carries, and that base parameters therefore do not
+            /// contain.
             ///
-            /// `None` is a component that the equations of motion do not determine at the model file's geometry, because the
-            /// mechanism is statically indeterminate there, such as a planar loop across its plane.
+            /// `None` is a component that the equations of motion do not determine at the model file's geometry,
+            /// because the mechanism is statically indeterminate there, such as a planar loop across its plane.
         },
         prepares: "Prepares the recursion: computes once what does not depend on the state.",
         is_public: true,
@@ -80,9 +81,9 @@ pub(super) fn reactions(
         /// Forces and moments that the joints transmit at one state.
         #[derive(Clone, Copy, Debug, PartialEq)]
         pub struct ReactionForces<T> {
-            /// Force and moment that each of [`JOINTS`] transmits to the side away from the base, N and N m, including its
-            /// drive and friction. They are in the axes that the frame's steps reach after the joint (those of the frame,
-            /// if no step follows); the moment is about the origin reached there.
+            /// Force and moment that each of [`JOINTS`] transmits to the side away from the base, N and N m, including
+            /// its drive and friction. They are in the axes that the frame's steps reach after the joint (those of the
+            /// frame, if no step follows); the moment is about the origin reached there.
             pub joints: [::modelmill_runtime::Wrench<T>; N_JOINTS],
             /// For each of [`LOOPS`] the force on the side of its first point, N.
             pub loops: [[Option<T>; 3]; N_LOOPS],

@@ -96,12 +96,12 @@ pub(super) fn self_test(derivation: &Derivation, scope: &NameScope) -> TokenStre
         /// Compares the base parameters with all parameters at random states around the nominal pose: H and H_min must
         /// have rank [`N_BASE`], and `H p` must equal `H_min p_min`.
         ///
-        /// Call it in a test of your own: `arm::self_test(&arm::Geometry::default())?;`, and for every other geometry that
-        /// you use. It needs stack memory for the square of the number of products.
+        /// Call it in a test of your own: `arm::self_test(&arm::Geometry::default())?;`, and for every other geometry
+        /// that you use. It needs stack memory for the square of the number of products.
         ///
         /// # Errors
-        /// The condition that fails, with numbers. The rank is smaller at special geometries, for example if a length is
-        /// zero that is not zero in the model file.
+        /// The condition that fails, with numbers. The rank is smaller at special geometries, for example if a length
+        /// is zero that is not zero in the model file.
         pub fn self_test(geometry: &Geometry<f64>) -> Result<(), ::modelmill_runtime::SelfTestError> {
             // Expressions of the scale are written for a number `T`.
             type T = f64;
