@@ -130,6 +130,7 @@ pub(super) fn unit(unit: impl Into<String>) -> InlineSpan {
 
 /// The spans of `tau = H(q, q', q'') p` with the given names of matrix and parameters.
 pub(super) fn linear_model(matrix: &str, parameters: &str) -> Vec<InlineSpan> {
+    // q and its derivatives.
     let motion = |order| {
         InlineSpan::Math(PrintedFormula::Symbol(FormulaSymbol::time_derivative(
             "q", order,
@@ -157,6 +158,7 @@ pub(super) fn cell(inline: InlineSpan) -> TextLine {
 
 /// A number in the shortest text that reads back as the same number, with an exponent outside 1e-4 to 1e7.
 pub(super) fn number(value: f64) -> String {
+    // Very small and very large numbers have an exponent.
     let magnitude = value.abs();
     if value != 0.0 && !(1e-4..1e7).contains(&magnitude) {
         format!("{value:e}")

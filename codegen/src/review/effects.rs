@@ -108,6 +108,7 @@ fn effect_contribution(
             [place] => name(place).unwrap_or(each),
             _ => each,
         };
+        // The other place by its own name, if it has one.
         let other = effect.other.as_ref().and_then(name).unwrap_or(other);
         // The sum of parameter times expression.
         let terms = effect.terms.iter().zip(&names);
@@ -130,6 +131,7 @@ fn effect_contribution(
     // The introduction of the mechanics, followed by the list.
     let mut line = vec![text(mechanics.introduction())];
     for (i, (label, formula)) in listed.into_iter().enumerate() {
+        // The list is separated by commas.
         let comma = if i == 0 { "" } else { ", " };
         if i > 0 || !label.is_empty() {
             line.push(text(format!("{comma}{label}")));

@@ -72,6 +72,7 @@ pub(super) fn frames(page: &mut PageDocument, mechanism: &Mechanism) {
                     FrameAxis::Y => "y",
                     FrameAxis::Z => "z",
                 };
+                // Steps are separated by blanks.
                 let space = if steps.is_empty() { "" } else { " " };
                 steps.push(text(format!("{space}{letter}{axis}(")));
                 steps.push(InlineSpan::Math(by));
@@ -117,6 +118,7 @@ fn free_body_motion(mechanism: &Mechanism, body: &FreeBody) -> TextLine {
         let names = all.iter().map(|i| mechanism.coordinates[i.0].name.as_str());
         names.collect::<Vec<_>>().join(", ")
     };
+    // The axes in words.
     let axes = |axes| match axes {
         TwistAxes::Body => "the body's axes",
         // Linear and angular quantities may use different axes.

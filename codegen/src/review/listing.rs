@@ -50,6 +50,7 @@ pub(super) fn list_program(
     };
     // Names of quantities and outputs are taken before any name is generated.
     lister.taken.extend(names.values().map(|m| m.symbol.text()));
+    // Symbols of outputs are taken as well.
     lister.taken.extend(outputs.iter().map(FormulaSymbol::text));
     // Whether a value is an output.
     let is_output = |i: usize| program.outputs.iter().any(|o| o.index() == i);
@@ -183,6 +184,7 @@ impl ListingBuilder<'_> {
             ProgramStage::Fixed => ("k", 0),
             ProgramStage::State => ("x", 1),
         };
+        // A number that the model uses as a name is skipped.
         loop {
             self.next[counter] += 1;
             let name = format!("{letter}{}", self.next[counter]);

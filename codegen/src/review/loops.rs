@@ -138,6 +138,7 @@ fn list_couplings(page: &mut PageDocument, derivation: &Derivation) {
         equations,
         ..
     } = derivation;
+    // Couplings are closures with a coordinate that others determine.
     let closures = equations.projection.loops.closures.iter();
     let mut lines = Vec::new();
     for follower in closures.filter_map(|closure| closure.follower.as_ref()) {
@@ -203,6 +204,7 @@ fn list_closed_form(page: &mut PageDocument, derivation: &Derivation) {
         if !step.solved.relations.is_empty() {
             continue;
         }
+        // The unknowns of the step, and how they are solved for.
         let mut line = coordinate_names(mechanism, &step.unknown);
         // How many unknowns of the step are values and not angles states its kind.
         line.push(text(match step.solved.values.len() {
@@ -253,6 +255,7 @@ pub(super) fn drives(page: &mut PageDocument, derivation: &Derivation) {
             // What the force acts on, and its sign.
             let acts = match drive.kind {
                 DriveKind::Joint(i) => {
+                    // A joint drive acts on its coordinate.
                     let coordinate = &mechanism.coordinates[i.0];
                     // Torque or force, by the motion of the coordinate.
                     let kind = match coordinate.motion.place_load() {
@@ -278,6 +281,7 @@ pub(super) fn drives(page: &mut PageDocument, derivation: &Derivation) {
             vec![cell(code(&*drive.name)), acts]
         })
         .collect();
+    // All drives, joint drives as well.
     page.table(
         "drives",
         PageTable {

@@ -60,6 +60,7 @@ pub fn page(derivation: &Derivation, format: PageFormat, numeric: Option<&Numeri
         PageFormat::Text => render_text::render(&document()),
         PageFormat::Markdown => render_markdown::render(&document()),
         PageFormat::Latex => render_latex::render(&document()),
+        // The picture is part of the HTML page only.
         PageFormat::Html => {
             render_html::render(&document(), &mechanism_picture(&derivation.mechanism))
         }

@@ -119,6 +119,7 @@ pub(super) fn quantities(page: &mut PageDocument, mechanism: &Mechanism) {
             } else {
                 "length"
             };
+            // Coupled and passive coordinates are computed; all others are inputs.
             let role = if follows(i) {
                 "passive, coupled to others"
             } else if c.passive {

@@ -141,6 +141,7 @@ pub(super) fn listings(derivation: &Derivation) -> Vec<ListedProgram<'_>> {
     // Lengths and their rates, then the Jacobian row by row.
     let is_linear = |d: &ModelDrive| matches!(d.kind, DriveKind::Linear { .. });
     if mechanism.drives.iter().any(is_linear) {
+        // Outputs in the order of the program.
         let mut outputs: Vec<FormulaSymbol> = Vec::new();
         // Lengths, then their rates.
         for order in 0..2 {
@@ -271,6 +272,7 @@ fn is_trivial(program: &StraightLineProgram, i: usize) -> bool {
 
 /// Adds a folded block with the equations of both stages.
 fn add_folded_listing(page: &mut PageDocument, title: &str, listing: ProgramListing) {
+    // Fixed equations first, because those of a state refer to them.
     let ProgramListing { fixed, state } = listing;
     let mut blocks: Vec<PageBlock> = Vec::new();
     // A stage without equations has no heading.

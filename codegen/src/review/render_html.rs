@@ -60,6 +60,7 @@ fn blocks(out: &mut String, blocks: &[PageBlock]) {
             PageBlock::Table(table) => {
                 // The wrapper scrolls if the table is wider than the page.
                 out.push_str("<div class=\"wide\"><table>\n<thead><tr>");
+                // Headings of the columns.
                 for head in &table.head {
                     _ = write!(out, "<th scope=\"col\">{}</th>", escape(head));
                 }
@@ -98,6 +99,7 @@ fn write_equation(out: &mut String, equation: &PageEquation) {
         math(&format!("{}<mo>=</mo>", equation.left.mathml())),
         mathml_segments(&equation.right)
     );
+    // The unit stands in a span of its own.
     if let Some(text) = &equation.unit {
         _ = write!(out, " <span class=\"unit\">{}</span>", unit(text));
     }
@@ -125,6 +127,7 @@ fn unit(text: &str) -> String {
             raised = false;
         }
         match c {
+            // A narrow blank that does not break.
             ' ' => out.push_str("&#x202F;"),
             c => out.push_str(&escape(c.encode_utf8(&mut [0; 4]))),
         }

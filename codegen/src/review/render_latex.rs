@@ -75,6 +75,7 @@ fn write_table(out: &mut String, table: &PageTable) {
         columns.push_str("p{75mm}");
     }
     _ = writeln!(out, "\\begin{{longtable}}{{{columns}}}");
+    // The head is repeated on every page.
     let head: Vec<String> = table.head.iter().map(|h| escape(h).into_owned()).collect();
     _ = writeln!(out, "{} \\\\ \\hline\n\\endhead", head.join(" & "));
     for row in &table.rows {
@@ -86,6 +87,7 @@ fn write_table(out: &mut String, table: &PageTable) {
 
 /// An equation in display style, long sums in several lines; `end` follows its last line.
 pub(super) fn align_equation(equation: &PageEquation, end: &str) -> String {
+    // The unit follows the equation in brackets.
     let unit = equation
         .unit
         .as_ref()

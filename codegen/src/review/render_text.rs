@@ -103,6 +103,7 @@ fn write_table(out: &mut String, table: &PageTable) {
     // Head, rule, then the rows.
     for row in [&head, &rule].into_iter().chain(&rows) {
         let mut line = String::new();
+        // Cells are padded to the width of their column.
         for (i, width) in widths.iter().enumerate() {
             if row.is_empty() {
                 line.extend(std::iter::repeat_n('-', *width));
@@ -125,6 +126,7 @@ pub(super) fn equation_lines(equations: &[PageEquation]) -> String {
         .unwrap_or(0);
     let mut out = String::new();
     for equation in equations {
+        // The tag comes first, so that equations can be found by it.
         let tag = format!("({})", equation.tag);
         // Continued lines begin below the first term.
         let start = format!("  {tag:>widest$}  {} = ", equation.left);

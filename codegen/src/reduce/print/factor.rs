@@ -114,6 +114,7 @@ fn multiply_powers(a: &PowerProduct, b: &PowerProduct) -> PowerProduct {
 
 /// Candidates for linear factors: `a u + b v` with coefficients up to 2, and `u + v + w` with all signs.
 fn linear_form_candidates(variables: &[FactorVariable]) -> Vec<TrigonometricPolynomial> {
+    // A linear form from variables and coefficients.
     let linear = |terms: &[(FactorVariable, i64)]| -> TrigonometricPolynomial {
         terms
             .iter()
@@ -157,6 +158,7 @@ fn exact_quotient(
         let step = divide_powers(powers, lead)?;
         let value = value * &inverse;
         for (other, k) in by {
+            // The divisor times the step is subtracted from the rest.
             let at = multiply_powers(&step, other);
             let there = rest.remove(&at).unwrap_or(Rational::ZERO);
             let left = &there - &(&value * k);
@@ -182,6 +184,7 @@ pub(super) struct SumSquare {
 /// Squares of sums of several variables that a polynomial contains with all their terms.
 pub(super) fn find_squares(p: &TrigonometricPolynomial) -> Vec<SumSquare> {
     let coefficient = |powers: &PowerProduct| p.get(powers).cloned().unwrap_or(Rational::ZERO);
+    // Coefficient of a mixed term.
     let cross =
         |u: FactorVariable, v: FactorVariable| coefficient(&vec![(u.min(v), 1), (u.max(v), 1)]);
     // Variables with a pure square are candidates.
@@ -199,6 +202,7 @@ pub(super) fn find_squares(p: &TrigonometricPolynomial) -> Vec<SumSquare> {
         let first = variables.remove(0);
         // The number in front of the square.
         let number = coefficient(&vec![(first, 2)]);
+        // A mixed term has twice the product of the coefficients.
         let half = (&number * &Rational::integer(2)).recip();
         let mut linear = vec![(first, Rational::ONE)];
         for v in &variables {

@@ -48,6 +48,7 @@ impl RationalFunction {
         ordered_terms(&self.numerator)
             .into_iter()
             .map(|(powers, k)| {
+                // Each term keeps the whole denominator, so that terms can be read alone.
                 let above = power_factors(powers, mechanism)
                     .into_iter()
                     .chain(factors.iter().cloned());
@@ -87,6 +88,7 @@ impl RationalFunction {
             .denominator
             .values()
             .fold(Rational::ZERO, |c, k| c.content_with(k));
+        // A polynomial divided by a number.
         let scaled = |p: &TrigonometricPolynomial, by: &Rational| -> TrigonometricPolynomial {
             let inverse = by.recip();
             p.iter().map(|(v, k)| (v.clone(), k * &inverse)).collect()
@@ -117,6 +119,7 @@ fn power_factors(powers: &PowerProduct, mechanism: &Mechanism) -> Vec<PrintedFor
 
 /// Terms in the usual order: higher degrees first, then higher powers of the constants that are declared first.
 fn ordered_terms(p: &TrigonometricPolynomial) -> Vec<(&PowerProduct, &Rational)> {
+    // Sum of the exponents.
     let degree = |powers: &PowerProduct| powers.iter().map(|(_, n)| *n).sum::<u32>();
     let mut terms: Vec<_> = p.iter().collect();
     terms.sort_by(|(a, _), (b, _)| degree(b).cmp(&degree(a)).then_with(|| compare_powers(a, b)));
@@ -179,6 +182,7 @@ fn gather_squares(p: &TrigonometricPolynomial, mechanism: &Mechanism) -> Printed
     let mut squares: BTreeMap<FactorVariable, PrintedFormula> = BTreeMap::new();
     // Each square takes its terms out of the sum.
     for square in factor::find_squares(p) {
+        // Squares are ordered by their first variable.
         let first = square.linear[0].0;
         let sum = PrintedFormula::sum(
             square
