@@ -1,4 +1,13 @@
-//! Derivation: from a mechanism to its base parameters, equations and straight-line programs. `modelmill-emit` writes code of them.
+//! From a mechanism to its base parameters and fast code: derivation, reduction, straight-line programs and emitted
+//! modules.
+//!
+//! A `Mechanism` goes in, a `Derivation` comes out. The stages: `tree` and `loops` (kinematics as expressions),
+//! `newton_euler`
+//! and `regressor` (forces, linear in p_g), `reduce` (base parameters), `programs` and `lower` (straight-line
+//! programs); `emit`, `evaluate`, `review` and `on_request` read the result.
+//!
+//! Decision: this crate reads the validated `Mechanism` of `modelmill-spec` and no TOML. A second tree of types
+//! with the same content would only be copied.
 
 mod derive;
 mod error;
@@ -37,9 +46,9 @@ pub use tree::expressions::ParameterMonomial;
 
 use modelmill_spec::Mechanism;
 
-/// Derives the inverse dynamics of a mechanism and reduces it to base parameters, exactly where that can be done.
+/// Derives the inverse dynamics of a mechanism and reduces it to base parameters, in exact arithmetic where possible.
 ///
-/// A base whose columns all but depend on each other at the file's values, so that its forces are wrong, is refused.
+/// A base is refused when its columns are almost dependent at the file's values, because its forces would be wrong.
 pub fn derive(mechanism: &Mechanism) -> Result<Derivation, DeriveError> {
     let derivation = derive::derive(mechanism)?;
     evaluate::lost_digits::check_lost_digits(&derivation)?;

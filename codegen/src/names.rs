@@ -1,7 +1,7 @@
-//! Names for intermediate values of a program: a value is called what it is, an angular velocity, a position, a rate.
+//! Names for intermediate values of a program: an angular velocity, a position, a rate.
 //!
-//! Lowering rewrites expressions freely, so a value is recognised by its number at a random state of a slightly changed
-//! geometry: quantities with a meaning are evaluated there, and a value of the program that agrees gets the name.
+//! Lowering rewrites expressions freely, so a value is recognised numerically. Known quantities are evaluated at a
+//! random state of a slightly changed geometry, and a value of the program that agrees gets the name.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -17,19 +17,21 @@ use crate::regressor::form::{RecursionFrames, TotalForm};
 use crate::tree::expressions::ParameterMonomial;
 use crate::{Derivation, ModelEvaluator, MotionStates};
 
-/// A state with all its atoms' values, and the quantities with a meaning there.
+/// A state with the values of all inputs, and the known quantities at this state.
 #[derive(Clone, Debug)]
 pub struct NamedQuantities {
+    /// Values of the inputs.
     pub(crate) atoms: BTreeMap<Atom, f64>,
+    /// Symbols of known quantities with their values; no two have the same magnitude.
     known: Vec<(FormulaSymbol, f64)>,
 }
 
-/// What a value of a program is: a quantity with a name, or its negative.
+/// A known quantity that a value of a program equals, up to its sign.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct QuantityName {
-    /// Its name.
+    /// Its symbol.
     pub symbol: FormulaSymbol,
-    /// Whether the value is the negative of what the name means.
+    /// Whether the value is minus the quantity.
     pub negative: bool,
 }
 
@@ -37,9 +39,11 @@ pub struct QuantityName {
 const RELATIVE_AGREEMENT: f64 = 1e-10;
 
 impl NamedQuantities {
-    /// Evaluates the quantities that have a meaning; none where no state is found.
+    /// Evaluates the known quantities at a random state; without any if no state has a solution.
     pub fn new(derivation: &Derivation) -> Self {
+        // A fixed seed, so that names are always the same.
         let mut stream = RandomStream::new(0x6E61_6D65);
+        // The state comes closer to the nominal pose until the loops close.
         for scale in [0.05, 0.02, 0.005, 0.001, 0.0002] {
             if let Some(atoms) = generic_state(derivation, scale, &mut stream) {
                 let known = evaluate_quantities(derivation, &atoms);
@@ -52,13 +56,14 @@ impl NamedQuantities {
         }
     }
 
-    /// What a program's values are, by position; each name is given once.
+    /// Names for the values of a program, by index. Each name is used once.
     pub fn name_values(&self, program: &StraightLineProgram) -> BTreeMap<usize, QuantityName> {
         let mut names = BTreeMap::new();
         if self.known.is_empty() {
             return names;
         }
         let values = self.values(program);
+        // Quantities that have not been used as a name yet.
         let mut free: Vec<&(FormulaSymbol, f64)> = self.known.iter().collect();
         for (i, (op, value)) in program.ops.iter().zip(&values).enumerate() {
             if matches!(
@@ -67,11 +72,13 @@ impl NamedQuantities {
             ) {
                 continue;
             }
+            // Values agree up to sign and rounding.
             let found = free
                 .iter()
                 .position(|(_, v)| (value.abs() - v.abs()).abs() <= RELATIVE_AGREEMENT * v.abs());
             if let Some(k) = found {
                 let (symbol, v) = free.remove(k).clone();
+                // The sign of the value decides how it is written.
                 let negative = (value < &0.0) != (v < 0.0);
                 names.insert(i, QuantityName { symbol, negative });
             }
@@ -90,12 +97,13 @@ impl NamedQuantities {
     }
 }
 
-/// Uniform in `[-1, 1)`.
+/// A random number, uniform in -1 to 1.
 fn uniform(stream: &mut RandomStream) -> f64 {
     stream.next_bits() as f64 / (1u64 << 63) as f64 - 1.0
 }
 
-/// A state near the nominal pose of a mechanism whose constants differ a little from the file's.
+/// A random state near the nominal pose, for constants that differ slightly from the file's. `scale` is the size of the
+/// differences; `None` if the loops cannot close there.
 fn generic_state(
     derivation: &Derivation,
     scale: f64,
@@ -103,15 +111,19 @@ fn generic_state(
 ) -> Option<BTreeMap<Atom, f64>> {
     let mechanism = &derivation.mechanism;
     let (active, passive) = derivation.coordinates();
+    // Changed constants separate quantities that are equal only for the file's values.
     let constants: Vec<f64> = mechanism
         .constants
         .iter()
         .map(|c| c.value * (1.0 + scale * uniform(stream)))
         .collect();
+    // Positions close to the nominal pose.
     let near = |i: &usize, stream: &mut RandomStream| {
         mechanism.coordinates[*i].nominal + scale * uniform(stream)
     };
     let q: Vec<f64> = active.iter().map(|i| near(i, stream)).collect();
+    // Rates, accelerations, loads and parameters are away from zero, so that no quantity vanishes by chance.
+    // Rates and accelerations between 0.3 and 2.3.
     let [qd, qdd] = [(); 2].map(|()| {
         active
             .iter()
@@ -123,6 +135,7 @@ fn generic_state(
         .iter()
         .map(|_| 1.7 + uniform(stream))
         .collect();
+    // Passive motion from the evaluator.
     let motion = {
         fn slices(values: &[f64]) -> Vec<&[f64]> {
             values.iter().map(std::slice::from_ref).collect()
@@ -137,6 +150,7 @@ fn generic_state(
             .passive_motion(&states)
             .ok()?
     };
+    // Values of all inputs that a program may read.
     let mut atoms = BTreeMap::new();
     for (i, value) in constants.iter().enumerate() {
         atoms.insert(Atom::Constant(i), *value);
@@ -146,6 +160,7 @@ fn generic_state(
         atoms.insert(Atom::Rate(*i), qd[k]);
         atoms.insert(Atom::Acceleration(*i), qdd[k]);
     }
+    // Passive motion comes as coordinates, rates, accelerations.
     let n = passive.len();
     for (k, i) in passive.iter().enumerate() {
         atoms.insert(Atom::Coordinate(*i), motion[k][0]);
@@ -180,6 +195,7 @@ fn operation_values(program: &StraightLineProgram, atoms: &BTreeMap<Atom, f64>) 
             ProgramOp::Div(a, b) => at(a) / at(b),
             ProgramOp::Neg(a) => -at(a),
             ProgramOp::Unary(Unary::Sqrt, a) => at(a).sqrt(),
+            // The same functions as for expressions, so that the values agree.
             ProgramOp::Unary(function, a) => FloatDomain(|_| 0.0)
                 .unary(*function, &at(a))
                 .unwrap_or(f64::NAN),
@@ -192,28 +208,32 @@ fn operation_values(program: &StraightLineProgram, atoms: &BTreeMap<Atom, f64>) 
     values
 }
 
-/// Quantities with a meaning and their values; the first of several equal ones gives the name.
+/// Symbols and values of the known quantities; of several with equal magnitude the first one is used.
 fn evaluate_quantities(
     derivation: &Derivation,
     atoms: &BTreeMap<Atom, f64>,
 ) -> Vec<(FormulaSymbol, f64)> {
+    // Quantities are built in a copy of the graph.
     let mut graph = derivation.graph.clone();
+    // In order of precedence.
     let mut named = trigonometric_quantities(&mut graph, derivation);
     named.extend(motion_quantities(&mut graph, derivation));
     named.extend(link_quantities(&mut graph, derivation));
     named.extend(point_quantities(&mut graph, derivation));
     named.extend(wrench_quantities(&mut graph, derivation));
     let atom = |a: Atom| atoms.get(&a).copied().unwrap_or(f64::NAN);
+    // A name of the model file is not used for another quantity.
     let reserved = reserved_names(&derivation.mechanism);
+    // Quantities with a value of their own.
     let mut known: Vec<(FormulaSymbol, f64)> = Vec::new();
     let ids: Vec<ExprId> = named.iter().map(|(_, id)| *id).collect();
     let together = EvaluationTape::new(&graph, &ids).evaluate(&FloatDomain(atom));
     for (k, (symbol, id)) in named.into_iter().enumerate() {
-        // Numbers and inputs have names already; so have the negatives of what is named.
+        // Numbers and inputs have names already.
         if matches!(graph.node(id), Node::Rational(_) | Node::Atom(_)) {
             continue;
         }
-        // One that has no value takes it from all others.
+        // One undefined quantity makes the joint evaluation fail; then each is evaluated alone.
         let value = match &together {
             Some(values) => Some(values[k]),
             None => EvaluationTape::new(&graph, &[id])
@@ -233,7 +253,7 @@ fn evaluate_quantities(
     known
 }
 
-/// Names that the model file has taken.
+/// Names of constants, parameters and coordinates of the model file.
 pub(crate) fn reserved_names(mechanism: &Mechanism) -> BTreeSet<String> {
     let mut names: BTreeSet<String> = BTreeSet::new();
     names.extend(mechanism.constants.iter().map(|c| c.name.clone()));
@@ -249,6 +269,7 @@ fn trigonometric_quantities(
 ) -> Vec<(FormulaSymbol, ExprId)> {
     let projection = &derivation.equations.projection;
     let mechanism = &derivation.mechanism;
+    // All sines and cosines in the closure equations, then those of the passive coordinates.
     let seen = graph.reachable(&projection.loops.residual);
     let mut named = Vec::new();
     for (i, _) in seen.into_iter().enumerate().filter(|(_, seen)| *seen) {
@@ -277,6 +298,7 @@ fn trigonometric_name(
 ) -> FormulaSymbol {
     let mut name = letter.to_owned();
     for (atom, n) in angle.terms() {
+        // Factors other than one are part of the name.
         let factor = match n {
             1 => String::new(),
             -1 => "m".to_owned(),
@@ -290,11 +312,13 @@ fn trigonometric_name(
     FormulaSymbol::new(name)
 }
 
-/// Motion of passive coordinates and drives.
+/// Rates and accelerations of passive coordinates, lengths of linear drives with derivatives and Jacobian, and
+/// determinants.
 fn motion_quantities(graph: &mut Graph, derivation: &Derivation) -> Vec<(FormulaSymbol, ExprId)> {
     let mechanism = &derivation.mechanism;
     let projection = &derivation.equations.projection;
     let mut named = Vec::new();
+    // Passive coordinates.
     for (k, p) in projection.loops.passive.iter().enumerate() {
         let name = &*mechanism.coordinates[*p].name;
         named.push((
@@ -306,10 +330,12 @@ fn motion_quantities(graph: &mut Graph, derivation: &Derivation) -> Vec<(Formula
             projection.passive_accelerations[k],
         ));
     }
+    // Linear drives; joint drives have the names of their coordinates.
     for (d, drive) in mechanism.drives.iter().enumerate() {
         if matches!(drive.kind, DriveKind::Joint(_)) {
             continue;
         }
+        // Length, rate and acceleration of the drive.
         let motion = &projection.drives[d];
         let name = format!("l_{}", drive.name);
         named.push((FormulaSymbol::new(&*name), motion.coordinate));
@@ -331,6 +357,7 @@ fn motion_quantities(graph: &mut Graph, derivation: &Derivation) -> Vec<(Formula
             ));
         }
     }
+    // Determinants and their inverses, which linear systems use.
     for (k, id) in projection.determinants.iter().enumerate() {
         named.push((FormulaSymbol::new(format!("Delta_{}", k + 1)), *id));
         let inverse = graph.pow(*id, -1);
@@ -339,11 +366,14 @@ fn motion_quantities(graph: &mut Graph, derivation: &Derivation) -> Vec<(Formula
     named
 }
 
+/// Ends of the names of components.
 const AXES: [&str; 3] = ["x", "y", "z"];
 
-/// Angular velocity and acceleration of every frame and the acceleration of its origin, gravity taken off.
+/// Per frame: angular velocity and acceleration, acceleration of the origin minus gravity, and the matrix U.
+/// These are the equations of the forward recursion (Newton and Euler), in the axes of the frame.
 fn link_quantities(graph: &mut Graph, derivation: &Derivation) -> Vec<(FormulaSymbol, ExprId)> {
     let mechanism = &derivation.mechanism;
+    // The links of the open tree.
     let tree = &derivation.equations.tree;
     let Ok(gravity) = mechanism
         .gravity
@@ -353,24 +383,29 @@ fn link_quantities(graph: &mut Graph, derivation: &Derivation) -> Vec<(FormulaSy
     else {
         return Vec::new();
     };
+    // The base stands still and accelerates against gravity.
     let still = (
         vector::ZERO,
         vector::ZERO,
         std::array::from_fn(|i| graph.neg(gravity[i])),
     );
+    // Angular velocity, angular acceleration and acceleration of each link.
     let mut motions: Vec<(SymbolicVector, SymbolicVector, SymbolicVector)> = Vec::new();
-    // Acceleration of the place where the joint acts, along the axes of the parent.
+    // Acceleration of the point where the joint acts, in the axes of the parent.
     let mut before: Vec<SymbolicVector> = Vec::new();
     for (i, link) in tree.links.iter().enumerate() {
+        // First the motion of the parent at the joint, then that of the joint itself.
         let (omega_p, alpha_p, a_p) = link.parent.map_or(still, |p| motions[p]);
         let swing = graph.cross(&omega_p, &link.position);
         let centripetal = graph.cross(&omega_p, &swing);
         let tangential = graph.cross(&alpha_p, &link.position);
         let a = graph.add_vectors(&[a_p, tangential, centripetal]);
         before.push(a);
+        // The motion of the parent in the axes of the link.
         let mut omega = tree.to_link(graph, i, &omega_p);
         let mut alpha = tree.to_link(graph, i, &alpha_p);
         let mut a = tree.to_link(graph, i, &a);
+        // Revolute joints add to the angular velocity about z.
         for (coordinate, n) in &link.turns {
             let n = crate::expr::Rational::integer(i64::from(*n));
             let [rate, acceleration] = [Atom::Rate(*coordinate), Atom::Acceleration(*coordinate)]
@@ -382,6 +417,7 @@ fn link_quantities(graph: &mut Graph, derivation: &Derivation) -> Vec<(FormulaSy
             let about = graph.scale(acceleration, &n);
             alpha[2] = graph.add(alpha[2], about);
         }
+        // Prismatic joints add the Coriolis term and the acceleration along z.
         for (coordinate, k) in &link.slides {
             let [rate, acceleration] = [Atom::Rate(*coordinate), Atom::Acceleration(*coordinate)]
                 .map(|atom| graph.atom(atom));
@@ -402,6 +438,7 @@ fn link_quantities(graph: &mut Graph, derivation: &Derivation) -> Vec<(FormulaSy
     for (frame, link) in mechanism.frames.iter().zip(&tree.of_frame) {
         let Some(link) = link else { continue };
         let (omega, alpha, a) = &motions[*link];
+        // Components of angular velocity and accelerations.
         for (axis, name) in AXES.iter().enumerate() {
             let of = |letter: &str| format!("{letter}_{}_{name}", frame.name);
             named.push((FormulaSymbol::new(of("omega")), omega[axis]));
@@ -409,7 +446,7 @@ fn link_quantities(graph: &mut Graph, derivation: &Derivation) -> Vec<(FormulaSy
             named.push((FormulaSymbol::new(of("a")), a[axis]));
         }
         for axis in 0..3 {
-            // The matrix that takes a place of the frame to its acceleration: [alpha]x + [omega]x [omega]x.
+            // The matrix that maps a point of the frame to its acceleration: [alpha]x + [omega]x [omega]x.
             let (j, k) = ((axis + 1) % 3, (axis + 2) % 3);
             let entry = |i: usize, j: usize| format!("U_{}_{}{}", frame.name, AXES[i], AXES[j]);
             let squares = [j, k].map(|x| graph.mul(omega[x], omega[x]));
@@ -434,13 +471,15 @@ fn link_quantities(graph: &mut Graph, derivation: &Derivation) -> Vec<(FormulaSy
     named
 }
 
-/// What moves every link and all beyond it, with base parameters for the inertia, as its joint transmits it: the force, and
-/// the moment about its origin, along its own axes and those from which it turns; and the generalised forces.
+/// Per frame: force and moment that its joint transmits, with base parameters for the inertia. The moment is about the
+/// origin of the frame; both are given in the axes of the frame, and in those of the last frame before the parallel
+/// axes begin.
 fn wrench_quantities(graph: &mut Graph, derivation: &Derivation) -> Vec<(FormulaSymbol, ExprId)> {
     let (mechanism, equations) = (&derivation.mechanism, &derivation.equations);
     let tree = &equations.tree;
     let base = crate::programs::base_parameter_atoms(graph, &derivation.reduction);
     let value = |product: &ParameterMonomial| base.get(product).copied().unwrap_or(Graph::ZERO);
+    // The plain form of the recursion.
     let plain = TotalForm::PLAIN;
     let frames = RecursionFrames::new(graph, tree, &equations.gravity, plain.style, false);
     let wrenches = plain.wrenches(graph, &equations.inertia, tree, &frames, &value);
@@ -449,12 +488,15 @@ fn wrench_quantities(graph: &mut Graph, derivation: &Derivation) -> Vec<(Formula
         wrench,
         until: None,
     });
+    // Sums of the wrenches from the ends to the base.
     let through = joint_wrenches(graph, tree, loads.collect());
     let mut named = Vec::new();
     for (frame, link) in mechanism.frames.iter().zip(&tree.of_frame) {
         let Some(link) = link else { continue };
         let SymbolicWrench { force, moment } = through[*link];
+        // Rotation to the axes before the parallel ones.
         let turn = tree.links[*link].absolute.clone();
+        // Links with parallel axes share axes up to a rotation about z; the last frame of the parent names the axes.
         let first = tree.links[tree.links[*link].first_parallel].parent;
         let carries = (0..mechanism.frames.len()).rfind(|f| tree.of_frame[*f] == first);
         let carries = carries.map_or("base", |f| mechanism.frames[f].name.as_str());
@@ -473,12 +515,13 @@ fn wrench_quantities(graph: &mut Graph, derivation: &Derivation) -> Vec<(Formula
     named
 }
 
-/// Places of the points in the base frame, from its origin, from that of their frame, and along the linear drives.
+/// Positions of the points in the axes of the base: from the base's origin, from the origin of their frame, and along
+/// linear drives.
 fn point_quantities(graph: &mut Graph, derivation: &Derivation) -> Vec<(FormulaSymbol, ExprId)> {
     let mut mechanism = derivation.mechanism.clone();
     let tree = &derivation.equations.tree;
     let n_points = mechanism.points.len();
-    // The origins of the frames are points like others.
+    // The origins of the frames are added as points.
     for i in 0..mechanism.frames.len() {
         mechanism.points.push(modelmill_spec::FramePoint {
             name: mechanism.frames[i].name.clone(),
@@ -486,6 +529,7 @@ fn point_quantities(graph: &mut Graph, derivation: &Derivation) -> Vec<(FormulaS
             at: std::array::from_fn(|_| modelmill_spec::ExactExpression::zero()),
         });
     }
+    // A point whose position has no expression leaves all positions without names.
     let places: Option<Vec<SymbolicVector>> = (0..mechanism.points.len())
         .map(|i| crate::loops::stretch::position_in_base(graph, &mechanism, tree, i).ok())
         .collect();
@@ -498,20 +542,24 @@ fn point_quantities(graph: &mut Graph, derivation: &Derivation) -> Vec<(FormulaS
             named.push((FormulaSymbol::new(format!("{start}_{axis}")), id));
         }
     };
+    // From the origin of the base.
     for (point, place) in mechanism.points.iter().zip(&places) {
         name(format!("r_{}", point.name), *place);
     }
+    // From the origin of the frame.
     for (point, place) in mechanism.points.iter().zip(&places).take(n_points) {
         let frame = &mechanism.frames[point.frame.0];
         let from = graph.sub_vectors(place, &places[n_points + point.frame.0]);
         name(format!("r_{}_{}", frame.name, point.name), from);
     }
+    // For each loop, the vector between the origins of the frames that it joins.
     for joined in &mechanism.loops {
         let [a, b] = joined.joins.map(|p| mechanism.points[p.0].frame.0);
         let between = graph.sub_vectors(&places[n_points + b], &places[n_points + a]);
         let names = [a, b].map(|f| &*mechanism.frames[f].name);
         name(format!("r_{}_{}", names[0], names[1]), between);
     }
+    // Along the linear drives.
     for drive in &mechanism.drives {
         if let DriveKind::Linear { from, to } = drive.kind {
             let along = graph.sub_vectors(&places[to.0], &places[from.0]);

@@ -1,11 +1,12 @@
 //! Rust identifiers for names of the model file: different names give different identifiers.
+//! A name of the model file goes in, an identifier that compiles and stays readable comes out.
 
 use std::fmt::Write as _;
 
 use proc_macro2::{Ident, Span};
 
-/// Keywords that `r#` does not make identifiers, and names of the prelude and of emitted modules that a pattern takes for
-/// what they are instead of binding them.
+/// Names that a pattern would not bind: keywords without a raw form, names of the prelude, and constants and structs of
+/// the emitted module, which a pattern would match instead.
 const UNBINDABLE_NAMES: [&str; 41] = [
     "self",
     "Self",
@@ -50,26 +51,29 @@ const UNBINDABLE_NAMES: [&str; 41] = [
     "Wrenches",
 ];
 
-/// Keywords that the parser takes for identifiers, because an older edition does.
+/// Keywords of the current edition that the parser, which knows an older edition, accepts as identifiers.
 const NEWER_KEYWORDS: [&str; 1] = ["gen"];
 
-/// Names in scope everywhere that a module of the same name would hide from its neighbours.
+/// Names in scope everywhere; a module of the same name would shadow them for its siblings.
 const IN_SCOPE: [&str; 20] = [
     "alloc", "bool", "char", "core", "f32", "f64", "i8", "i16", "i32", "i64", "i128", "isize",
     "std", "str", "u8", "u16", "u32", "u64", "u128", "usize",
 ];
 
-/// The name of a field: the name itself, as `r#type` if it is a keyword.
+/// The identifier of a field: the name itself, as `r#type` if it is a keyword.
 ///
-/// What cannot be written so starts with `_`, which no name of a model file does; characters that an identifier cannot
-/// hold are spelled by their code, so that no two names meet.
+/// Other names are spelled with a leading `_`, which no name of a model file has. Characters that an identifier cannot
+/// contain are written as their code, so that different names stay different.
 pub(super) fn field_identifier(name: &str) -> Ident {
+    // Letters first, then letters, digits and underscores.
     let plain = name.starts_with(|c: char| c.is_ascii_alphabetic())
+        // Only ASCII names are taken as they are; others may look alike after normalisation.
         && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
         && !UNBINDABLE_NAMES.contains(&name);
     if !plain {
         return Ident::new(&valid_spelling(name), Span::call_site());
     }
+    // A keyword is no identifier for the parser, and needs the raw form.
     if NEWER_KEYWORDS.contains(&name) || syn::parse_str::<syn::Ident>(name).is_err() {
         Ident::new_raw(name, Span::call_site())
     } else {
@@ -77,7 +81,7 @@ pub(super) fn field_identifier(name: &str) -> Ident {
     }
 }
 
-/// The name of a module, which also keeps clear of what is in scope around it.
+/// The identifier of a module: as [`field_identifier`], and different from the names in scope around it.
 pub(super) fn module_identifier(name: &str) -> Ident {
     if IN_SCOPE.contains(&name) {
         Ident::new(&valid_spelling(name), Span::call_site())
@@ -86,8 +90,10 @@ pub(super) fn module_identifier(name: &str) -> Ident {
     }
 }
 
+/// A leading `_` and the name with other characters as `_HEX_`.
 fn valid_spelling(name: &str) -> String {
     let mut spelled = "_".to_owned();
+    // The code of a character is unique, so that no two names become equal.
     for c in name.chars() {
         if c.is_ascii_alphanumeric() {
             spelled.push(c);

@@ -1,14 +1,14 @@
-//! The list of languages, those of crates around the Rust module included.
+//! The list of output languages, including crates that wrap the Rust module.
 
 use super::language::{
     C99Sources, EmissionRequest, EmittedFile, OutputForm, OutputLanguage, RustModule,
 };
 use super::wrap::{emit_c, emit_python};
 
-/// All languages; the first is taken where none is named.
+/// All languages; the first is the default.
 pub const LANGUAGES: [&dyn OutputLanguage; 4] = [&RustModule, &C99Sources, &CCrate, &PythonCrate];
 
-/// A crate around the Rust module that makes a C library.
+/// A crate that wraps the Rust module in a C library.
 struct CCrate;
 
 impl OutputLanguage for CCrate {
@@ -26,6 +26,7 @@ impl OutputLanguage for CCrate {
         }
     }
 
+    // The header declares neither.
     fn has_reactions_and_self_test(&self) -> bool {
         false
     }
@@ -35,7 +36,7 @@ impl OutputLanguage for CCrate {
     }
 }
 
-/// A crate around the Rust module that makes a Python module.
+/// A crate that wraps the Rust module in a Python module.
 struct PythonCrate;
 
 impl OutputLanguage for PythonCrate {

@@ -1,7 +1,7 @@
-//! Emission: a derivation goes in, source comes out, in one language or another: each is an entry of [`LANGUAGES`].
+//! Emission: a derivation goes in, source files in one output language come out.
 //!
-//! `tree` makes statements of the lowered programs, once for all languages; `language` prints them; `wrap` puts faces for
-//! other languages around the Rust that is printed.
+//! `tree` turns the lowered programs into statements, the same for all languages. `language` prints them, and `wrap`
+//! adds interfaces for other languages to the printed Rust module.
 
 mod identifier;
 mod language;

@@ -8,11 +8,11 @@
 #else
 #define LANES 2
 #endif
-/* How many lines, each of the same number of as many states, are read before the program runs: with the results they take
+/* Number of lines (the same quantity at LANES states) that are read before the program runs: with the results they take
    16 kB of the fastest cache. */
 #define FITTING (16384 / (8 * LANES) / (READ + WIDTH))
 #define LINES (FITTING < 1 ? 1 : FITTING > 64 / LANES ? 64 / LANES : FITTING)
-/* How many states before they are needed numbers are asked for, and how many a cache line has of a column. */
+/* How many states ahead memory is prefetched, and how many numbers of a column a cache line has. */
 #define AHEAD (LINES * LANES < 32 ? 64 : 2 * LINES * LANES)
 #define CACHE_LINE 8
 typedef double V __attribute__((vector_size(8 * LANES)));
@@ -31,10 +31,10 @@ FUNCTION V angle(V y, V x)
     return y;
 }
 
-/* What is no number stays none: such a sum is zero as long as all are numbers. */
+/* Detects NaN and infinity: the sum stays zero as long as all numbers are finite. */
 FUNCTION void look_at(V x, V *none) { *none += x * 0.0; }
 
-/* Four numbers wherever they lie, and what picks four of eight. */
+/* Four numbers without alignment, and a selection of four from eight. */
 typedef double H __attribute__((vector_size(32), aligned(8), may_alias));
 #ifdef __clang__
 #define PICK(a, b, i, j, k, l) __builtin_shufflevector(a, b, i, j, k, l)
@@ -43,7 +43,7 @@ typedef long long I __attribute__((vector_size(32)));
 #define PICK(a, b, i, j, k, l) __builtin_shuffle(a, b, (I){i, j, k, l})
 #endif
 
-/* Four rows of four numbers, the next row `from_next` doubles on, as four columns, the next one `to_next` on. */
+/* Transposes four rows of four numbers. Rows are `from_next` doubles apart, columns of the result `to_next` doubles. */
 FUNCTION void turn(const double *from, long from_next, double *to, long to_next)
 {
     const H a = *(const H *)from, b = *(const H *)(from + from_next);
@@ -56,10 +56,10 @@ FUNCTION void turn(const double *from, long from_next, double *to, long to_next)
     *(H *)(to + 3 * to_next) = PICK(ba, dc, 2, 3, 6, 7);
 }
 
-/* Where the block of four columns starts that comes `k` columns on: the last one ends with the last column. */
+/* A loop over blocks of four columns, which start at column `k`; the last block ends with the last column. */
 #define BLOCKS(k, width) for (long k = 0; k < (width); k = k + 4 < (width) && k + 8 > (width) ? (width) - 4 : k + 4)
 
-/* Columns of `m` states from the `first` on to lines; the last line is filled up with its last state. */
+/* Copies columns of `m` states, from state `first` on, to lines. The last line is filled up with the last state. */
 FUNCTION void read(
     const double *array, long first, long by_state, long by_column, long width, long m, V *lines, V *none)
 {
@@ -85,7 +85,7 @@ FUNCTION void read(
             look_at(lines[k * LINES + line], none);
 }
 
-/* Asks the memory for the states of a cache line, which are read later or whose results are written. */
+/* Prefetches the states of a cache line, for reading or for writing results. */
 FUNCTION void fetch(const double *array, long first, long by_state, long by_column, long width, int is_written)
 {
     const double *const from = array + first * by_state;
@@ -97,7 +97,7 @@ FUNCTION void fetch(const double *array, long first, long by_state, long by_colu
             __builtin_prefetch(from + k * step, 0);
 }
 
-/* Lines of results to the rows of `m` states. */
+/* Copies lines of results to the rows of `m` states. */
 FUNCTION void write(const V *lines, long m, double *to, V *none)
 {
     for (long k = 0; k < WIDTH; k++)
@@ -114,7 +114,7 @@ FUNCTION void write(const V *lines, long m, double *to, V *none)
             to[i * WIDTH + k] = from[k * LINES * LANES + i];
 }
 
-/* Both for angles below 102943 rad, which is 65536 quarters of a turn; `bad` has a bit above the 17th where an angle is larger.
+/* Sine and cosine of angles below 102943 rad, 65536 quarters of a turn; `bad` gets a bit above the 17th for larger angles.
    Reduction by Cody and Waite, polynomials of FDLIBM (Sun Microsystems, 1993), terms in pairs after G. Estrin. The compiler
    computes them once where an angle has both. */
 FUNCTION void sine_and_cosine(V x, V *sine, V *cosine, W *bad)

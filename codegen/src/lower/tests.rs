@@ -1,4 +1,4 @@
-//! Every pass keeps the value of each output, and what is estimated as cost is what the program counts.
+//! Every pass keeps the value of each output, and printed numbers of operations equal a count in the source.
 
 use std::path::Path;
 
@@ -15,7 +15,7 @@ fn derivation(model: &str) -> Derivation {
     derive(&loaded.mechanism).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// Values of some expressions at a random point of the field, with all atoms free.
+/// Values of some expressions at a random point of the field, with independent values of all atoms.
 fn values(graph: &Graph, roots: &[ExprId], seed: u64) -> Vec<FieldElement> {
     let mut stream = RandomStream::new(seed);
     loop {
@@ -61,7 +61,7 @@ fn every_pass_keeps_the_value_of_each_output() {
             values(&graph, &now, 11) == expected,
             "compacting changes a value of {model}"
         );
-        // Twice, since passes meet what the others have made of the expressions.
+        // Twice, because each pass also meets the results of the others.
         for pass in PASSES.iter().chain(&PASSES) {
             (graph, now) = (pass.run)(graph, &now);
             assert!(

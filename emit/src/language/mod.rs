@@ -1,7 +1,7 @@
 //! Languages that print the statement tree.
 //!
-//! A language is one entry of [`LANGUAGES`](super::LANGUAGES): what it is called, what its files are, and how it writes a
-//! model. Adding one touches its own folder, this file and that list, which the library and the program read.
+//! A language is one entry of [`LANGUAGES`](super::LANGUAGES): its name, the form of its files, and how it writes a
+//! model. A new one touches its own folder, this file and that list, which library and program read.
 
 use modelmill_codegen::{Derivation, DynamicsPrograms, ReactionPrograms};
 
@@ -9,29 +9,29 @@ pub(crate) mod c99;
 pub(crate) mod rust;
 mod syntax;
 
-/// A text file of what is emitted.
+/// A text file of the output.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct EmittedFile {
-    /// Its place in the folder, with `/` between folders.
+    /// Path in the output folder, with `/` between folders.
     pub path: String,
-    /// What it holds.
+    /// Its content.
     pub text: String,
 }
 
-/// What is written of a model.
+/// What to write of a model.
 #[derive(Clone, Copy)]
 pub struct EmissionRequest<'a> {
     /// The model: regressor, inverse dynamics, drives, passive coordinates.
     pub derivation: &'a Derivation,
-    /// Its equation of motion, if that is wanted.
+    /// Its equation of motion, if requested.
     pub dynamics: Option<&'a DynamicsPrograms>,
-    /// What its joints transmit, if that is wanted.
+    /// The reactions in its joints, if requested.
     pub reactions: Option<&'a ReactionPrograms>,
-    /// Whether a test of the base parameters is wanted.
+    /// Whether to add a test of the base parameters.
     pub self_test: bool,
 }
 
-/// What the files of a language are.
+/// The form of a language's output.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum OutputForm {
     /// One file.
@@ -40,20 +40,20 @@ pub enum OutputForm {
     Sources,
     /// A crate, which needs the runtime in its folder `modelmill-runtime`.
     Crate {
-        /// What it makes, and how it is built.
+        /// What building it gives, and the command.
         makes: &'static str,
     },
 }
 
-/// A language in which models are written.
+/// An output language.
 pub trait OutputLanguage: Sync {
-    /// What it is called.
+    /// Its name in options.
     fn name(&self) -> &'static str;
-    /// What is made in it, in a few words.
+    /// Its output in a few words, for lists.
     fn description(&self) -> &'static str;
-    /// What its files are.
+    /// The form of its output.
     fn output_form(&self) -> OutputForm;
-    /// Whether it has reactions and a self-test, if a source asks for them.
+    /// Whether it can write reactions and a self-test, if a request has them.
     fn has_reactions_and_self_test(&self) -> bool {
         true
     }
@@ -61,7 +61,7 @@ pub trait OutputLanguage: Sync {
     fn emit_files(&self, source: &EmissionRequest<'_>) -> Vec<EmittedFile>;
 }
 
-/// A module of Rust.
+/// A Rust module.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RustModule;
 
@@ -79,6 +79,7 @@ impl OutputLanguage for RustModule {
     }
 
     fn emit_files(&self, source: &EmissionRequest<'_>) -> Vec<EmittedFile> {
+        // Optional structs are appended in a fixed order.
         let mut emitted = rust::emit(source.derivation);
         if let Some(dynamics) = source.dynamics {
             emitted = emitted.with_dynamics(source.derivation, dynamics);

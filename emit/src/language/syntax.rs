@@ -1,22 +1,22 @@
-//! What languages differ in when they print expressions and statements, and what they share.
+//! The part of printing that languages share, and the trait for the part in which they differ.
 
 use modelmill_codegen::expr::Unary;
 
 use crate::tree::{CodeExpression, OperatorPrecedence};
-/// How a language writes what stands in statements.
+/// How a language writes names, numbers and functions.
 pub(crate) trait LanguageSyntax {
-    /// A variable.
+    /// A variable; keywords and special characters are replaced.
     fn name(&self, name: &str) -> String;
     /// A number between operators.
     fn number(&self, value: f64) -> String;
-    /// A number that stands by itself where a variable is expected.
+    /// A number that stands alone where a variable is expected; it may need a conversion or parentheses.
     fn standalone_number(&self, value: f64) -> String;
-    /// A function of one argument; the argument holds together.
+    /// A function of one argument; the text of the argument needs no further parentheses.
     fn call(&self, function: Unary, argument: &str) -> String;
-    /// Angle of the point (`x`, `y`); `y` holds together.
+    /// Angle of the point (`x`, `y`) in rad; the text of `y` needs no further parentheses.
     fn atan2(&self, y: &str, x: &str) -> String;
 
-    /// An expression, with parentheses where they are needed.
+    /// An expression with as few parentheses as possible.
     fn expression_text(&self, value: &CodeExpression) -> String {
         match value {
             CodeExpression::Number(value) => self.number(*value),
@@ -31,7 +31,7 @@ pub(crate) trait LanguageSyntax {
         }
     }
 
-    /// An expression where a variable is expected.
+    /// An expression where a variable is expected; only a lone number differs.
     fn operand_text(&self, value: &CodeExpression) -> String {
         match value {
             CodeExpression::Number(value) => self.standalone_number(*value),
@@ -39,12 +39,13 @@ pub(crate) trait LanguageSyntax {
         }
     }
 
-    /// A term that holds together.
+    /// An expression that may be an operand of any operator or function.
     fn grouped_text(&self, value: &CodeExpression) -> String {
         parenthesize(self.operand_text(value), value, OperatorPrecedence::Whole)
     }
 
-    /// One operator on two operands; numbers may stand on one side only.
+    /// A binary operation. Two numbers cannot be combined by the operators of Rust's variables, so the left one is
+    /// converted.
     fn binary_text(
         &self,
         a: &CodeExpression,
@@ -52,6 +53,7 @@ pub(crate) trait LanguageSyntax {
         b: &CodeExpression,
         binding: OperatorPrecedence,
     ) -> String {
+        // Whether both operands are numbers.
         let both = matches!(
             (a, b),
             (CodeExpression::Number(_), CodeExpression::Number(_))
@@ -61,6 +63,7 @@ pub(crate) trait LanguageSyntax {
         } else {
             self.expression_text(a)
         };
+        // The right operand needs parentheses already at equal precedence: `a - (b - c)`.
         let next = match binding {
             OperatorPrecedence::Sum => OperatorPrecedence::Product,
             _ => OperatorPrecedence::Negation,
@@ -73,7 +76,7 @@ pub(crate) trait LanguageSyntax {
     }
 }
 
-/// Text in parentheses if it does not hold together as tightly as asked.
+/// The text in parentheses if its operator binds less strongly than `binding`.
 fn parenthesize(text: String, value: &CodeExpression, binding: OperatorPrecedence) -> String {
     if value.precedence() < binding {
         format!("({text})")

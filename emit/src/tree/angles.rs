@@ -1,26 +1,28 @@
-//! The angles of a program that come before everything else.
+//! The angles whose sines and cosines a program computes before anything else.
 
 use modelmill_codegen::{ProgramOp, ProgramStage, StraightLineProgram};
 
-/// Sines with their cosines whose angles need no other function, if there are several: they take much of the time of one
-/// state, and less if they are computed at once.
+/// Pairs of sine and cosine whose angles need only arithmetic. They take much of the time of one state, and less if
+/// they are computed together. Empty if there is only one.
 pub(super) struct LeadingAngles {
-    /// The sines; the cosine of each stands right before it.
+    /// Indices of the sines; the cosine of each is the operation before.
     pub(super) sines: Vec<usize>,
-    /// Which operations are written before all others: what the angles are made of.
+    /// Operations that are written before all others, because the angles depend on them.
     pub(super) done: Vec<bool>,
 }
 
 impl LeadingAngles {
+    /// Finds the pairs of a program.
     pub(super) fn from_program(program: &StraightLineProgram) -> Self {
         let n = program.ops.len();
-        // What needs inputs and arithmetic alone.
+        // Values that depend on inputs by sums, products and signs only.
         let mut plain = vec![false; n];
         let mut done = vec![false; n];
         let mut sines = Vec::new();
         for (i, op) in program.ops.iter().enumerate() {
             let mut of_plain = true;
             op.for_each_operand(|v| of_plain &= plain[v.index()]);
+            // Fixed values are available before the state.
             let fixed = program.stages[i] == ProgramStage::Fixed;
             let simple = matches!(
                 op,
@@ -32,6 +34,7 @@ impl LeadingAngles {
                     | ProgramOp::Neg(_)
             );
             plain[i] = fixed || simple && of_plain;
+            // A pair of cosine and sine.
             if let ProgramOp::Sin(a) = op
                 && i > 0
                 && program.ops[i - 1] == ProgramOp::Cos(*a)
@@ -42,12 +45,14 @@ impl LeadingAngles {
                 done[a.index()] = true;
             }
         }
+        // One pair gains nothing.
         if sines.len() < 2 {
             return Self {
                 sines: Vec::new(),
                 done: vec![false; n],
             };
         }
+        // All operands of the angles come first as well.
         for i in (0..n).rev() {
             if done[i] {
                 program.ops[i].for_each_operand(|v| done[v.index()] = true);
@@ -56,7 +61,7 @@ impl LeadingAngles {
         Self { sines, done }
     }
 
-    /// The same where operations stand in another order.
+    /// The same after the operations have been permuted.
     pub(super) fn reorder(self, order: &[usize]) -> Self {
         let mut place = vec![0; self.done.len()];
         for (k, i) in order.iter().enumerate() {

@@ -1,47 +1,60 @@
-//! Expressions of the statement tree, and how wide they are when written.
+//! Expressions of the statement tree: constructors that normalise signs and order, and the precedence of operators.
 
 use modelmill_codegen::expr::print::{FormulaFunction, PrintedFormula};
 use modelmill_codegen::expr::{Rational, Unary};
 
-/// A formula in one line.
+/// A formula of variables and numbers. Operands may be exchanged only where the result is the same floating-point
+/// number.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum CodeExpression {
     /// A number.
     Number(f64),
     /// A variable.
     Name(String),
+    /// A sum of two operands.
     Add(Box<CodeExpression>, Box<CodeExpression>),
+    /// A difference.
     Sub(Box<CodeExpression>, Box<CodeExpression>),
+    /// A product.
     Mul(Box<CodeExpression>, Box<CodeExpression>),
+    /// A quotient.
     Div(Box<CodeExpression>, Box<CodeExpression>),
+    /// A change of sign.
     Neg(Box<CodeExpression>),
     /// A function of one argument.
     Call(Unary, Box<CodeExpression>),
-    /// Angle of the point (`x`, `y`): y, then x.
+    /// Angle of the point (`x`, `y`) in rad, with the operands in the order y, x.
     Atan2(Box<CodeExpression>, Box<CodeExpression>),
 }
 
-/// How tightly an expression holds together, from sums to names.
+/// How strongly an expression binds, in increasing order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum OperatorPrecedence {
+    /// Sums and differences.
     Sum,
+    /// Products and quotients.
     Product,
+    /// Changes of sign and negative numbers.
     Negation,
+    /// Names, positive numbers and calls.
     Whole,
 }
 
 impl CodeExpression {
+    /// A variable.
     pub(crate) fn name(name: impl Into<String>) -> Self {
         Self::Name(name.into())
     }
 
+    /// A number, rounded to floating point.
     pub(crate) fn number(value: &Rational) -> Self {
         Self::Number(value.to_f64())
     }
 
-    /// `a + b`, written `b + a` where that needs no parentheses: it is the same number.
+    /// `a + b`, as `b + a` where that needs no parentheses; the result is the same number.
     pub(crate) fn add(a: Self, b: Self) -> Self {
         match (a, b) {
+            // Adding a negative is a subtraction.
             (a, Self::Neg(b)) => Self::sub(a, *b),
             (Self::Neg(a), b) => Self::sub(b, *a),
             (a, b)
@@ -54,6 +67,7 @@ impl CodeExpression {
         }
     }
 
+    /// `a - b`; changes of sign are merged into the operator.
     pub(crate) fn sub(a: Self, b: Self) -> Self {
         match (a, b) {
             (a, Self::Neg(b)) => Self::add(a, *b),
@@ -62,16 +76,19 @@ impl CodeExpression {
         }
     }
 
-    /// `a * b`, written `b * a` where that reads better: it is the same number. Signs are passed on.
+    /// `a * b`, as `b * a` where that reads better; the result is the same number. Signs are moved outwards.
     pub(crate) fn mul(a: Self, b: Self) -> Self {
         match (a, b) {
+            // Signs of both operands move outwards.
             (Self::Neg(a), b) => Self::neg(Self::mul(*a, b)),
             (a, Self::Neg(b)) => Self::neg(Self::mul(a, *b)),
             (a, b) => Self::product(a, b),
         }
     }
 
+    /// A product without signs: numbers in front, nested products on the left.
     fn product(a: Self, b: Self) -> Self {
+        // A product on the right would need parentheses.
         let nested = b.precedence() == OperatorPrecedence::Product
             && a.precedence() != OperatorPrecedence::Product;
         let number = matches!(b, Self::Number(_)) && a.precedence() != OperatorPrecedence::Product;
@@ -79,6 +96,7 @@ impl CodeExpression {
         Self::Mul(Box::new(a), Box::new(b))
     }
 
+    /// `a / b`; signs are moved outwards.
     pub(crate) fn div(a: Self, b: Self) -> Self {
         match (a, b) {
             (Self::Neg(a), b) => Self::neg(Self::div(*a, b)),
@@ -87,6 +105,7 @@ impl CodeExpression {
         }
     }
 
+    /// `-a`; two signs cancel, and a number takes the sign.
     pub(crate) fn neg(a: Self) -> Self {
         match a {
             Self::Neg(a) => *a,
@@ -95,19 +114,21 @@ impl CodeExpression {
         }
     }
 
-    /// The negative where it takes no operation more: it is the same number.
+    /// The negative, if it needs no additional operation; the result is the same number.
     fn negated_without_cost(&self) -> Option<Self> {
         match self {
             Self::Number(a) => Some(Self::Number(-a)),
             Self::Neg(a) => Some((**a).clone()),
             Self::Sub(a, b) => Some(Self::Sub(b.clone(), a.clone())),
             Self::Add(a, b) => {
+                // One negated term is enough: the other one is subtracted.
                 let (turned, rest) = match a.negated_without_cost() {
                     Some(turned) => (turned, b),
                     None => (b.negated_without_cost()?, a),
                 };
                 Some(Self::Sub(Box::new(turned), rest.clone()))
             }
+            // A product is negated by one of its factors.
             Self::Mul(a, b) => match a.negated_without_cost() {
                 Some(a) => Some(Self::mul(a, (**b).clone())),
                 None => Some(Self::mul((**a).clone(), b.negated_without_cost()?)),
@@ -120,7 +141,7 @@ impl CodeExpression {
         }
     }
 
-    /// The same number with a sign in front only where that saves nothing.
+    /// The same number, with its leading sign absorbed where possible.
     pub(crate) fn normalize_sign(self) -> Self {
         match self {
             Self::Neg(a) => a.negated_without_cost().unwrap_or(Self::Neg(a)),
@@ -128,14 +149,17 @@ impl CodeExpression {
         }
     }
 
+    /// A function of one argument.
     pub(crate) fn call(function: Unary, a: Self) -> Self {
         Self::Call(function, Box::new(a))
     }
 
+    /// Angle of the point (`x`, `y`).
     pub(crate) fn atan2(y: Self, x: Self) -> Self {
         Self::Atan2(Box::new(y), Box::new(x))
     }
 
+    /// Precedence of the outermost operator.
     pub(crate) fn precedence(&self) -> OperatorPrecedence {
         match self {
             Self::Add(..) | Self::Sub(..) => OperatorPrecedence::Sum,
@@ -148,7 +172,7 @@ impl CodeExpression {
         }
     }
 
-    /// Calls `visit` for every name.
+    /// Calls `visit` for every name, from left to right.
     pub(crate) fn for_each_name(&self, visit: &mut dyn FnMut(&str)) {
         match self {
             Self::Number(_) => {}
@@ -165,7 +189,7 @@ impl CodeExpression {
         }
     }
 
-    /// Calls `change` for every name.
+    /// Calls `change` for every name, from left to right.
     pub(crate) fn rename(&mut self, change: &dyn Fn(&mut String)) {
         match self {
             Self::Number(_) => {}
@@ -182,7 +206,7 @@ impl CodeExpression {
         }
     }
 
-    /// A printed formula as an expression; `rename` says how its names are called.
+    /// A printed formula as an expression; `rename` maps its names to those of the scope.
     pub(crate) fn from_formula(formula: &PrintedFormula, rename: &dyn Fn(&str) -> String) -> Self {
         let of = |f: &PrintedFormula| Self::from_formula(f, rename);
         match formula {
@@ -191,6 +215,8 @@ impl CodeExpression {
                 Self::Name(rename(&symbol.text()))
             }
             PrintedFormula::Sum(terms) => {
+                // The terms of a sum are added in order, with their signs as operators.
+                // The first term may be negative, all others are added or subtracted.
                 let mut sum: Option<Self> = None;
                 for term in terms {
                     let (negative, term) = if term.is_negative() {
@@ -212,7 +238,9 @@ impl CodeExpression {
                 above,
                 below,
             } => {
+                // The sign is added at the end.
                 let magnitude = factor.abs();
+                // A term: factor times numerator over denominator.
                 let number = (!magnitude.is_one()).then(|| Self::number(&magnitude));
                 let product = |factors: Vec<Self>| {
                     let mut factors = factors.into_iter();
@@ -222,6 +250,7 @@ impl CodeExpression {
                     })
                 };
                 let above = product(number.into_iter().chain(above.iter().map(of)).collect());
+                // Numerator and denominator as products.
                 let below = product(below.iter().map(of).collect());
                 let above = above.unwrap_or(Self::Number(1.0));
                 let value = match below {
@@ -235,6 +264,7 @@ impl CodeExpression {
                 }
             }
             PrintedFormula::Power(base, n) => {
+                // A power becomes repeated multiplication.
                 let base = of(base);
                 (1..*n).fold(base.clone(), |power, _| {
                     Self::Mul(Box::new(power), Box::new(base.clone()))
@@ -249,6 +279,7 @@ impl CodeExpression {
     }
 }
 
+/// The operation of a function of one argument.
 fn unary(function: FormulaFunction) -> Unary {
     match function {
         FormulaFunction::Sin => Unary::Sin,

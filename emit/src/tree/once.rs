@@ -1,4 +1,4 @@
-//! What several programs compute once, computed once for all of them.
+//! Precomputed values of several programs: values that two programs have in common are computed once.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -7,19 +7,23 @@ use modelmill_codegen::expr::Atom;
 use super::build::group_statements;
 use super::scope::{NameScope, unique_name};
 use super::{CodeStatement, PoseCheck, StatementRoutine};
-/// What is computed once for a geometry and its parameters, by all programs of one struct.
+/// What all programs of one struct compute once per geometry and parameters.
 #[derive(Clone, Debug)]
 pub(crate) struct PrecomputedValues {
+    /// The statements, in order.
     statements: Vec<CodeStatement>,
-    /// Names of the values that programs need at every state.
+    /// Names of the values that programs read at every state, in the order in which they are stored.
     pub(crate) kept: Vec<String>,
-    /// Inputs that are read.
+    /// Inputs that the statements read.
     pub(crate) read: BTreeSet<Atom>,
+    /// Names that may not be used again.
     taken: BTreeSet<String>,
+    /// Counter of generated names.
     next: usize,
 }
 
 impl PrecomputedValues {
+    /// No values; names of the scope are taken.
     pub(crate) fn new(scope: &NameScope) -> Self {
         Self {
             statements: Vec::new(),
@@ -30,13 +34,17 @@ impl PrecomputedValues {
         }
     }
 
-    /// Takes over what a program computes once; values that are there already are not computed again.
+    /// Moves the precomputed statements of a program here. Statements with an equal value are shared, and names in the
+    /// program are replaced by the ones chosen here.
     pub(crate) fn absorb(&mut self, routine: &mut StatementRoutine) {
+        // New names by old names of this program.
         let mut renamed: BTreeMap<String, String> = BTreeMap::new();
         for mut statement in std::mem::take(&mut routine.once) {
             statement.rename(&|name| replace_name(&renamed, name));
             match statement {
+                // The same value under another name is reused.
                 CodeStatement::Let { name, value, note } => {
+                    // A statement with the same value.
                     let known = self.statements.iter().find_map(|other| match other {
                         CodeStatement::Let { name, value: v, .. } if *v == value => {
                             Some(name.clone())
@@ -60,6 +68,7 @@ impl PrecomputedValues {
                     angle,
                     requested: asked,
                 } => {
+                    // Sines and cosines are not compared with earlier ones.
                     let [sine, cosine] = [sine, cosine].map(|name| {
                         name.map(|name| {
                             let new = self.unique_name(&name);
@@ -77,6 +86,7 @@ impl PrecomputedValues {
                 other => self.statements.push(other),
             }
         }
+        // The rest of the program follows the renaming.
         for name in &mut routine.kept {
             replace_name(&renamed, name);
             if !self.kept.contains(name) {
@@ -93,12 +103,14 @@ impl PrecomputedValues {
         self.read.extend(&routine.read_once);
     }
 
-    /// All statements.
+    /// All statements, in groups if they are many.
     pub(crate) fn statements(&self) -> Vec<CodeStatement> {
         group_statements(self.statements.clone(), &self.kept)
     }
 
+    /// The wanted name, or a similar one that is free. Generated names are numbered anew.
     fn unique_name(&mut self, name: &str) -> String {
+        // Whether the name was generated.
         let numbered = name
             .strip_prefix('k')
             .is_some_and(|rest| rest.chars().all(|c| c.is_ascii_digit()));
@@ -115,6 +127,7 @@ impl PrecomputedValues {
     }
 }
 
+/// Replaces a name if it has a new one.
 fn replace_name(renamed: &BTreeMap<String, String>, name: &mut String) {
     if let Some(new) = renamed.get(name) {
         new.clone_into(name);
@@ -122,7 +135,7 @@ fn replace_name(renamed: &BTreeMap<String, String>, name: &mut String) {
 }
 
 impl CodeStatement {
-    /// Calls `change` for every name that it reads.
+    /// Calls `change` for every name that the statement reads.
     fn rename(&mut self, change: &dyn Fn(&mut String)) {
         match self {
             Self::Section(_) => {}

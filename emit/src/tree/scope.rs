@@ -1,4 +1,4 @@
-//! Names of a module's variables: those of the model file where they can be, and none twice.
+//! Names of the variables of a module: those of the model file where possible, all different.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -12,7 +12,7 @@ use super::CodeExpression;
 use super::pose::SharedPose;
 use super::sections::CodeSections;
 
-/// Words that stand in every routine, in whatever language, and names of modules that a variable would meet.
+/// Words that occur in the routines of any language, and names of items that a variable would shadow or match.
 const WORDS: [&str; 42] = [
     "n",
     "angles",
@@ -58,24 +58,27 @@ const WORDS: [&str; 42] = [
     "T",
 ];
 
-/// What the variables of a model are called.
+/// The names of a model's variables, and what is known of them.
 #[derive(Clone, Debug)]
 pub(crate) struct NameScope {
+    /// Names of inputs.
     atoms: BTreeMap<Atom, String>,
+    /// Names that are taken in every program.
     taken: BTreeSet<String>,
-    /// What values with names are, where there is something to say.
+    /// Comments on named values.
     notes: BTreeMap<String, String>,
-    /// What values of programs mean.
+    /// Known quantities, by which values of programs are named.
     pub(crate) meanings: NamedQuantities,
-    /// Inputs that stand with the other sign under their names.
+    /// Inputs whose name stands for the negative.
     turned: BTreeSet<Atom>,
-    /// What names belong to, for headings.
+    /// Sections of names, for headings.
     pub(super) sections: CodeSections,
-    /// What the programs share of the pose, if it is written apart.
+    /// The shared part of the pose, if it is a struct of its own.
     pub(crate) pose: Option<Box<SharedPose>>,
 }
 
 impl NameScope {
+    /// Names of all inputs, without a shared pose.
     pub(crate) fn new(derivation: &Derivation) -> Self {
         let mechanism = &derivation.mechanism;
         let mut scope = Self {
@@ -87,6 +90,7 @@ impl NameScope {
             sections: CodeSections::new(derivation),
             pose: None,
         };
+        // Names of the model file come first, so that generated ones give way.
         let coordinates = || mechanism.coordinates.iter().enumerate();
         for (i, c) in mechanism.constants.iter().enumerate() {
             scope.add_name(Atom::Constant(i), &c.name);
@@ -101,6 +105,7 @@ impl NameScope {
             scope.add_name(Atom::Rate(i), &format!("{}_d", c.name));
             scope.add_name(Atom::Acceleration(i), &format!("{}_dd", c.name));
         }
+        // Base parameters are called as on the page.
         for k in 0..derivation.reduction.retained.len() {
             scope.add_name(Atom::Base(k), &format!("p{}_min", k + 1));
         }
@@ -111,20 +116,23 @@ impl NameScope {
         scope
     }
 
+    /// Adds an input under the wanted name or a similar one.
     fn add_name(&mut self, atom: Atom, name: &str) {
         let name = unique_name(name, &mut self.taken);
         self.atoms.insert(atom, name);
     }
 
-    /// The same with what the programs share of the pose written apart.
+    /// As `new`, with the shared part of the pose as a struct of its own.
     pub(crate) fn with_pose(derivation: &Derivation) -> Self {
         let mut scope = Self::new(derivation);
         scope.pose = SharedPose::new(derivation, &mut scope).map(Box::new);
         scope
     }
 
-    /// Takes a value that stands for an input, with its number at the state of [`Self::meanings`].
+    /// Adds a shared value as an input of programs; `number` is its value at the state of [`Self::meanings`], by which
+    /// it is recognised.
     pub(super) fn add_shared(&mut self, atom: Atom, value: &CodeExpression, number: f64) {
+        // The name may stand for the negative.
         let (name, turned) = match value {
             CodeExpression::Neg(a) => (&**a, true),
             a => (a, false),
@@ -139,7 +147,7 @@ impl NameScope {
         self.meanings.insert(atom, number);
     }
 
-    /// What stands for an input.
+    /// The expression of an input, with its sign.
     pub(super) fn input_expression(&self, atom: Atom) -> CodeExpression {
         let name = CodeExpression::name(self.input_name(atom));
         if self.turned.contains(&atom) {
@@ -149,14 +157,15 @@ impl NameScope {
         }
     }
 
-    /// What an input is called.
+    /// The name of an input; empty if it has none.
     pub(crate) fn input_name(&self, atom: Atom) -> &str {
         self.atoms.get(&atom).map_or("", String::as_str)
     }
 
-    /// Whether a name is that of a coordinate, rate or acceleration.
+    /// Whether a name is that of a coordinate, a rate or an acceleration.
     pub(super) fn is_input(&self, name: &str) -> bool {
         self.atoms.iter().any(|(atom, other)| {
+            // Inputs of the state only.
             let of_state = matches!(
                 atom,
                 Atom::Coordinate(_) | Atom::Rate(_) | Atom::Acceleration(_)
@@ -165,12 +174,12 @@ impl NameScope {
         })
     }
 
-    /// What a value with a name is, for the reader.
+    /// The comment on a named value.
     pub(super) fn value_note(&self, name: &str) -> Option<String> {
         self.notes.get(name).cloned()
     }
 
-    /// Names that are taken in a program: those of what is shared only where some of that is read.
+    /// Names that are taken in a program; those of the shared pose only if the program reads any of it.
     pub(super) fn reserved_names_in(&self, program: &StraightLineProgram) -> BTreeSet<String> {
         let mut taken = self.taken.clone();
         let is_shared = |op: &ProgramOp| matches!(op, ProgramOp::Input(Atom::Shared(_)));
@@ -182,21 +191,23 @@ impl NameScope {
         taken
     }
 
-    /// Names that are taken everywhere.
+    /// Names that are taken in every program.
     pub(super) fn reserved_names(&self) -> &BTreeSet<String> {
         &self.taken
     }
 }
 
-/// Notes on values with a name: their numbered equations on the page of the model, and the links that they belong to.
+/// Comments on named values: the number of their equation on the page of the model.
 fn value_notes(derivation: &Derivation) -> BTreeMap<String, String> {
     let mechanism = &derivation.mechanism;
     let mut notes = BTreeMap::new();
+    // Tags count as on the page: closure equations first, then determinants.
     let n_gaps = derivation.loop_gap_count();
     for k in 0..derivation.loop_determinant_count() {
         let tag = format!("eq. (L{})", n_gaps + k + 1);
         notes.insert(format!("Delta_{}", k + 1), tag);
     }
+    // Per linear drive: its length, then the entries of its Jacobian that are not zero.
     let mut tag = 0;
     for (d, drive) in mechanism.drives.iter().enumerate() {
         if !matches!(drive.kind, DriveKind::Linear { .. }) {
@@ -213,7 +224,7 @@ fn value_notes(derivation: &Derivation) -> BTreeMap<String, String> {
     notes
 }
 
-/// A name near the wanted one that nothing else has.
+/// The wanted name with underscores appended until it is free.
 pub(super) fn unique_name(wanted: &str, taken: &mut BTreeSet<String>) -> String {
     let mut name = wanted.to_owned();
     while !taken.insert(name.clone()) {

@@ -1,4 +1,6 @@
-//! Headings of a program, for the reader: loops, drives, motion of the links, their wrenches, forces.
+//! Sections of a program, printed as headings: loops, drives, motion of the links, their wrenches, forces.
+//!
+//! Names of values decide their sections; a value without a name belongs to the section that needs it first.
 
 use std::collections::BTreeMap;
 
@@ -8,43 +10,51 @@ use modelmill_spec::DriveKind;
 
 use super::build::NamedValue;
 
-/// Programs of more statements are put in the order that suits machines; their parts of the mechanism are mixed.
+/// Programs of more statements have no sections: they are ordered for speed, which mixes the parts of the mechanism.
 const MOST_STATEMENTS: usize = 150;
 
-/// Which name belongs where; what stands nowhere stands where it is needed first.
+/// The headings, and the section of each name.
 #[derive(Clone, Debug)]
 pub(crate) struct CodeSections {
+    /// Heading of each section, in order of the text; the first one is empty.
     headings: Vec<String>,
+    /// Section by name.
     names: BTreeMap<String, usize>,
 }
 
-/// The section of the loops.
+/// Index of the section of the loops.
 const LOOPS: usize = 1;
 
+/// Ends of the names of components.
 const AXES: [&str; 3] = ["x", "y", "z"];
 
 impl CodeSections {
+    /// Sections in the order of the recursion, with all names that belong to them.
     pub(super) fn new(derivation: &Derivation) -> Self {
         let mechanism = &derivation.mechanism;
         let mut sections = Self {
             headings: vec![String::new()],
             names: BTreeMap::new(),
         };
+        // Loops come first, with the positions of all points.
         let closes = sections.add(closure_heading(derivation));
         for k in 0..derivation.loop_determinant_count() {
             sections.names.insert(format!("Delta_{}", k + 1), closes);
         }
+        // Positions of points, from the base and from their frames.
         for point in &mechanism.points {
             let frame = &mechanism.frames[point.frame.0].name;
             for of in [point.name.clone(), format!("{frame}_{}", point.name)] {
                 sections.assign_section("r", &of, "", closes);
             }
         }
+        // Tags of the drives' equations count as on the page.
         let mut tag = 0;
         for (d, drive) in mechanism.drives.iter().enumerate() {
             let DriveKind::Linear { from, to } = drive.kind else {
                 continue;
             };
+            // First and last equation of the drive on the page.
             let first = tag + 1;
             tag += 1 + derivation.coordinates_that_move(d).len();
             let along = sections.add(format!(
@@ -69,8 +79,10 @@ impl CodeSections {
                 sections.names.insert(name, along);
             }
         }
+        // Names of motions, by what they are.
         let rates = sections.add("Rates of the links.".to_owned());
-        let accelerations = sections.add("Accelerations of the links, less gravity.".to_owned());
+        let accelerations = sections.add("Accelerations of the links, minus gravity.".to_owned());
+        // Motion of each frame.
         for frame in &mechanism.frames {
             sections.assign_section("omega", &frame.name, "", rates);
             sections.assign_section("omega", &frame.name, "_sq", rates);
@@ -80,6 +92,7 @@ impl CodeSections {
             let along = format!("{}_{parent}", frame.name);
             sections.assign_section("a", &along, "", accelerations);
         }
+        // Computed coordinates: positions, sines and cosines with the loops, rates and accelerations with the links.
         for coordinate in &mechanism.coordinates {
             for name in ["", "c_", "s_"].map(|letter| format!("{letter}{}", coordinate.name)) {
                 sections.names.insert(name, closes);
@@ -94,7 +107,7 @@ impl CodeSections {
                 .names
                 .insert(format!("{}_dd", coordinate.name), accelerations);
         }
-        // From the ends to the base, as wrenches are carried.
+        // From the last link to the base, the direction in which wrenches are summed.
         for frame in mechanism.frames.iter().rev() {
             let text = format!("Link {}: balances of forces and moments.", frame.name);
             let wrench = sections.add(text);
@@ -106,15 +119,18 @@ impl CodeSections {
                 }
             }
         }
+        // The forces are the last section.
         sections.add("Forces of the drives.".to_owned());
         sections
     }
 
+    /// Appends a section and returns its index.
     fn add(&mut self, heading: String) -> usize {
         self.headings.push(heading);
         self.headings.len() - 1
     }
 
+    /// Assigns the three components of a vector to a section.
     fn assign_section(&mut self, letter: &str, of: &str, suffix: &str, section: usize) {
         for axis in AXES {
             self.names
@@ -122,18 +138,18 @@ impl CodeSections {
         }
     }
 
-    /// The section of the forces, which is the last.
+    /// Index of the section of the drives' forces, the last one.
     pub(super) fn force_section(&self) -> usize {
         self.headings.len() - 1
     }
 
-    /// The heading of a section, if it has one.
+    /// Heading of a section; `None` for the first one.
     pub(super) fn heading(&self, section: usize) -> Option<&str> {
         let heading = self.headings.get(section)?;
         (!heading.is_empty()).then_some(heading)
     }
 
-    /// The section of each value of a program, with results in `last`; none where it is long.
+    /// The section of each value of a program, with outputs in `last`; `None` if the program is too long.
     pub(super) fn value_sections(
         &self,
         program: &StraightLineProgram,
@@ -141,25 +157,30 @@ impl CodeSections {
         named: &BTreeMap<usize, NamedValue>,
         last: Option<usize>,
     ) -> Option<Vec<usize>> {
+        // Long programs are ordered for speed.
         let n = program.ops.len();
         let moving = |i: &usize| program.stages[*i] == ProgramStage::State;
         if (0..n).filter(moving).filter(|i| !inside[*i]).count() > MOST_STATEMENTS {
             return None;
         }
-        // What nothing asks for stands where its operands do.
+        // Backwards: each value belongs to the earliest section that needs it. A value without users follows its
+        // operands.
         let mut sections: Vec<Option<usize>> = vec![None; n];
+        // Outputs belong to the last section.
         for value in &program.outputs {
             sections[value.index()] = last;
         }
         for guard in &program.guards {
+            // Radicands belong to the loops.
             if let PoseGuard::Reachable(value) = guard {
                 sections[value.index()] = Some(LOOPS);
             }
         }
         let earlier = |a: Option<usize>, b: Option<usize>| a.into_iter().chain(b).min();
         for i in (0..n).rev() {
+            // The section of its name, if it has one.
             let own = named.get(&i).and_then(|named| self.names.get(&named.name));
-            // Quotients take long: they begin as soon as they can.
+            // Divisions have a long latency, so they start as early as possible.
             let quotient = matches!(program.ops[i], ProgramOp::Div(..)) && !named.contains_key(&i);
             let own = own.copied().or(quotient.then_some(0));
             sections[i] = earlier(sections[i], own);
@@ -167,6 +188,7 @@ impl CodeSections {
                 sections[v.index()] = earlier(sections[v.index()], sections[i]);
             });
         }
+        // Forwards: a value cannot come before its operands.
         let mut sections: Vec<usize> = sections
             .into_iter()
             .map(Option::unwrap_or_default)
@@ -184,7 +206,7 @@ impl CodeSections {
     }
 }
 
-/// What is said of the loops.
+/// The heading of the loops: their names and the tags of their equations; empty without loops.
 fn closure_heading(derivation: &Derivation) -> String {
     let n_gaps = derivation.loop_gap_count();
     let names: Vec<String> = (derivation.mechanism)

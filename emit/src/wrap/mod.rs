@@ -1,6 +1,11 @@
-//! Crates that bring a model to other languages: the emitted module, a face for the language, and a manifest.
+//! Crates that make a model available to other languages: the emitted module, an interface for the language, and a
+//! manifest.
 //!
-//! The face is the only code with `unsafe`; the module beside it is the one that [`crate::emit`] makes.
+//! The interface is the only code with `unsafe`; the module next to it is the one that [`super::emit`] writes.
+//!
+//! Decision: such a crate carries the source of the runtime, so that its folder can be moved anywhere. C passes
+//! constants and parameters as arrays with named places, because names of a model file may be keywords there. The
+//! header is written here and not by `cbindgen`, which would not see places, units and expressions.
 
 mod c_abi;
 mod c_header;
@@ -19,22 +24,25 @@ use crate::language::rust::{doc_lines, emit, print_source};
 use crate::language::{EmissionRequest, EmittedFile};
 use crate::tree::uses_load;
 
-/// What faces of all languages need to know of a model.
+/// What the interfaces of all languages read of a model.
 pub(super) struct LanguageBinding<'a> {
+    /// The model.
     pub(super) derivation: &'a Derivation,
-    /// The equation of motion, if that is wanted.
+    /// The equation of motion, if it is requested.
     pub(super) dynamics: Option<&'a DynamicsPrograms>,
     /// Name of the library and prefix of its functions.
     pub(super) name: String,
+    /// Whether the forces of the drives are an input, because an effect depends on them.
     pub(super) load: bool,
-    /// Whether passive coordinates are found by Newton's method.
+    /// Whether the passive coordinates are solved for by Newton's method.
     pub(super) newton: bool,
 }
 
 impl<'a> LanguageBinding<'a> {
-    /// Names that are `reserved` in the other language get `_model` behind them.
+    /// The model with its library name; a name in `reserved` gets the suffix `_model`.
     pub(super) fn new(source: &EmissionRequest<'a>, reserved: &[&str]) -> Self {
         let derivation = source.derivation;
+        // A raw identifier is no name of a file or a C function.
         let module = module_identifier(&derivation.mechanism.name).to_string();
         let mut name = module.trim_start_matches("r#").to_owned();
         if reserved.contains(&name.as_str()) {
@@ -52,36 +60,43 @@ impl<'a> LanguageBinding<'a> {
         }
     }
 
+    /// Number of independent coordinates.
     pub(super) fn n_active(&self) -> usize {
         self.derivation.coordinates().0.len()
     }
 
+    /// Number of passive coordinates.
     pub(super) fn n_passive(&self) -> usize {
         self.derivation.coordinates().1.len()
     }
 
+    /// Number of drives.
     pub(super) fn n_drives(&self) -> usize {
         self.derivation.mechanism.drives.len()
     }
 
+    /// Number of base parameters.
     pub(super) fn n_base(&self) -> usize {
         self.derivation.reduction.retained.len()
     }
 
+    /// Names of the constants, in the order of the file.
     pub(super) fn constants(&self) -> Vec<&str> {
         let constants = &self.derivation.mechanism.constants;
         constants.iter().map(|c| c.name.as_str()).collect()
     }
 
+    /// Names of the dynamic parameters, in the order of the file.
     pub(super) fn parameters(&self) -> Vec<&str> {
         let parameters = &self.derivation.mechanism.parameters;
         parameters.iter().map(|p| p.name.as_str()).collect()
     }
 
-    /// The parts of a state, in order, with how many numbers each has.
+    /// The arrays of a state, in order, with their lengths.
     pub(super) fn state_parts(&self) -> Vec<(Ident, usize)> {
         let n = self.n_active();
         let mut parts = vec![("q", n), ("qd", n), ("qdd", n)];
+        // Loads are part of the state only if an effect reads them.
         if self.load {
             parts.push(("load", self.n_drives()));
         }
@@ -91,8 +106,9 @@ impl<'a> LanguageBinding<'a> {
             .collect()
     }
 
-    /// The emitted module as a file.
+    /// The emitted module as a file, with the equation of motion if it is requested.
     pub(super) fn emitted_module(&self) -> EmittedFile {
+        // Reactions and self-test are not part of interfaces.
         let mut emitted = emit(self.derivation);
         if let Some(dynamics) = self.dynamics {
             emitted = emitted.with_dynamics(self.derivation, dynamics);
@@ -103,7 +119,8 @@ impl<'a> LanguageBinding<'a> {
         }
     }
 
-    /// A function that makes `Geometry` or `Parameters` of an array, and its inverse.
+    /// A function that converts an array to `Geometry` or `Parameters`, and one that returns the default values as an
+    /// array.
     pub(super) fn record_functions(function: &str, record: &str, names: &[&str]) -> TokenStream {
         let (from, to) = (
             format_ident!("{function}"),
@@ -112,6 +129,7 @@ impl<'a> LanguageBinding<'a> {
         let record = format_ident!("{record}");
         let n = names.len();
         let fields: Vec<Ident> = names.iter().map(|name| field_identifier(name)).collect();
+        // Position k of the array belongs to field k.
         let places = 0..n;
         quote! {
             fn #from(values: &[f64; #n]) -> model::#record<f64> {
@@ -130,7 +148,7 @@ impl<'a> LanguageBinding<'a> {
     }
 }
 
-/// Source of a file that begins with a comment for its reader.
+/// A source file that begins with a documentation comment.
 pub(super) fn source_file(path: &str, doc: &str, items: &TokenStream) -> EmittedFile {
     let doc = doc_lines(doc, true);
     EmittedFile {

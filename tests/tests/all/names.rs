@@ -76,7 +76,10 @@ fn all_definitions() -> [Vec<Definition>; 2] {
                 if !SKIPPED.contains(&name.as_str()) && !name.starts_with('.') {
                     open.push(path);
                 }
-            } else if path.extension().is_some_and(|e| e == "rs") && name != "tests.rs" && !name.ends_with("_tests.rs") {
+            } else if path.extension().is_some_and(|e| e == "rs")
+                && name != "tests.rs"
+                && !name.ends_with("_tests.rs")
+            {
                 let text = fs::read_to_string(&path).expect("a source file");
                 let file = path
                     .strip_prefix(&root)

@@ -1,4 +1,4 @@
-//! The header: what the model has, and what is to be had of it.
+//! The C header: names and sizes of the model, and the functions of the source.
 
 use std::fmt::Write as _;
 
@@ -6,32 +6,35 @@ use super::statements::{CSyntax, comment};
 use super::{CFunction, TranslationUnit};
 use crate::language::syntax::LanguageSyntax;
 
-/// What functions return, with its name after the prefix, and its meaning.
+/// Status codes in the order of their values: name after the prefix, and meaning.
 const STATUS: [(&str, &str); 6] = [
-    ("OK", "all is well"),
+    ("OK", "no error"),
     (
         "OUT_OF_REACH",
         "the loops cannot close: the pose is out of reach",
     ),
     ("SINGULAR", "the pose is singular"),
-    ("UNDEFINED", "a term of the model has no finite value there"),
     (
-        "NOT_FINITE",
-        "an input is no number, or too large to compute with",
+        "UNDEFINED",
+        "a term of the model has no finite value at this state",
     ),
+    ("NOT_FINITE", "an input is NaN, infinite, or above 1e60"),
     (
         "SPECIAL",
-        "base parameters divide by what vanishes for this geometry",
+        "a denominator of the base parameters is zero for this geometry",
     ),
 ];
 
+/// The text of the header.
 #[allow(clippy::too_many_lines, reason = "one text from top to bottom")]
 pub(super) fn header(unit: &TranslationUnit<'_>) -> String {
     let TranslationUnit { name, upper, .. } = unit;
     let derivation = unit.source.derivation;
     let mechanism = &derivation.mechanism;
+    // Names that C allows.
     let c = CSyntax { name, upper };
     let mut text = String::new();
+    // Text of the model file may contain the end of a comment.
     let title = comment(mechanism.title.as_deref().unwrap_or(&mechanism.name));
     _ = write!(
         text,
@@ -39,7 +42,7 @@ pub(super) fn header(unit: &TranslationUnit<'_>) -> String {
  *
  * Inverse dynamics tau = H_min(q, q', q'') p_min, written by modelmill; do not edit.
  *
- * Prepare once, then call; nothing allocates or locks, and all of it is reentrant:
+ * Prepare once, then call. No function allocates or locks; all functions are reentrant:
  *
  *     {name}_geometry geometry;
  *     {name}_parameters parameters;
@@ -51,8 +54,8 @@ pub(super) fn header(unit: &TranslationUnit<'_>) -> String {
  *     {name}_prepare(&dynamics, &geometry, base);
  *     status = {name}_inverse_dynamics(&dynamics, {}, forces);
  *
- * SI units. Arrays have as many numbers as coordinates (q, qd, qdd) or drives (forces, load); functions return a status, and
- * write results only when it is OK. Links with the library of mathematics (-lm). */
+ * SI units. Arrays have as many numbers as coordinates (q, qd, qdd) or drives (forces, load). Functions return a status and
+ * write results only if it is OK. Link with the math library (-lm). */
 #ifndef {upper}_H
 #define {upper}_H
 
@@ -63,6 +66,7 @@ extern \"C\" {{
 ",
         unit.state_arguments()
     );
+    // Sizes, then status codes, then names of positions in the arrays.
     for (what, n) in [
         ("ACTIVE", unit.n_active()),
         ("PASSIVE", unit.n_passive()),
@@ -71,12 +75,14 @@ extern \"C\" {{
     ] {
         _ = writeln!(text, "#define {upper}_N_{what} {n}");
     }
-    text.push_str("\n/* What functions return. */\n");
+    text.push_str("\n/* Status codes. */\n");
     for (k, (status, meaning)) in STATUS.iter().enumerate() {
         _ = writeln!(text, "#define {upper}_{status} {k} /* {meaning} */");
     }
+    // Coordinates in the order of `q` and of the passive ones.
     let (active, passive) = derivation.coordinates();
     let coordinate = |i: &usize| mechanism.coordinates[*i].name.as_str();
+    // One constant per name: its position in the array.
     let mut places = |what: &str, prefix: &str, names: Vec<&str>| {
         if names.is_empty() {
             return;
@@ -102,6 +108,7 @@ extern \"C\" {{
         mechanism.drives.iter().map(|d| d.name.as_str()).collect(),
     );
     text.push_str("\n/* Base parameters, in order, eq. (16).\n");
+    // One line per base parameter: name, expression and unit.
     for base in derivation.base_parameters() {
         _ = writeln!(
             text,
@@ -112,11 +119,14 @@ extern \"C\" {{
         );
     }
     text.push_str(" */\n");
+    // A struct of named quantities with their units as comments.
     let mut record = |what: &str, name: &str, fields: Vec<(&str, &str)>| {
         _ = writeln!(text, "\n/* {what} */\ntypedef struct {{");
+        // C has no empty structs.
         if fields.is_empty() {
             text.push_str("    double nothing;\n");
         }
+        // The unit of each field is its comment.
         for (field, measure) in fields {
             _ = writeln!(
                 text,
@@ -147,11 +157,12 @@ extern \"C\" {{
     );
     _ = writeln!(
         text,
-        "\n/* A prepared model: what depends on geometry and base parameters alone. */\ntypedef struct {{\n    int input;\n    \
+        "\n/* A prepared model: values that depend only on geometry and base parameters. */\ntypedef struct {{\n    int input;\n    \
          {name}_geometry geometry;\n    double base[{}];\n    double once[{}];",
         unit.n_base().max(1),
         unit.once.kept.len().max(1)
     );
+    // Loops without closed form store their scale and the solution at the nominal pose.
     if unit.newton {
         _ = writeln!(
             text,
@@ -166,21 +177,24 @@ extern \"C\" {{
 void {name}_default_geometry({name}_geometry *geometry);
 void {name}_nominal_parameters({name}_parameters *parameters);
 
-/* Base parameters of physical ones, eq. (16). */
+/* Base parameters from physical parameters, eq. (16). */
 int {name}_base_parameters(const {name}_geometry *geometry, const {name}_parameters *parameters, double *base);
 
-/* Computes what depends on geometry and base parameters alone; says what is wrong with them, as all functions then do. */
+/* Computes what depends only on geometry and base parameters. If they are invalid, this and all other functions return the
+ * status. */
 int {name}_prepare({name}_dynamics *dynamics, const {name}_geometry *geometry, const double *base);"
     );
+    // The solution for the passive coordinates is a function of its own.
     if unit.newton {
         _ = writeln!(
             text,
             "
-/* Passive coordinates of a pose, followed from the nominal pose; or from those of a pose near by, which they replace. */
+/* Passive coordinates of a pose, followed from the nominal pose; `_near`: from those of a nearby pose, which are replaced. */
 int {name}_passive_position(const {name}_dynamics *dynamics, const double *q, double *passive);
 int {name}_passive_position_near(const {name}_dynamics *dynamics, const double *q, double *passive);"
         );
     }
+    // Each public function with its documentation and its operations per state.
     for function in unit.functions.iter().filter(|f| f.is_public) {
         _ = writeln!(
             text,
@@ -190,24 +204,26 @@ int {name}_passive_position_near(const {name}_dynamics *dynamics, const double *
         );
         _ = writeln!(text, "{};", signature(unit, function, "dynamics", false));
         if function.follows {
-            text.push_str("/* The same from the passive coordinates of a pose near by, which become those of this state. */\n");
+            text.push_str("/* The same, starting from the passive coordinates of a nearby pose, which are replaced by those of this state. */\n");
             _ = writeln!(text, "{};", signature(unit, function, "dynamics", true));
         }
     }
+    // The equation of motion, if it is requested.
     if unit.source.dynamics.is_some() {
-        text.push_str("\n/* c + g + e alone. */\n");
+        text.push_str("\n/* c + g + e only. */\n");
         for near in bias_variants(unit) {
             _ = writeln!(text, "{};", bias_declaration(unit, *near));
         }
         _ = writeln!(
             text,
-            "\n/* Forward dynamics: accelerations under given forces of the drives; those of the state are not read. */\n{};",
+            "\n/* Forward dynamics: accelerations under given forces of the drives. Accelerations of the state are not read. */\n{};",
             forward_dynamics_declaration(unit)
         );
     }
+    // The outputs of the reactions are listed, because some components may be missing.
     if let (Some((function, once)), Some(reactions)) = (&unit.reactions, unit.source.reactions) {
         text.push_str(
-            "\n/* What the joints transmit to the side away from the base: in order, with what is not determined left out.\n",
+            "\n/* Forces and moments that the joints transmit to the side away from the base, in order; undetermined components are left out.\n",
         );
         for (k, of) in source_names(reactions).iter().enumerate() {
             _ = writeln!(text, " * {k}: {}", comment(of));
@@ -232,13 +248,15 @@ int {name}_prepare_reactions({name}_reactions *reactions, const {name}_geometry 
             _ = writeln!(text, "{};", signature(unit, function, "reactions", true));
         }
     }
+    // The self-test, if it is requested.
     if unit.columns.is_some() {
         _ = writeln!(
             text,
             "
-/* Holds the base parameters against all parameters at random states around the nominal pose: 0 if H and H_min have rank
- * {upper}_N_BASE and H p = H_min p_min; 1 if too few states have an answer; 2 for the rank of H_min; 3 for that of H; 4 if
- * H_min p_min differs; 5 if the inverse dynamics differ; 6 if base parameters divide by what vanishes for this geometry. */
+/* Compares the base parameters with all parameters at random states around the nominal pose. Returns 0 if H and H_min have
+ * rank {upper}_N_BASE and H p = H_min p_min; 1 if too few states have a solution; 2 if the rank of H_min is wrong; 3 if that of
+ * H is wrong; 4 if H_min p_min differs from H p; 5 if the inverse dynamics differ from H p; 6 if a denominator of the base
+ * parameters is zero for this geometry. */
 int {name}_self_test(const {name}_geometry *geometry);"
         );
     }
@@ -246,9 +264,10 @@ int {name}_self_test(const {name}_geometry *geometry);"
     text
 }
 
-/// What each output of the reactions is.
+/// The meaning of each output of the reactions, with its axis.
 fn source_names(reactions: &modelmill_codegen::ReactionPrograms) -> Vec<String> {
     let mut names = vec![String::new(); reactions.program.outputs.len()];
+    // The three components of a vector.
     let mut name = |what: &str, of: &str, places: &[Option<usize>; 3]| {
         for (place, axis) in places.iter().zip(["x", "y", "z"]) {
             if let Some(name) = place.and_then(|k| names.get_mut(k)) {
@@ -256,17 +275,19 @@ fn source_names(reactions: &modelmill_codegen::ReactionPrograms) -> Vec<String> 
             }
         }
     };
+    // Each joint has a force and a moment.
     for joint in &reactions.joints {
         name("force in joint", &joint.name, &joint.force);
         name("moment in joint", &joint.name, &joint.moment);
     }
+    // Loops follow the joints.
     for closed in &reactions.loops {
         name("force that closes loop", &closed.name, &closed.force);
     }
     names
 }
 
-/// How a function is declared.
+/// The declaration of a function of one state.
 pub(super) fn signature(
     unit: &TranslationUnit<'_>,
     function: &CFunction<'_>,
@@ -276,6 +297,7 @@ pub(super) fn signature(
     declaration(unit, function.name, owner, near, function.result)
 }
 
+/// A declaration with the arguments that all functions of a state share; `near` adds the passive coordinates.
 fn declaration(
     unit: &TranslationUnit<'_>,
     what: &str,
@@ -284,6 +306,7 @@ fn declaration(
     result: &str,
 ) -> String {
     let name = &unit.name;
+    // The guess is an argument that is overwritten.
     let (suffix, passive) = if near {
         ("_near", ", double *passive")
     } else {
@@ -295,8 +318,9 @@ fn declaration(
     )
 }
 
-/// Whether the bias forces come from the nominal pose, and from a pose near by.
+/// Which forms the function `bias` has: without guess, and with a guess if its program follows the loops.
 pub(super) fn bias_variants(unit: &TranslationUnit<'_>) -> &'static [bool] {
+    // The program of the bias.
     let follows = |f: &CFunction<'_>| f.name == "bias_and_drives" && f.follows;
     if unit.functions.iter().any(follows) {
         &[false, true]
@@ -305,12 +329,12 @@ pub(super) fn bias_variants(unit: &TranslationUnit<'_>) -> &'static [bool] {
     }
 }
 
-/// How the bias forces are declared.
+/// The declaration of `bias`.
 pub(super) fn bias_declaration(unit: &TranslationUnit<'_>, near: bool) -> String {
     declaration(unit, "bias", "dynamics", near, "bias")
 }
 
-/// How forward dynamics are declared.
+/// The declaration of `forward`.
 pub(super) fn forward_dynamics_declaration(unit: &TranslationUnit<'_>) -> String {
     let name = &unit.name;
     format!(

@@ -1,5 +1,5 @@
-/* Newton's method on the loops: every step must shrink to a quarter of the one before; where that fails, the motion from the
- * known pose is divided into shorter strides, which keeps to the assembly mode (Deuflhard 2004, sections 2.1 and 5.1). */
+/* Newton's method on the loops: each step must be at most a quarter of the previous one. Where that fails, the motion from the
+ * known pose is divided into shorter strides, which keeps the assembly mode (Deuflhard 2004, sections 2.1 and 5.1). */
 typedef struct {
     int steps, contracts;
     double enough;
@@ -49,7 +49,7 @@ static int NAME_newton(const NAME_model *self, const double *q, double *passive,
             *contraction = size / first;
         if (!rule.contracts && size > longest)
             cut = longest / size;
-        /* Closed loops whose passive coordinates still run away do not determine them. */
+        /* The loops are closed, but the passive coordinates still change: the loops do not determine them. */
         if (cut * size > longest)
             return closed ? UPPER_SINGULAR : UPPER_OUT_OF_REACH;
         for (i = 0; i < UPPER_N_PASSIVE; i++)

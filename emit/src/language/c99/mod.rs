@@ -13,7 +13,7 @@ use modelmill_codegen::{PassivePosition, StraightLineProgram};
 use super::{EmissionRequest, EmittedFile};
 use crate::identifier::module_identifier;
 use crate::tree::{NameScope, PrecomputedValues, StatementRoutine, reads_passive, uses_load};
-/// Names whose headers the C library has itself, and `main`.
+/// Names of standard headers, which `#include` would find instead, and `main`.
 pub(crate) const RESERVED: [&str; 30] = [
     "assert",
     "complex",
@@ -47,7 +47,7 @@ pub(crate) const RESERVED: [&str; 30] = [
     "main",
 ];
 
-/// The header and the source.
+/// The header and the source, named after the model.
 pub(crate) fn emit_sources(source: &EmissionRequest<'_>) -> Vec<EmittedFile> {
     let unit = TranslationUnit::new(source);
     let file = |suffix: &str, text: String| EmittedFile {
@@ -60,35 +60,45 @@ pub(crate) fn emit_sources(source: &EmissionRequest<'_>) -> Vec<EmittedFile> {
     ]
 }
 
-/// What is printed.
+/// All that header and source are printed from.
 struct TranslationUnit<'a> {
+    /// The request, with the derivation.
     source: &'a EmissionRequest<'a>,
+    /// Names of all values.
     scope: NameScope,
-    /// Prefix of everything, and its capitals.
+    /// Prefix of functions and structs.
     name: String,
+    /// Prefix of constants.
     upper: String,
+    /// Whether the forces of the drives are an input.
     load: bool,
+    /// Whether the passive coordinates are solved for by Newton's method.
     newton: bool,
-    /// Programs of the geometry and the base parameters, and what they compute once.
+    /// Programs that read geometry and base parameters.
     functions: Vec<CFunction<'a>>,
+    /// Their common precomputed values.
     once: PrecomputedValues,
-    /// The reactions, and what they compute once.
+    /// The program of the reactions with its own precomputed values.
     reactions: Option<(CFunction<'a>, PrecomputedValues)>,
-    /// H for all products, for the self-test.
+    /// The regressor H for all products, for the self-test, with its own precomputed values.
     columns: Option<(CFunction<'a>, PrecomputedValues)>,
 }
 
-/// A program with its statements.
+/// A program with the C function that it becomes.
 struct CFunction<'a> {
+    /// The program; its operations are counted for the header.
     program: &'a StraightLineProgram,
+    /// Name without prefix.
     name: &'static str,
+    /// Documentation without a full stop; empty for functions that are not public.
     doc: String,
-    /// What its results are called in declarations.
+    /// Name of the result in the declaration.
     result: &'static str,
+    /// Its statements.
     routine: StatementRoutine,
-    /// Whether it reads passive coordinates that are found first.
+    /// Whether it reads passive coordinates that Newton's method has to solve for.
     follows: bool,
-    /// Whether it may be called from outside.
+    /// Whether the header declares it.
     is_public: bool,
 }
 
@@ -101,6 +111,7 @@ impl<'a> TranslationUnit<'a> {
         let derivation = source.derivation;
         let mechanism = &derivation.mechanism;
         let scope = NameScope::new(derivation);
+        // The unit is named after the model, with a suffix if the name is reserved.
         let module = module_identifier(&mechanism.name).to_string();
         let mut name = module.trim_start_matches("r#").to_owned();
         if RESERVED.contains(&name.as_str()) || statements::is_reserved(&name) {
@@ -109,6 +120,7 @@ impl<'a> TranslationUnit<'a> {
         let programs = &derivation.programs;
         let (active, passive) = derivation.coordinates();
         let of_coordinate = |i: &usize| mechanism.coordinates[*i].name.clone();
+        // A public function from a program, with names for its outputs.
         let function =
             |program: &'a StraightLineProgram, name, doc: String, result, outputs: Vec<String>| {
                 let routine = StatementRoutine::new(program, &scope, &outputs);
@@ -123,12 +135,14 @@ impl<'a> TranslationUnit<'a> {
                     is_public: true,
                 }
             };
+        // Names such as `l_left` and `l_left_d`, one per drive.
         let each = |letter: &str, suffix: &str| -> Vec<String> {
             let drives = mechanism.drives.iter();
             drives
                 .map(|d| format!("{letter}_{}{suffix}", d.name))
                 .collect()
         };
+        // Lengths, rates, then the Jacobian row by row: the order of the program's outputs.
         let mut of_motion = each("l", "");
         of_motion.extend(each("l", "_d"));
         for drive in &mechanism.drives {
@@ -138,6 +152,7 @@ impl<'a> TranslationUnit<'a> {
                     .map(|a| format!("J_{}_{}", drive.name, of_coordinate(a))),
             );
         }
+        // Functions that every model has.
         let mut functions = vec![
             function(
                 &programs.inverse_dynamics,
@@ -162,6 +177,7 @@ impl<'a> TranslationUnit<'a> {
                 of_motion,
             ),
         ];
+        // Only mechanisms with loops have passive coordinates.
         if !passive.is_empty() {
             let names = ["", "_d", "_dd"].iter();
             let names = names.flat_map(|suffix| passive.iter().map(move |p| (p, suffix)));
@@ -175,33 +191,42 @@ impl<'a> TranslationUnit<'a> {
                     .collect(),
             ));
         }
+        // The terms of the equation of motion.
         if let Some(dynamics) = source.dynamics {
             let accelerations = "accelerations are not read";
             for (program, name, doc, result) in [
-                (&dynamics.mass_matrix, "mass_matrix", format!("M row by row; {accelerations}"), "matrix"),
+                (
+                    &dynamics.mass_matrix,
+                    "mass_matrix",
+                    format!("M row by row; {accelerations}"),
+                    "matrix",
+                ),
                 (
                     &dynamics.coriolis,
                     "coriolis",
-                    format!("c, generalised forces that rates alone ask for; {accelerations}"),
+                    format!("c, generalised forces that depend on the rates; {accelerations}"),
                     "forces",
                 ),
                 (
                     &dynamics.gravity,
                     "gravity",
-                    "g, generalised forces that weight alone asks for; rates and accelerations are not read".to_owned(),
+                    "g, generalised forces of gravity; rates and accelerations are not read"
+                        .to_owned(),
                     "forces",
                 ),
                 (
                     &dynamics.effects,
                     "effects",
-                    format!("e, generalised forces of effects where nothing accelerates; {accelerations}"),
+                    format!(
+                        "e, generalised forces of the effects at zero acceleration; {accelerations}"
+                    ),
                     "forces",
                 ),
                 (
                     &dynamics.bias,
                     "bias_and_drives",
                     format!(
-                        "c + g + e, at a lower cost than one by one, then the Jacobian of the drives row by row; {accelerations}"
+                        "c + g + e, at a lower cost than the three separately, then the Jacobian of the drives row by row; {accelerations}"
                     ),
                     "bias",
                 ),
@@ -209,6 +234,7 @@ impl<'a> TranslationUnit<'a> {
                 functions.push(function(program, name, doc, result, Vec::new()));
             }
         }
+        // Loops without closed form add residual and scales, which are internal.
         let newton = match &programs.passive_position {
             PassivePosition::Newton(loops) => {
                 for (program, name) in [(&loops.residual, "gaps"), (&loops.scales, "scales")] {
@@ -220,20 +246,23 @@ impl<'a> TranslationUnit<'a> {
             }
             _ => false,
         };
+        // A program with precomputed values of its own.
         let alone = |mut function: CFunction<'a>| {
             let mut once = PrecomputedValues::new(&scope);
             once.absorb(&mut function.routine);
             (function, once)
         };
+        // Reactions read all parameters, and have precomputed values of their own.
         let reactions = source.reactions.map(|reactions| {
             alone(function(
                 &reactions.program,
                 "transmitted",
-                "Forces and moments in the joints, and forces that close loops".to_owned(),
+                "Forces and moments in the joints, and forces in the closures of loops".to_owned(),
                 "wrenches",
                 Vec::new(),
             ))
         });
+        // The self-test compares H_min with all columns.
         let columns = source.self_test.then(|| {
             let mut function = function(
                 &programs.full_regressor,
@@ -245,10 +274,12 @@ impl<'a> TranslationUnit<'a> {
             function.is_public = false;
             alone(function)
         });
+        // All other programs share theirs.
         let mut once = PrecomputedValues::new(&scope);
         for function in &mut functions {
             once.absorb(&mut function.routine);
         }
+        // Constants are in capitals.
         let upper = name.to_uppercase();
         Self {
             source,
@@ -264,46 +295,51 @@ impl<'a> TranslationUnit<'a> {
         }
     }
 
-    /// A template with the names of this unit.
+    /// A template with its placeholders replaced by the prefixes of this unit.
     fn expand_template(&self, template: &str) -> String {
         let text = template.replace("NAME_", &format!("{}_", self.name));
         text.replace("UPPER_", &format!("{}_", self.upper))
     }
 
+    /// Number of independent coordinates.
     fn n_active(&self) -> usize {
         self.source.derivation.coordinates().0.len()
     }
 
+    /// Number of passive coordinates.
     fn n_passive(&self) -> usize {
         self.source.derivation.coordinates().1.len()
     }
 
+    /// Number of drives.
     fn n_drives(&self) -> usize {
         self.source.derivation.mechanism.drives.len()
     }
 
+    /// Number of base parameters.
     fn n_base(&self) -> usize {
         self.source.derivation.reduction.retained.len()
     }
 
-    /// The parts of a state, with how many numbers each has.
+    /// The arrays of a state, in order, with their lengths.
     fn state_parts(&self) -> Vec<(&'static str, usize)> {
         let n = self.n_active();
         let mut parts = vec![("q", n), ("qd", n), ("qdd", n)];
+        // Loads are part of the state only if an effect reads them.
         if self.load {
             parts.push(("load", self.n_drives()));
         }
         parts
     }
 
-    /// Declarations of a state.
+    /// The arrays of a state as parameters of a function.
     fn state_parameters(&self) -> String {
         let parts = self.state_parts().into_iter();
         let parts = parts.map(|(name, _)| format!("const double *{name}"));
         parts.collect::<Vec<String>>().join(", ")
     }
 
-    /// The names of a state as arguments.
+    /// The arrays of a state as arguments of a call.
     fn state_arguments(&self) -> String {
         let parts = self.state_parts().into_iter().map(|(name, _)| name);
         parts.collect::<Vec<&str>>().join(", ")

@@ -12,7 +12,7 @@ static double NAME_between(uint64_t *state, double low, double high)
     return low + (double)(z >> 11) / 9007199254740992.0 * (high - low);
 }
 
-/* Takes a row into the triangle of a QR factorisation, by rotations (Givens 1958). */
+/* Adds a row to the R factor of a QR factorisation, by rotations (Givens 1958). */
 static void NAME_take_row(double *triangle, double *row, int n)
 {
     int k, i;
@@ -28,7 +28,7 @@ static void NAME_take_row(double *triangle, double *row, int n)
     }
 }
 
-/* How many singular values are not zero, with all columns of length 1 (one-sided rotations; Hestenes 1958). */
+/* Number of singular values that are not zero, after scaling all columns to length 1 (one-sided rotations; Hestenes 1958). */
 static int NAME_rank(double *m, int n)
 {
     int sweep, p, q, i, rank = 0, turned = 1;

@@ -1,4 +1,4 @@
-//! A test of the base parameters that goes with the source.
+//! The function `self_test` of the C source, which compares base parameters with all parameters at random states.
 
 use std::fmt::Write as _;
 
@@ -7,10 +7,11 @@ use super::source::{parameter_bindings, single_value};
 use crate::language::syntax::LanguageSyntax;
 use crate::tree::StatementRoutine;
 
-/// The function that draws states, and H for all products.
+/// Appends the test: the regressor H for all products, the numeric helpers, and the function itself.
 #[allow(clippy::too_many_lines, reason = "one text from top to bottom")]
 pub(super) fn self_test(unit: &TranslationUnit<'_>, text: &mut String) {
     let TranslationUnit { name, upper, .. } = unit;
+    // Only if the self-test is requested.
     let Some((function, once)) = &unit.columns else {
         return;
     };
@@ -21,6 +22,7 @@ pub(super) fn self_test(unit: &TranslationUnit<'_>, text: &mut String) {
     let kept = once.kept.len().max(1);
     _ = writeln!(
         text,
+        // H has precomputed values of its own, in a struct of its own.
         "\n#define {upper}_N_PRODUCTS {n_products}
 typedef struct {{
     {name}_geometry geometry;
@@ -38,6 +40,8 @@ typedef struct {{
     text.push_str(&unit.expand_template(include_str!("self_test.c")));
 
     let (active, _) = derivation.coordinates();
+    // Lengths are scaled with the geometry, so that the states stay near the nominal pose of a larger machine.
+    // Whether lengths are in the loops.
     let has_scale = derivation.programs.scale.is_some();
     let is_length = |i: &usize| mechanism.coordinates[*i].motion.is_length();
     let scaled = |i: &usize, value: f64| {
@@ -47,6 +51,7 @@ typedef struct {{
             format!("{value:?}")
         }
     };
+    // Inputs of H: a state, followed by the passive coordinates if Newton's method solves for them.
     let n_active = unit.n_active();
     let n_state: usize = unit.state_parts().iter().map(|(_, n)| n).sum();
     let n_inputs = n_state
@@ -55,6 +60,7 @@ typedef struct {{
         } else {
             0
         };
+    // Declarations of the function's variables come first.
     let mut lines = vec![
         format!("{name}_all_columns all;"),
         format!("{name}_parameters parameters;"),
@@ -79,6 +85,7 @@ typedef struct {{
             "int halving, k, i, d, found = 0, worst = 0; const int needed = 2 * {n_products} + 20;"
         ),
     ];
+    // The scale is computed in a block of its own, because its names may repeat.
     if let Some(program) = &derivation.programs.scale {
         let routine = StatementRoutine::new(program, &unit.scope, &[]);
         let read = routine.read_once.union(&routine.read).copied().collect();
@@ -93,6 +100,7 @@ typedef struct {{
         lines.push("(void)scale;".to_owned());
     }
     let self_test_reach = derivation.self_test_reaches();
+    // Centre, reach and unit of each coordinate's random values.
     for (k, (i, reach)) in active.iter().zip(self_test_reach).enumerate() {
         lines.push(format!(
             "nominal[{k}] = {}; reach_of[{k}] = {}; unit_of[{k}] = {};",
@@ -101,15 +109,19 @@ typedef struct {{
             scaled(i, 1.0)
         ));
     }
+    // Start from the nominal parameters.
     lines.push(format!("{name}_nominal_parameters(&parameters);"));
+    // Parameters are random around their nominal values; a zero is replaced, so that every product counts.
     for parameter in &mechanism.parameters {
         let field = c.name(&parameter.name);
         lines.push(format!(
             "parameters.{field} = {name}_between(&draw, 0.5, 1.5) * (parameters.{field} == 0.0 ? 1.0 : parameters.{field});"
         ));
     }
+    // Values of the products p_g.
     for (k, product) in derivation.reduction.products.iter().enumerate() {
         let mut value = "1.0".to_owned();
+        // A power is a repeated product.
         for (p, n) in &product.0 {
             for _ in 0..*n {
                 _ = write!(
@@ -132,6 +144,7 @@ typedef struct {{
     lines.push(format!(
         "memset(few_triangle, 0, {upper}_N_BASE * {upper}_N_BASE * sizeof(double));"
     ));
+    // The parts of the state are ranges of the inputs.
     let mut at = 0;
     let mut parts = Vec::new();
     for (part, n) in unit.state_parts() {
@@ -139,7 +152,9 @@ typedef struct {{
         at += n;
         _ = part;
     }
+    // The state as arguments of the public functions.
     let arguments = parts.join(", ");
+    // Random loads if an effect depends on them.
     let load = if unit.load {
         format!(
             "\n            for (d = 0; d < {upper}_N_DRIVES; d++)\n                inputs[3 * {n_active} + d] = {name}_between(&random, -50.0, 50.0);"
@@ -147,6 +162,7 @@ typedef struct {{
     } else {
         String::new()
     };
+    // A pose without a solution is skipped.
     let follow = if function.follows {
         format!(
             "\n            if ({name}_passive_position(&dynamics, inputs, inputs + {n_state}) != {upper}_OK)\n                continue;"
@@ -154,6 +170,7 @@ typedef struct {{
     } else {
         String::new()
     };
+    // The reach is halved when too few states had a solution.
     _ = writeln!(
         text,
         "\nint {name}_self_test(const {name}_geometry *geometry)\n{{"
@@ -184,7 +201,7 @@ typedef struct {{
                     reduced += h_min[d * {upper}_N_BASE + i] * base[i];
                     size += fabs(h_min[d * {upper}_N_BASE + i] * base[i]);
                 }}
-                /* What is no number is wrong too. */
+                /* NaN is an error too: every comparison with it is false. */
                 if (worst == 0 && !(fabs(reduced - expected) <= NOTHING * size))
                     worst = 4;
                 if (worst == 0 && !(fabs(forces[d] - expected) <= NOTHING * size))

@@ -1,7 +1,7 @@
 #if defined(FLT_EVAL_METHOD) && FLT_EVAL_METHOD == 0
 /* Sine and cosine within an ulp up to 16 000 turns, without branches: after K. C. Ng's k_sin.c, k_cos.c and e_rem_pio2.c of
- * FDLIBM 5.3 (Sun Microsystems, 1993; freely distributable), polynomials added up in pairs. `real` is a number or a vector of
- * numbers, `bits` as many whole numbers of 64 bits. */
+ * FDLIBM 5.3 (Sun Microsystems, 1993; freely distributable), polynomials summed in pairs. `real` is a number or a vector of
+ * numbers, `bits` as many 64-bit integers. */
 #define NAME_SIN_COS(real, bits, x, sine, cosine) do { \
     const real shifted = 6755399441055744.0 + (x) * 0.63661977236758134308; \
     const real turns = shifted - 6755399441055744.0; \
@@ -38,7 +38,7 @@ static inline void NAME_sin_cos(double x, double *sine, double *cosine)
     NAME_SIN_COS(double, uint64_t, x, sine, cosine);
 }
 
-/* Those of several angles, the last two of which may be the same: in pairs where the compiler has vectors. */
+/* Sines and cosines of n angles, two at a time with GCC vector types. The last two angles may be the same. */
 static inline void NAME_sin_cos_all(int n, const double *angles, double *sines, double *cosines)
 {
     int k;
@@ -60,7 +60,7 @@ static inline void NAME_sin_cos_all(int n, const double *angles, double *sines, 
         NAME_sin_cos(angles[k], sines + k, cosines + k);
 }
 #else
-/* Where numbers are rounded late, the tricks of the other branch do not hold. */
+/* Intermediate results have more than double precision here, so the reduction of the other branch would be wrong. */
 static inline void NAME_sin_cos(double x, double *sine, double *cosine)
 {
     *sine = sin(x);

@@ -1,4 +1,4 @@
-/* Solves matrix * x = rhs by Gaussian elimination with partial pivoting; rhs becomes x, the matrix is used up. */
+/* Solves matrix * x = rhs by Gaussian elimination with partial pivoting; rhs becomes x, the matrix is overwritten. */
 static int NAME_solve(double *matrix, double *rhs, int n)
 {
     int column, row, k;

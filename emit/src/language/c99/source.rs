@@ -1,4 +1,4 @@
-//! The source: programs as functions, and what calls them.
+//! The C source: programs as static functions, and the public functions that call them.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -12,11 +12,12 @@ use super::{CFunction, TranslationUnit, newton, self_test};
 use crate::language::syntax::LanguageSyntax;
 use crate::tree::{BaseParameterCode, CodeExpression, PrecomputedValues, inputs_of_state};
 
-/// Operations of a function.
+/// Operations per state of a function.
 pub(super) fn operation_count(function: &CFunction<'_>) -> OperationCount {
     function.program.count_operations(ProgramStage::State)
 }
 
+/// The text of the source file. Helpers that no statement calls are left out, so that no compiler warns of them.
 pub(super) fn source(unit: &TranslationUnit<'_>) -> String {
     let name = &unit.name;
     let mut text = format!(
@@ -30,6 +31,7 @@ pub(super) fn source(unit: &TranslationUnit<'_>) -> String {
 
 "
     );
+    // Helpers: checks of inputs, sines and cosines, signs, linear systems.
     text.push_str(&unit.expand_template(include_str!("support.c")));
     if has_call(unit, "_sin_cos") {
         text.push('\n');
@@ -41,15 +43,19 @@ pub(super) fn source(unit: &TranslationUnit<'_>) -> String {
             "\nstatic double {name}_sign(double x)\n{{\n    return x > 0.0 ? 1.0 : x < 0.0 ? -1.0 : x;\n}}"
         );
     }
+    // Newton's method and forward dynamics solve linear systems.
     if unit.newton || unit.source.dynamics.is_some() {
         text.push('\n');
         text.push_str(&unit.expand_template(include_str!("solve.c")));
     }
+    // Default values and base parameters.
     write_records(unit, &mut text);
     write_base_parameters(unit, &mut text);
+    // Programs first, then preparation and inputs, then the public functions that use them.
     for function in &unit.functions {
         write_program(unit, function, &unit.once, "dynamics", &mut text);
     }
+    // The solution for the passive coordinates needs the programs above.
     if unit.newton {
         newton::newton(unit, &mut text);
     }
@@ -62,21 +68,25 @@ pub(super) fn source(unit: &TranslationUnit<'_>) -> String {
         write_bias(unit, &mut text);
         write_forward_dynamics(unit, &mut text);
     }
+    // Reactions are a struct of their own.
     if let Some((function, once)) = &unit.reactions {
         write_program(unit, function, once, "reactions", &mut text);
         write_reaction_preparation(unit, function, once, &mut text);
         write_public_function(unit, function, "reactions", &mut text);
     }
+    // The self-test is last, because it calls public functions.
     if unit.columns.is_some() {
         self_test::self_test(unit, &mut text);
     }
     text
 }
 
-/// Whether any statement calls a function.
+/// Whether any statement calls a function whose name is that of the unit followed by `what`.
 fn has_call(unit: &TranslationUnit<'_>, what: &str) -> bool {
     let c = unit.syntax();
+    // All statements as they will be printed.
     let mut lines = Vec::new();
+    // Programs with precomputed values of their own.
     let others = unit.reactions.iter().chain(&unit.columns);
     c.statements(&unit.once.statements(), &mut lines);
     for (function, once) in others {
@@ -92,6 +102,7 @@ fn has_call(unit: &TranslationUnit<'_>, what: &str) -> bool {
 }
 
 impl TranslationUnit<'_> {
+    /// The syntax of C with the names of this unit.
     pub(super) fn syntax(&self) -> CSyntax<'_> {
         CSyntax {
             name: &self.name,
@@ -100,7 +111,7 @@ impl TranslationUnit<'_> {
     }
 }
 
-/// Default values of geometry and parameters.
+/// The functions that fill geometry and parameters with the values of the model file.
 fn write_records(unit: &TranslationUnit<'_>, text: &mut String) {
     let (name, c) = (&unit.name, unit.syntax());
     let mechanism = &unit.source.derivation.mechanism;
@@ -112,8 +123,10 @@ fn write_records(unit: &TranslationUnit<'_>, text: &mut String) {
         .parameters
         .iter()
         .map(|x| (x.name.as_str(), x.nominal));
+    // A struct without fields has one that is not used, because C allows no empty struct.
     let mut record = |function: &str, of: &str, values: Vec<(&str, f64)>| {
         _ = writeln!(text, "\nvoid {name}_{function}({name}_{of} *{of})\n{{");
+        // One assignment per field.
         for (field, value) in &values {
             _ = writeln!(text, "    {of}->{} = {};", c.name(field), c.number(*value));
         }
@@ -126,7 +139,7 @@ fn write_records(unit: &TranslationUnit<'_>, text: &mut String) {
     record("nominal_parameters", "parameters", parameters.collect());
 }
 
-/// Base parameters as eq. (16) gives them.
+/// The function that computes base parameters from physical parameters, eq. (16).
 fn write_base_parameters(unit: &TranslationUnit<'_>, text: &mut String) {
     let (name, c) = (&unit.name, unit.syntax());
     let derivation = unit.source.derivation;
@@ -142,21 +155,24 @@ fn write_base_parameters(unit: &TranslationUnit<'_>, text: &mut String) {
     );
     let mut lines = Vec::new();
     parameter_bindings(unit, &read, "geometry->", "parameters->", "", &mut lines);
+    // Unread arguments are marked, so that compilers do not warn.
     if !read.iter().any(|atom| matches!(atom, Atom::Constant(_))) {
         lines.push("(void)geometry;".to_owned());
     }
     if !read.iter().any(|atom| matches!(atom, Atom::Parameter(_))) {
         lines.push("(void)parameters;".to_owned());
     }
+    // A denominator that is zero at this geometry is reported by its text.
     for divisor in &divisors {
         lines.push(format!(
-            "if (!(fabs({}) > SINGULAR_SHARE * {})) return {}_SPECIAL; /* {} vanishes */",
+            "if (!(fabs({}) > SINGULAR_SHARE * {})) return {}_SPECIAL; /* {} is zero */",
             c.operand_text(&divisor.value),
             c.grouped_text(&divisor.size),
             unit.upper,
             comment(&divisor.text)
         ));
     }
+    // Sums before the base parameters that refer to them.
     for (name, value) in &sums {
         lines.push(format!("const double {name} = {};", c.operand_text(value)));
     }
@@ -171,7 +187,8 @@ fn write_base_parameters(unit: &TranslationUnit<'_>, text: &mut String) {
     text.push_str("}\n");
 }
 
-/// Names for what is read of geometry, parameters and base parameters.
+/// Declarations of the constants, parameters and base parameters that are read. `geometry`, `parameters` and `base` are
+/// the expressions in front of a field or an index.
 pub(super) fn parameter_bindings(
     unit: &TranslationUnit<'_>,
     read: &BTreeSet<Atom>,
@@ -183,6 +200,7 @@ pub(super) fn parameter_bindings(
     let c = unit.syntax();
     let mechanism = &unit.source.derivation.mechanism;
     for atom in read {
+        // Where the value comes from.
         let value = match atom {
             Atom::Constant(i) => format!("{geometry}{}", c.name(&mechanism.constants[*i].name)),
             Atom::Parameter(i) => {
@@ -199,13 +217,14 @@ pub(super) fn parameter_bindings(
     }
 }
 
+/// Appends the lines of a function body, indented.
 pub(super) fn write_body(lines: &[String], text: &mut String) {
     for line in lines {
         _ = writeln!(text, "    {line}");
     }
 }
 
-/// A program.
+/// A program as a static function from `inputs` to `outputs`. `owner` is the struct with the precomputed values.
 pub(super) fn write_program(
     unit: &TranslationUnit<'_>,
     function: &CFunction<'_>,
@@ -214,6 +233,7 @@ pub(super) fn write_program(
     text: &mut String,
 ) {
     let (name, c) = (&unit.name, unit.syntax());
+    // Statements and inputs of the program.
     let routine = &function.routine;
     _ = writeln!(
         text,
@@ -221,6 +241,7 @@ pub(super) fn write_program(
         function.name
     );
     let mut lines = Vec::new();
+    // Reactions contain a prepared model; its geometry is one level deeper.
     let within = if owner == "reactions" {
         "dynamics."
     } else {
@@ -234,11 +255,13 @@ pub(super) fn write_program(
         "self->base",
         &mut lines,
     );
+    // Precomputed values that this program reads.
     for (k, kept) in once.kept.iter().enumerate() {
         if routine.kept.contains(kept) {
             lines.push(format!("const double {} = self->once[{k}];", c.name(kept)));
         }
     }
+    // Loop programs take a pose, all others a state.
     let derivation = unit.source.derivation;
     let inputs = if function.name == "gaps" || function.name == "scales" {
         let (active, passive) = derivation.coordinates();
@@ -250,6 +273,7 @@ pub(super) fn write_program(
     } else {
         inputs_of_state(derivation, function.follows)
     };
+    // Inputs that this program reads, by name.
     for (k, atom) in inputs.into_iter().enumerate() {
         if routine.read.contains(&atom) {
             lines.push(format!(
@@ -258,19 +282,22 @@ pub(super) fn write_program(
             ));
         }
     }
+    // A program may read none of its arguments.
     for unused in ["self", "inputs", "outputs"] {
         lines.push(format!("(void){unused};"));
     }
+    // Outputs that are always zero have no statement.
     for k in routine.zero_outputs() {
         lines.push(format!("outputs[{k}] = 0.0;"));
     }
+    // All other outputs are written by the statements.
     c.statements(&routine.state, &mut lines);
     lines.push(format!("return {}_OK;", unit.upper));
     write_body(&lines, text);
     text.push_str("}\n");
 }
 
-/// Statements of what is computed once, into `self->once`.
+/// Statements that compute the precomputed values and store them in `self->once`.
 pub(super) fn once_lines(
     unit: &TranslationUnit<'_>,
     once: &PrecomputedValues,
@@ -288,7 +315,7 @@ pub(super) fn once_lines(
     lines
 }
 
-/// What depends on geometry and base parameters alone.
+/// The function `prepare`: computes what depends only on geometry and base parameters, and checks both.
 fn write_preparation(unit: &TranslationUnit<'_>, text: &mut String) {
     let TranslationUnit { name, upper, .. } = unit;
     let c = unit.syntax();
@@ -298,16 +325,19 @@ fn write_preparation(unit: &TranslationUnit<'_>, text: &mut String) {
         "\nint {name}_prepare({name}_dynamics *dynamics, const {name}_geometry *geometry, const double *base)\n{{\n    \
          {name}_dynamics *self = dynamics;"
     );
+    // Precomputed values.
     let mut lines = once_lines(unit, &unit.once, "geometry->", "", "base");
     lines.push("self->geometry = *geometry;".to_owned());
     lines.push(format!("self->input = {upper}_OK;"));
     for k in 0..unit.n_base() {
         lines.push(format!("self->base[{k}] = base[{k}];"));
     }
+    // C has no arrays of length zero.
     if unit.n_base() == 0 {
         lines.push("(void)base;".to_owned());
         lines.push("self->base[0] = 0.0;".to_owned());
     }
+    // Inputs that are NaN or too large are reported by every later call.
     for constant in constants {
         lines.push(format!(
             "if (!{name}_all_fine(&geometry->{}, 1)) self->input = {upper}_NOT_FINITE;",
@@ -325,11 +355,13 @@ fn write_preparation(unit: &TranslationUnit<'_>, text: &mut String) {
     text.push_str("}\n");
 }
 
-/// The inputs of programs from a state.
+/// The function that copies a state into the inputs of programs and checks it.
 fn write_state_inputs(unit: &TranslationUnit<'_>, text: &mut String) {
     let TranslationUnit { name, upper, .. } = unit;
     let mut lines = Vec::new();
+    // Index of the next input.
     let mut next = 0;
+    // The parts of the state follow each other in the inputs.
     for (part, n) in unit.state_parts() {
         for k in 0..n {
             lines.push(format!("inputs[{next}] = {part}[{k}];"));
@@ -348,7 +380,7 @@ fn write_state_inputs(unit: &TranslationUnit<'_>, text: &mut String) {
     text.push_str("}\n");
 }
 
-/// A function that may be called from outside, and its fellow with a guess.
+/// A public function, and a second one with a guess if it follows the loops.
 fn write_public_function(
     unit: &TranslationUnit<'_>,
     function: &CFunction<'_>,
@@ -357,38 +389,45 @@ fn write_public_function(
 ) {
     let TranslationUnit { name, upper, .. } = unit;
     let n_state: usize = unit.state_parts().iter().map(|(_, n)| n).sum();
+    // The state, and passive coordinates behind it.
     let n_inputs = n_state
         + if function.follows {
             unit.n_passive()
         } else {
             0
         };
+    // Length of the result.
     let n_outputs = function.routine.n_outputs;
+    // The prepared model inside the struct.
     let model = if owner == "reactions" {
         "&reactions->dynamics"
     } else {
         "dynamics"
     };
+    // The status of the preparation.
     let input = if owner == "reactions" {
         "reactions->dynamics.input"
     } else {
         "dynamics->input"
     };
-    // Results are written only when all is well.
+    // A program that can fail writes to a local array first, so that results change only if the status is OK.
     let can_fail = function.routine.can_fail();
     let ways: &[bool] = if function.follows {
         &[false, true]
     } else {
         &[false]
     };
+    // The statements of both forms differ in how the passive coordinates are found.
     for near in ways {
         let mut lines = vec![
             format!("double inputs[{}];", n_inputs.max(1)),
             format!("int status = {input};"),
         ];
+        // Outputs of a program that may fail.
         if can_fail {
             lines.push(format!("double outputs[{}];", n_outputs.max(1)));
         }
+        // The guess is copied, so that it changes only if the status is OK.
         if *near {
             lines.push("int i;".to_owned());
             lines.push(format!("double found[{upper}_N_PASSIVE];"));
@@ -397,6 +436,7 @@ fn write_public_function(
             "if (status == {upper}_OK) status = {name}_inputs({}, inputs);",
             unit.state_arguments()
         ));
+        // Passive coordinates follow the state in the inputs.
         match (function.follows, near) {
             (false, _) => {}
             (true, false) => lines.push(format!(
@@ -413,12 +453,14 @@ fn write_public_function(
             }
         }
         lines.push(format!("if (status != {upper}_OK) return status;"));
+        // A program that cannot fail writes to the caller's array.
         let results = if can_fail { "outputs" } else { function.result };
         lines.push(format!(
             "status = {name}_{}_program({owner}, inputs, {results});",
             function.name
         ));
         lines.push(format!("if (status != {upper}_OK) return status;"));
+        // The passive coordinates of this state replace the guess.
         if *near {
             lines.push(format!(
                 "for (i = 0; i < {upper}_N_PASSIVE; i++) passive[i] = found[i];"
@@ -437,10 +479,11 @@ fn write_public_function(
     }
 }
 
-/// The bias forces alone, without what forward dynamics need beside them.
+/// The function `bias`: the bias forces without the Jacobian of the drives, which is in the same program.
 fn write_bias(unit: &TranslationUnit<'_>, text: &mut String) {
     let TranslationUnit { name, upper, .. } = unit;
     let arguments = unit.state_arguments();
+    // With and without a guess.
     for near in super::header::bias_variants(unit) {
         let (suffix, passive) = if *near {
             ("_near", ", passive")
@@ -463,7 +506,7 @@ fn write_bias(unit: &TranslationUnit<'_>, text: &mut String) {
     }
 }
 
-/// Accelerations from forces: a linear system with the mass matrix.
+/// The function `forward`: solves `M q'' = J' f - bias` for the accelerations.
 fn write_forward_dynamics(unit: &TranslationUnit<'_>, text: &mut String) {
     let TranslationUnit { name, upper, .. } = unit;
     let arguments = unit.state_arguments();
@@ -498,7 +541,7 @@ fn write_forward_dynamics(unit: &TranslationUnit<'_>, text: &mut String) {
     );
 }
 
-/// What the reactions compute once.
+/// The function `prepare_reactions`: base parameters, the prepared model, and the precomputed values of the reactions.
 fn write_reaction_preparation(
     unit: &TranslationUnit<'_>,
     function: &CFunction<'_>,
@@ -517,6 +560,7 @@ int {name}_prepare_reactions({name}_reactions *reactions, const {name}_geometry 
     double base[{}];",
         unit.n_base().max(1)
     );
+    // Precomputed values first, because they do not depend on the base parameters.
     let mut lines = once_lines(unit, once, "geometry->", "parameters->", "base");
     lines.push(format!(
         "if ({name}_base_parameters(geometry, parameters, base) != {upper}_OK)\n        return self->dynamics.input = {upper}_SPECIAL;"
@@ -525,6 +569,7 @@ int {name}_prepare_reactions({name}_reactions *reactions, const {name}_geometry 
         "(void){name}_prepare(&self->dynamics, geometry, base);"
     ));
     lines.push("self->parameters = *parameters;".to_owned());
+    // Checks of all parameters.
     for parameter in &unit.source.derivation.mechanism.parameters {
         lines.push(format!(
             "if (!{name}_all_fine(&parameters->{}, 1)) self->dynamics.input = {upper}_NOT_FINITE;",
@@ -536,7 +581,7 @@ int {name}_prepare_reactions({name}_reactions *reactions, const {name}_geometry 
     text.push_str("}\n");
 }
 
-/// An expression of a program without a state.
+/// The expression of a program's single result.
 pub(super) fn single_value(unit: &TranslationUnit<'_>, result: &CodeExpression) -> String {
     unit.syntax().operand_text(result)
 }

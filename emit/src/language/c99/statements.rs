@@ -1,4 +1,4 @@
-//! Statements and expressions as text of C.
+//! Statements and expressions as lines of C.
 
 use std::fmt::Write as _;
 
@@ -7,14 +7,15 @@ use modelmill_codegen::expr::Unary;
 use crate::language::syntax::LanguageSyntax;
 use crate::tree::{CodeStatement, PoseCheck};
 
-/// The syntax of C, with functions that begin with the name of the module.
+/// The syntax of C with the prefixes of one unit.
 pub(super) struct CSyntax<'a> {
     /// Prefix of functions, and of the status.
     pub(super) name: &'a str,
+    /// Prefix of constants and status codes.
     pub(super) upper: &'a str,
 }
 
-/// Words of C, of its headers, and of the functions that are written.
+/// Words of C and C++, names of the included headers, and names of the emitted functions, which no variable may have.
 const RESERVED_NAMES: [&str; 83] = [
     "sines",
     "cosines",
@@ -101,13 +102,15 @@ const RESERVED_NAMES: [&str; 83] = [
     "catch",
 ];
 
-/// Whether a name means something else in C or C++.
+/// Whether a name has another meaning in C, C++ or the emitted source.
 pub(super) fn is_reserved(name: &str) -> bool {
     RESERVED_NAMES.contains(&name)
 }
 
 impl LanguageSyntax for CSyntax<'_> {
     fn name(&self, name: &str) -> String {
+        // Names with the prefix of the unit could collide with its functions and constants.
+        // Letters first, then letters, digits and underscores.
         let plain = name.starts_with(|c: char| c.is_ascii_alphabetic())
             && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
             && !is_reserved(name)
@@ -116,6 +119,7 @@ impl LanguageSyntax for CSyntax<'_> {
         if plain {
             return name.to_owned();
         }
+        // Other names get a leading `_`, with special characters as their code.
         let mut spelled = "_".to_owned();
         for c in name.chars() {
             if c.is_ascii_alphanumeric() {
@@ -132,6 +136,7 @@ impl LanguageSyntax for CSyntax<'_> {
     }
 
     fn standalone_number(&self, value: f64) -> String {
+        // A negative number may follow an operator.
         if value.is_sign_negative() {
             format!("({value:?})")
         } else {
@@ -140,6 +145,7 @@ impl LanguageSyntax for CSyntax<'_> {
     }
 
     fn call(&self, function: Unary, argument: &str) -> String {
+        // The argument may have parentheses of its own, which the call replaces.
         let bare = argument
             .strip_prefix('(')
             .and_then(|rest| rest.strip_suffix(')'))
@@ -162,9 +168,10 @@ impl LanguageSyntax for CSyntax<'_> {
     }
 }
 
-/// Whether every parenthesis is closed in the text itself.
+/// Whether every parenthesis in the text is closed within it.
 fn is_balanced(text: &str) -> bool {
     let mut depth = 0_i32;
+    // A closing parenthesis before its opening one belongs to the surrounding text.
     for c in text.chars() {
         match c {
             '(' => depth += 1,
@@ -179,16 +186,18 @@ fn is_balanced(text: &str) -> bool {
 }
 
 impl CSyntax<'_> {
-    /// Statements, one per line, with `outputs` for the results in scope.
+    /// Appends the statements as lines. An array `outputs` for the results must be in scope.
     pub(super) fn statements(&self, statements: &[CodeStatement], lines: &mut Vec<String>) {
         for statement in statements {
             self.statement(statement, lines);
         }
     }
 
+    /// Appends one statement.
     fn statement(&self, statement: &CodeStatement, lines: &mut Vec<String>) {
         match statement {
             CodeStatement::Section(text) => lines.push(format!("/* {} */", comment(text))),
+            // A named value, with its comment.
             CodeStatement::Let { name, value, note } => {
                 let note = note
                     .as_ref()
@@ -199,10 +208,11 @@ impl CSyntax<'_> {
                     self.operand_text(value)
                 ));
             }
+            // Sines and cosines of all angles of a program are computed together.
             CodeStatement::Angles(angles) => {
                 let mut values: Vec<String> =
                     angles.iter().map(|a| self.operand_text(&a.value)).collect();
-                // They are computed in pairs.
+                // They are computed in pairs, so the last angle of an odd number is repeated.
                 if values.len() % 2 == 1 {
                     values.extend(values.last().cloned());
                 }
@@ -223,6 +233,7 @@ impl CSyntax<'_> {
                 requested: Some(k),
                 ..
             } => {
+                // Values of an angle that is part of that list.
                 for (name, all) in [(sine, "sines"), (cosine, "cosines")] {
                     if let Some(name) = name {
                         lines.push(format!("const double {} = {all}[{k}];", self.name(name)));
@@ -235,6 +246,7 @@ impl CSyntax<'_> {
                 angle,
                 requested: None,
             } => {
+                // A single angle; the number of the line makes the name of an unused value unique.
                 let place = lines.len();
                 let [sine, cosine] =
                     [(sine, "s"), (cosine, "c")].map(|(name, letter)| match name {
@@ -248,6 +260,8 @@ impl CSyntax<'_> {
                     self.operand_text(angle)
                 ));
             }
+            // A check that fails ends the program with its status.
+            // The condition is negated, so that NaN fails it.
             CodeStatement::Guard(check) => lines.push(match check {
                 PoseCheck::Reachable(value) => format!(
                     "if (!({} >= 0.0)) return {}_OUT_OF_REACH;",
@@ -266,17 +280,19 @@ impl CSyntax<'_> {
                     self.upper
                 ),
             }),
+            // Outputs are elements of the caller's array.
             CodeStatement::Put { output, value } => {
                 lines.push(format!("outputs[{output}] = {};", self.operand_text(value)));
             }
+            // C needs no blocks, so groups are printed in place.
             CodeStatement::Group { statements, .. } => self.statements(statements, lines),
         }
     }
 }
 
-/// Free text within a comment.
+/// Text of the model file for use inside a comment.
 pub(super) fn comment(text: &str) -> String {
     let text = modelmill_boundary::text::comment(text);
-    // Three characters that old compilers take for one, and a line that goes on.
+    // Trigraphs, which old compilers replace, and a backslash, which would continue the line.
     text.replace("??", "? ?").replace('\\', "/")
 }

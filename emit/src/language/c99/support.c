@@ -1,8 +1,8 @@
-/* What a determinant must exceed, as a share of the magnitude of its terms, and what inputs must stay below. */
+/* A determinant below this share of the magnitude of its terms is singular; an input above this limit is refused. */
 #define SINGULAR_SHARE 1e-9
 #define LARGEST_INPUT 1e60
 
-/* Whether all numbers are finite and not too large to compute with. */
+/* Whether all numbers are finite and below the limit for inputs. */
 static int NAME_all_fine(const double *values, int n)
 {
     int k, fine = 1;

@@ -1,4 +1,5 @@
-//! The equation of motion as a struct of its own: mass matrix, velocity terms, gravity, effects, forward dynamics.
+//! The struct `Dynamics` of an emitted module, the equation of motion: mass matrix, velocity terms, gravity, effects,
+//! forward dynamics.
 
 use modelmill_codegen::{Derivation, DynamicsPrograms};
 use proc_macro2::TokenStream;
@@ -11,7 +12,7 @@ use super::program::{
 };
 use crate::tree::{NameScope, reads_passive};
 
-/// The struct `Dynamics`.
+/// The struct `Dynamics` for one geometry and one set of base parameters.
 pub(super) fn dynamics(
     derivation: &Derivation,
     scope: &NameScope,
@@ -22,25 +23,29 @@ pub(super) fn dynamics(
         .iter()
         .map(|i| derivation.mechanism.coordinates[*i].name.as_str());
     let names: Vec<&str> = names.collect();
+    // Names of outputs: one per coordinate, with a letter in front.
     let of_each = |letter: &str| -> Vec<String> {
         names
             .iter()
             .map(|name| format!("{letter}_{name}"))
             .collect()
     };
+    // Entries of the mass matrix, row by row.
     let entries = names
         .iter()
         .flat_map(|a| names.iter().map(move |b| format!("M_{a}_{b}")));
+    // The program of the bias also returns the Jacobian, which forward dynamics needs.
     let mut with_jacobian = of_each("b");
     for drive in &derivation.mechanism.drives {
         with_jacobian.extend(names.iter().map(|a| format!("J_{}_{a}", drive.name)));
     }
     let vector = quote! { [T; N_ACTIVE] };
+    // Name and struct, program, documentation, names of outputs, and type of each method.
     let functions = [
         (
             ["mass_matrix", "MassMatrix"],
             &dynamics.mass_matrix,
-            "M, by rows: generalised force per acceleration of the independent coordinates. Accelerations of the state are \
+            "M, row by row: generalised force per acceleration of the independent coordinates. Accelerations of the state are \
              not read.",
             entries.collect(),
             quote! { [[T; N_ACTIVE]; N_ACTIVE] },
@@ -48,7 +53,7 @@ pub(super) fn dynamics(
         (
             ["coriolis", "Coriolis"],
             &dynamics.coriolis,
-            "c: generalised forces that rates alone ask for, centrifugal and Coriolis. Accelerations of the state are not \
+            "c: generalised forces that depend on the rates, centrifugal and Coriolis. Accelerations of the state are not \
              read.",
             of_each("c"),
             vector.clone(),
@@ -56,14 +61,14 @@ pub(super) fn dynamics(
         (
             ["gravity", "Gravity"],
             &dynamics.gravity,
-            "g: generalised forces that weight alone asks for. Rates and accelerations of the state are not read.",
+            "g: generalised forces of gravity. Rates and accelerations of the state are not read.",
             of_each("g"),
             vector.clone(),
         ),
         (
             ["effects", "Effects"],
             &dynamics.effects,
-            "e: generalised forces that effects ask for where the independent coordinates do not accelerate, such as \
+            "e: generalised forces of the effects at zero acceleration of the independent coordinates, such as \
              friction and springs. Accelerations of the state are not read.",
             of_each("e"),
             vector.clone(),
@@ -71,11 +76,12 @@ pub(super) fn dynamics(
         (
             ["bias", "Bias"],
             &dynamics.bias,
-            "c + g + e, at a lower cost than one by one. Accelerations of the state are not read.",
+            "c + g + e, at a lower cost than the three separately. Accelerations of the state are not read.",
             with_jacobian,
             vector,
         ),
     ];
+    // The methods with their numbers of operations.
     let functions = functions.map(
         |([name, item], program, doc, outputs, output)| ProgramMethod {
             program,
@@ -85,7 +91,7 @@ pub(super) fn dynamics(
             inputs: ProgramStateInputs::Motion,
             outputs,
             output: Some(output),
-            // The Jacobian stands behind the bias in its program.
+            // The Jacobian follows the bias in the outputs of the program; the method returns only the bias.
             results: (name == "bias").then(|| ResultConversion {
                 from_type: quote! { Linearisation<T, N_ACTIVE, N_DRIVES> },
                 conversion: quote! { found.values },
@@ -100,7 +106,7 @@ pub(super) fn dynamics(
             /// The equation of motion for one geometry and one set of base parameters,
             /// `J' f = M(q) q'' + c(q, q') + g(q) + e(q, q')` with the forces f of the drives and their Jacobian J.
         },
-        prepares: "Prepares the equation of motion: what does not depend on the state is computed once.",
+        prepares: "Prepares the equation of motion: computes once what does not depend on the state.",
         is_public: true,
         preparation: PreparationInputs::Base,
         functions: functions.into(),
@@ -112,28 +118,33 @@ pub(super) fn dynamics(
     .tokens()
 }
 
-/// Accelerations from forces: a linear system with the mass matrix.
+/// The method `forward`: solves the equation of motion for the accelerations. It has a form with a guess if loops are
+/// followed.
 fn forward_dynamics(derivation: &Derivation, dynamics: &DynamicsPrograms) -> TokenStream {
+    // Both forms of the method have the same documentation.
     let doc = quote! {
         /// Forward dynamics: accelerations of the independent coordinates under given forces of the drives.
         ///
         /// Accelerations of the state are not read. Cost: [`Self::mass_matrix`], [`Self::bias`], and a linear system.
         ///
         /// # Errors
-        /// A pose out of reach or singular, a mass matrix that is singular, or an input that is no number or too large.
+        /// A pose that is out of reach or singular, a singular mass matrix, or an input that is NaN or too large.
     };
     let [matrix_reads, bias_reads] =
         [&dynamics.mass_matrix, &dynamics.bias].map(|program| reads_passive(derivation, program));
+    // Without passive coordinates to solve for, both programs read the state directly.
     if !matrix_reads && !bias_reads {
         return quote! {
             #doc
             pub fn forward(&self, state: &State<T>, forces: &[T; N_DRIVES]) -> Result<[T; N_ACTIVE], PoseError> {
+                // The matrix, and the bias together with the Jacobian.
                 let matrix = self.mass_matrix(state)?;
                 let bias: Linearisation<T, N_ACTIVE, N_DRIVES> = run_checked(&Bias(self), inputs(state))?;
                 accelerations(matrix, &bias, forces, &DRIVES)
             }
         };
     }
+    // Each of the two programs may or may not read passive coordinates.
     let inputs = |reads: bool| {
         if reads {
             quote! { inputs_with_passive(state, passive) }
@@ -150,8 +161,8 @@ fn forward_dynamics(derivation: &Derivation, dynamics: &DynamicsPrograms) -> Tok
             self.forward_at(state, forces, &self.model.passive_position(&state.q)?)
         }
 
-        /// The same as [`Self::forward`], with the passive coordinates of a pose near by, such as those of the last step;
-        /// they become those of this state.
+        /// The same as [`Self::forward`], starting from the passive coordinates of a nearby pose, such as those of the
+        /// last step; they are replaced by those of this state.
         ///
         /// # Errors
         /// As [`Self::forward`].
@@ -163,6 +174,7 @@ fn forward_dynamics(derivation: &Derivation, dynamics: &DynamicsPrograms) -> Tok
         ) -> Result<[T; N_ACTIVE], PoseError> {
             self.input?;
             check_finite(&inputs(state), &INPUTS)?;
+            // The guess changes only if everything succeeds.
             let found = self.model.passive_position_near(&state.q, passive)?;
             let result = self.forward_at(state, forces, &found)?;
             *passive = found;

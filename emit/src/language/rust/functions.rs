@@ -1,4 +1,5 @@
-//! The functions of an emitted model: regressor, motion of drives and passive coordinates, inverse dynamics.
+//! The structs `Model` and `InverseDynamics` of an emitted module: regressor, motion of drives and passive coordinates,
+//! forces.
 
 use modelmill_codegen::{Derivation, PassivePosition};
 use proc_macro2::TokenStream;
@@ -11,12 +12,13 @@ use super::program::{
 };
 use crate::tree::{NameScope, reads_passive};
 
-/// The struct `Model` with everything that needs no parameters.
+/// The struct `Model`: all programs that need only the geometry.
 pub(super) fn model(derivation: &Derivation, scope: &NameScope) -> TokenStream {
     let programs = &derivation.programs;
     let mechanism = &derivation.mechanism;
     let (active, passive) = derivation.coordinates();
     let name = |i: &usize| mechanism.coordinates[*i].name.as_str();
+    // H_min.
     let regressor = ProgramMethod {
         program: &programs.regressor,
         name: "regressor",
@@ -30,12 +32,14 @@ pub(super) fn model(derivation: &Derivation, scope: &NameScope) -> TokenStream {
         output: Some(quote! { [[T; N_BASE]; N_DRIVES] }),
         results: None,
     };
+    // Names of the outputs: `l_left`, `l_left_d`, one per drive.
     let of_drives = |letter: &str, suffix: &str| -> Vec<String> {
         let drives = mechanism.drives.iter();
         drives
             .map(|d| format!("{letter}_{}{suffix}", d.name))
             .collect()
     };
+    // Lengths, rates, then the Jacobian row by row: the order of the program's outputs.
     let mut of_motion = of_drives("l", "");
     of_motion.extend(of_drives("l", "_d"));
     for drive in &mechanism.drives {
@@ -45,6 +49,7 @@ pub(super) fn model(derivation: &Derivation, scope: &NameScope) -> TokenStream {
                 .map(|a| format!("J_{}_{}", drive.name, name(a))),
         );
     }
+    // Kinematics of the drives.
     let drives = ProgramMethod {
         program: &programs.drives,
         name: "drives",
@@ -56,6 +61,7 @@ pub(super) fn model(derivation: &Derivation, scope: &NameScope) -> TokenStream {
         results: None,
     };
     let mut functions = vec![regressor, drives];
+    // Only mechanisms with loops have passive coordinates.
     if !passive.is_empty() {
         let motion = ["", "_d", "_dd"].iter();
         let motion = motion.flat_map(|suffix| passive.iter().map(move |p| (p, suffix)));
@@ -72,7 +78,9 @@ pub(super) fn model(derivation: &Derivation, scope: &NameScope) -> TokenStream {
             results: None,
         });
     }
+    // Loops without closed form add programs, fields and methods.
     let newton = newton(derivation, scope);
+    // Many states are evaluated in sequence if each follows from the one before.
     let followed = reads_passive(derivation, &programs.regressor);
     let (newton_items, more) = match newton {
         Some(newton) => {
@@ -81,12 +89,13 @@ pub(super) fn model(derivation: &Derivation, scope: &NameScope) -> TokenStream {
         }
         None => (TokenStream::new(), ExtraItems::default()),
     };
+    // The struct with its methods.
     let owner = ProgramStruct {
         derivation,
         scope,
         name: "Model",
         doc: quote! {
-            /// The model for one geometry; what depends on the geometry alone is computed once.
+            /// The model for one geometry; values that depend only on the geometry are computed once.
         },
         prepares: "Prepares the model of a geometry.",
         is_public: true,
@@ -95,6 +104,7 @@ pub(super) fn model(derivation: &Derivation, scope: &NameScope) -> TokenStream {
         more,
     };
     let owner = owner.tokens();
+    // The function for many states differs by whether each state follows the one before.
     let of_many = if followed {
         quote! { ::modelmill_runtime::regressor_of_many!(followed); }
     } else {
@@ -112,10 +122,11 @@ pub(super) fn model(derivation: &Derivation, scope: &NameScope) -> TokenStream {
     }
 }
 
-/// The struct `InverseDynamics`.
+/// The struct `InverseDynamics`: the forces of the drives for one set of base parameters.
 pub(super) fn inverse_dynamics(derivation: &Derivation, scope: &NameScope) -> TokenStream {
     let program = &derivation.programs.inverse_dynamics;
     let drives = derivation.mechanism.drives.iter();
+    // The forces as the only method.
     let function = ProgramMethod {
         program,
         name: "forces",
@@ -136,7 +147,7 @@ pub(super) fn inverse_dynamics(derivation: &Derivation, scope: &NameScope) -> To
         doc: quote! {
             /// Inverse dynamics for one geometry and one set of base parameters.
         },
-        prepares: "Prepares the recursion: what does not depend on the state is computed once.",
+        prepares: "Prepares the recursion: computes once what does not depend on the state.",
         is_public: true,
         preparation: PreparationInputs::Base,
         functions: vec![function],
@@ -154,7 +165,7 @@ pub(super) fn inverse_dynamics(derivation: &Derivation, scope: &NameScope) -> To
     }
 }
 
-/// Whether the passive coordinates are found by Newton's method.
+/// Whether the passive coordinates are solved for by Newton's method.
 pub(super) fn is_newton(derivation: &Derivation) -> bool {
     matches!(
         derivation.programs.passive_position,

@@ -17,7 +17,7 @@ use crate::identifier::field_identifier;
 use crate::language::syntax::LanguageSyntax;
 use crate::tree::{BaseParameterCode, CodeExpression, NameScope, inputs_of_state, uses_load};
 
-/// What the module says of itself.
+/// The documentation of the module: title, cautions, and the dependent columns of eq. (6).
 pub(super) fn module_doc(derivation: &Derivation) -> String {
     let mechanism = &derivation.mechanism;
     let mut doc = String::new();
@@ -25,6 +25,7 @@ pub(super) fn module_doc(derivation: &Derivation) -> String {
         doc.push_str(&text);
         doc.push('\n');
     };
+    // The first line is the summary that rustdoc shows in lists.
     let title = mechanism.title.as_deref().unwrap_or(&mechanism.name);
     line(format!("{}.", modelmill_boundary::text::comment(title)));
     line(String::new());
@@ -34,25 +35,28 @@ pub(super) fn module_doc(derivation: &Derivation) -> String {
     );
     line(String::new());
     if let Some(caution) = derivation.reduction.method.caution() {
-        line(format!("Beware: {caution}."));
+        line(format!("Caution: {caution}."));
         line(String::new());
     }
     line("# Dependent columns".to_owned());
     line(String::new());
+    // One list item per dependent column.
     for text in derivation.dependency_texts() {
         line(format!("- `{text}`"));
     }
     doc
 }
 
+/// Operations per state of a program.
 pub(super) fn operation_count(program: &StraightLineProgram) -> OperationCount {
     program.count_operations(ProgramStage::State)
 }
 
-/// All items.
+/// All items of a module without its optional structs.
 pub(super) fn items(derivation: &Derivation, scope: &NameScope) -> TokenStream {
     let mechanism = &derivation.mechanism;
     let tables = tables(derivation);
+    // Names, default values and units of both records.
     let constants: Vec<_> = mechanism
         .constants
         .iter()
@@ -63,12 +67,14 @@ pub(super) fn items(derivation: &Derivation, scope: &NameScope) -> TokenStream {
         .iter()
         .map(|p| (p.name.as_str(), p.nominal, p.unit.as_str()))
         .collect();
+    // Constants with the values of the file.
     let geometry = record_struct(
         "Geometry",
         "Known quantities; the default is the model file's.",
         "CONSTANTS",
         &constants,
     );
+    // Parameters with their nominal values.
     let parameters = record_struct(
         "Parameters",
         "Dynamic parameters; the default is nominal.",
@@ -95,16 +101,20 @@ pub(super) fn items(derivation: &Derivation, scope: &NameScope) -> TokenStream {
     }
 }
 
+/// Constants with counts and names, and the table of base parameters.
 fn tables(derivation: &Derivation) -> TokenStream {
     let mechanism = &derivation.mechanism;
     let (active, passive) = derivation.coordinates();
+    // Names of coordinates.
     let name_of = |i: &usize| mechanism.coordinates[*i].name.as_str();
     let (n_active, n_passive) = (active.len(), passive.len());
     let (active, passive) = (active.iter().map(name_of), passive.iter().map(name_of));
     let drives: Vec<&str> = mechanism.drives.iter().map(|d| d.name.as_str()).collect();
     let n_drives = drives.len();
+    // Texts of the base parameters.
     let bases = derivation.base_parameters();
     let n_base = bases.len();
+    // The table passes the printer as text, one entry per line.
     let bases = bases.iter().map(|base| {
         let (name, retained, expression, unit) =
             (&base.name, &base.retained, &base.expression, &base.unit);
@@ -117,7 +127,7 @@ fn tables(derivation: &Derivation) -> TokenStream {
     quote! {
         /// Number of independent coordinates.
         pub const N_ACTIVE: usize = #n_active;
-        /// Number of coordinates that follow from the loops.
+        /// Number of passive coordinates, which the loops determine.
         pub const N_PASSIVE: usize = #n_passive;
         /// Number of drives.
         pub const N_DRIVES: usize = #n_drives;
@@ -134,11 +144,13 @@ fn tables(derivation: &Derivation) -> TokenStream {
     }
 }
 
-/// A struct of named quantities and the table of their values, in one list.
+/// A struct of named quantities and the table of their values, as one macro call. Names that Rust does not allow keep
+/// their original name in the table.
 fn record_struct(name: &str, doc: &str, table: &str, fields: &[(&str, f64, &str)]) -> TokenStream {
     let mut text = format!("/// {doc}\n{name}, {table}:");
     for (field, value, unit) in fields {
         let ident = field_identifier(field).to_string();
+        // The original name is stated only where it differs.
         let called = if ident == *field {
             String::new()
         } else {
@@ -150,15 +162,18 @@ fn record_struct(name: &str, doc: &str, table: &str, fields: &[(&str, f64, &str)
     quote! { ::modelmill_runtime::record! { #text } }
 }
 
+/// Types of states and motions, and the functions that list a state as inputs of programs.
 fn state(derivation: &Derivation) -> TokenStream {
     let mechanism = &derivation.mechanism;
     let (active, passive) = derivation.coordinates();
     let load = uses_load(derivation);
+    // A state with loads has another type.
     let alias = if load {
         quote! { ::modelmill_runtime::LoadedState<T, N_ACTIVE, N_DRIVES> }
     } else {
         quote! { ::modelmill_runtime::State<T, N_ACTIVE> }
     };
+    // Names of inputs, which messages about a NaN print.
     let name = |atom: Atom| match atom {
         Atom::Rate(i) => format!("{}_d", mechanism.coordinates[i].name),
         Atom::Acceleration(i) => format!("{}_dd", mechanism.coordinates[i].name),
@@ -166,10 +181,12 @@ fn state(derivation: &Derivation) -> TokenStream {
         Atom::Coordinate(i) => mechanism.coordinates[i].name.clone(),
         _ => String::new(),
     };
+    // The table of names and the function that lists the numbers have the same order.
     let inputs = inputs_of_state(derivation, false);
     let n_inputs = Literal::usize_unsuffixed(inputs.len());
     let names = inputs.into_iter().map(|atom| format!("{:?}", name(atom)));
     let names = verbatim_tokens(&fill_lines("[", names, "];").join("\n"));
+    // Fields of the state with their lengths.
     let mut fields = vec![
         ("q", active.len()),
         ("qd", active.len()),
@@ -182,6 +199,7 @@ fn state(derivation: &Derivation) -> TokenStream {
         .iter()
         .flat_map(|(field, n)| (0..*n).map(move |k| format!("state.{field}[{k}]")))
         .collect();
+    // Programs that read passive coordinates solved for by Newton's method have more inputs.
     let with_passive = is_newton(derivation).then(|| {
         let all = inputs_of_state(derivation, true);
         let n_all = Literal::usize_unsuffixed(all.len());
@@ -194,7 +212,7 @@ fn state(derivation: &Derivation) -> TokenStream {
             /// The inputs of a program that reads passive coordinates.
             const INPUTS_WITH_PASSIVE: [&str; #n_all] = #names;
 
-            /// The numbers of a state and of its passive coordinates in their order.
+            /// The values of a state and of its passive coordinates in the order of [`INPUTS_WITH_PASSIVE`].
             fn inputs_with_passive<V: Copy>(state: &State<V>, passive: &[V; N_PASSIVE]) -> [V; #n_all] {
                 #entries
             }
@@ -213,7 +231,7 @@ fn state(derivation: &Derivation) -> TokenStream {
         /// The inputs of a program, in order.
         const INPUTS: [&str; #n_inputs] = #names;
 
-        /// The numbers of a state in the order of [`INPUTS`].
+        /// The values of a state in the order of [`INPUTS`].
         fn inputs<V: Copy>(state: &State<V>) -> [V; #n_inputs] {
             #entries
         }
@@ -222,14 +240,14 @@ fn state(derivation: &Derivation) -> TokenStream {
     }
 }
 
-/// How large the loops of a `geometry` in scope are beside those of the file, for numbers `T`; nothing where no coordinate
-/// in them is a length.
+/// The scale of the loops of a `geometry` in scope relative to those of the file, as a number `T`. `None` if no
+/// coordinate in them is a length.
 pub(super) fn loop_scale(derivation: &Derivation, scope: &NameScope) -> Option<TokenStream> {
     let program = derivation.programs.scale.as_ref()?;
     Some(single_value(derivation, scope, program))
 }
 
-/// Nominal values of coordinates, lengths in loops as many times longer as `scale` says.
+/// Nominal values of coordinates; lengths in loops are multiplied by `scale`.
 pub(super) fn nominal_values<'a>(
     derivation: &'a Derivation,
     coordinates: &'a [usize],
@@ -237,6 +255,7 @@ pub(super) fn nominal_values<'a>(
 ) -> impl Iterator<Item = TokenStream> + use<'a> {
     let in_loops = derivation.coordinates_in_loops();
     coordinates.iter().map(move |i| {
+        // Only lengths that occur in the loops are scaled.
         let coordinate = &derivation.mechanism.coordinates[*i];
         let value = signed(coordinate.nominal);
         let is_length = coordinate.motion.is_length() && in_loops.contains(i);
@@ -246,7 +265,7 @@ pub(super) fn nominal_values<'a>(
     })
 }
 
-/// Base parameters as eq. (16) gives them, term by term.
+/// The function that computes base parameters from physical parameters, eq. (16), term by term.
 fn base_parameters(derivation: &Derivation, scope: &NameScope) -> TokenStream {
     let BaseParameterCode {
         sums,
@@ -255,7 +274,7 @@ fn base_parameters(derivation: &Derivation, scope: &NameScope) -> TokenStream {
         read,
     } = crate::tree::base_parameters(derivation, scope);
     let n_base = values.len();
-    // An argument that nothing reads is called so.
+    // An argument that is not read gets an underscore, so that the compiler does not warn.
     let argument = |name: &str, is_its: fn(&Atom) -> bool| {
         let unread = if read.iter().any(is_its) { "" } else { "_" };
         let name = format_ident!("{unread}{name}");
@@ -265,11 +284,14 @@ fn base_parameters(derivation: &Derivation, scope: &NameScope) -> TokenStream {
     let parameters = argument("parameters", |atom| matches!(atom, Atom::Parameter(_)));
     let given =
         super::program::parameter_bindings(derivation, scope, &read, &geometry, &parameters, "");
+    // Base parameters are variables first, then an array.
     let names: Vec<_> = (0..n_base)
         .map(|k| field_identifier(scope.input_name(Atom::Base(k))))
         .collect();
+    // Long sums are broken after a term.
     let written = names.iter().zip(&values);
     let written = written.flat_map(|(name, value)| sum_lines(&format!("let {name} = "), value));
+    // Denominators are checked before anything is divided.
     let divisors = divisors.iter().map(|divisor| {
         let [value, size] = [&divisor.value, &divisor.size].map(|x| RustSyntax.operand_text(x));
         format!("divisor({:?}, {value}, {size})?;", divisor.text)
@@ -281,7 +303,7 @@ fn base_parameters(derivation: &Derivation, scope: &NameScope) -> TokenStream {
         /// Base parameters of given physical parameters, eq. (16).
         ///
         /// # Errors
-        /// [`SpecialGeometry`] where a denominator of theirs vanishes.
+        /// [`SpecialGeometry`] if one of their denominators is zero for this geometry.
         pub fn base_parameters<T: Real>(
             #geometry: &Geometry<T>, #parameters: &Parameters<T>,
         ) -> Result<[T; N_BASE], SpecialGeometry> {
@@ -293,10 +315,11 @@ fn base_parameters(derivation: &Derivation, scope: &NameScope) -> TokenStream {
     }
 }
 
-/// A statement with a sum, term by term in as many lines as it needs.
+/// A statement that assigns a sum, with a line break before a term where it is too long.
 fn sum_lines(start: &str, value: &CodeExpression) -> Vec<String> {
     let mut terms = Vec::new();
     let mut rest = value;
+    // Terms are collected from the right, because sums are nested to the left.
     loop {
         let (before, operator, term) = match rest {
             CodeExpression::Add(a, b) => (a, "+", b),
@@ -307,6 +330,7 @@ fn sum_lines(start: &str, value: &CodeExpression) -> Vec<String> {
             }
         };
         let text = RustSyntax.expression_text(term);
+        // A sum on the right of an operator needs parentheses.
         let nested = matches!(**term, CodeExpression::Add(..) | CodeExpression::Sub(..));
         terms.push(if nested {
             format!("{operator} ({text})")
@@ -317,6 +341,7 @@ fn sum_lines(start: &str, value: &CodeExpression) -> Vec<String> {
     }
     let mut lines = vec![start.to_owned()];
     for (k, term) in terms.iter().rev().enumerate() {
+        // The first term follows the start directly.
         let space = if k == 0 { "" } else { " " };
         match lines.last_mut() {
             Some(line) if k == 0 || line.len() + term.len() < 95 => {

@@ -1,8 +1,7 @@
-//! Rust: a module as tokens, printed by prettyplease.
+//! Rust: a module as tokens, printed by prettyplease. A derivation goes in, source text comes out.
 //!
 //! The module depends on `modelmill-runtime` alone. It is `no_std`, allocates nothing, contains no unsafe code, and works
 //! for `f32` and `f64`.
-
 //!
 //! Decision: emitted functions suit real time. They have no loops but Newton's, no branch on the state except for
 //! what is refused, and no code that can panic: a test builds libraries without the standard library and looks for
@@ -27,19 +26,22 @@ use quote::quote;
 use crate::identifier;
 use crate::tree::NameScope;
 
-/// Rust source of a module.
+/// Source of an emitted module, to which further structs can be added.
 #[derive(Clone, Debug)]
 pub struct EmittedModule {
     /// Name of the module.
     pub name: String,
     /// Documentation of the module, in Markdown.
     pub doc: String,
+    /// Names of all values, shared by the structs.
     scope: NameScope,
+    /// All items of the module.
     items: TokenStream,
 }
 
 /// Writes the module of a derivation: regressor and inverse dynamics.
 pub fn emit(derivation: &Derivation) -> EmittedModule {
+    // Programs share the part of the pose that they have in common.
     let scope = NameScope::with_pose(derivation);
     EmittedModule {
         name: derivation.mechanism.name.clone(),
@@ -49,12 +51,13 @@ pub fn emit(derivation: &Derivation) -> EmittedModule {
     }
 }
 
-/// Writes the module of a derivation with its equation of motion besides: mass matrix, forward dynamics and what belongs
-/// to them.
+/// Writes the module of a derivation together with its equation of motion: mass matrix, forward dynamics and related
+/// terms.
 pub fn emit_with_dynamics(derivation: &Derivation, dynamics: &DynamicsPrograms) -> EmittedModule {
     emit(derivation).with_dynamics(derivation, dynamics)
 }
 
+// Each method adds items that use the names of the same scope.
 impl EmittedModule {
     /// The module with the equation of motion of the same derivation.
     #[must_use]
@@ -82,24 +85,26 @@ impl EmittedModule {
 
     /// The source as a file of its own, to be declared with `mod`.
     pub fn file(&self) -> String {
+        // Attributes of a file are inner ones.
         let (doc, items) = (doc_lines(&self.doc, true), &self.items);
         print_source(&quote! { #doc #![allow(#LINTS)] #items })
     }
 
     /// The source as a `pub mod` that can be included anywhere.
     pub fn module(&self) -> String {
+        // Attributes of a module are outer ones.
         let (doc, items) = (doc_lines(&self.doc, false), &self.items);
         let name = identifier::module_identifier(&self.name);
         print_source(&quote! { #doc #[allow(#LINTS)] pub mod #name { #items } })
     }
 }
 
-/// The name of the module that is emitted for a model: its own, or one near it where Rust cannot have that.
+/// The name of the module that is emitted for a model: its own, or a similar one where Rust does not allow that.
 pub fn module_name(model: &str) -> String {
     identifier::module_identifier(model).to_string()
 }
 
-/// Lints that emitted code does not keep to: names come from the model file, and formulas have a manner of their own.
+/// Lints that emitted code does not follow: names come from the model file, and formulas are laid out in their own way.
 struct LintAttributes;
 const LINTS: LintAttributes = LintAttributes;
 
@@ -111,9 +116,11 @@ impl quote::ToTokens for LintAttributes {
     }
 }
 
+/// Lines of documentation as attributes; `inner` ones belong to the file or module that they are in.
 pub(crate) fn doc_lines(doc: &str, inner: bool) -> TokenStream {
     let lines = doc.lines().map(|line| {
         let line = format!(" {line}");
+        // A blank after the slashes, as rustfmt has it.
         if inner {
             quote! { #![doc = #line] }
         } else {
@@ -123,7 +130,7 @@ pub(crate) fn doc_lines(doc: &str, inner: bool) -> TokenStream {
     quote! { #(#lines)* }
 }
 
-/// Source of tokens that are a file.
+/// The source text of tokens that form a file.
 pub(crate) fn print_source(tokens: &TokenStream) -> String {
     let file = syn::parse2(tokens.clone())
         .unwrap_or_else(|error| panic!("emitted tokens do not parse: {error}\n{tokens}"));

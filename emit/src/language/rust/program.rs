@@ -1,5 +1,4 @@
-//! A program as a struct that holds what is computed once, and computes the rest at a state.
-
+//! A program as a struct that stores precomputed values, and a method that computes the rest at a state.
 //!
 //! Decision: programs of more than 2000 statements are written as blocks of 250. Every `let` opens a scope inside
 //! the one before, and rustc writes debug information scope by scope with recursion: a 6-UPS platform in one
@@ -21,16 +20,19 @@ use crate::tree::{
     reads_passive,
 };
 
-/// What a program is made of besides the geometry.
+/// What a struct is prepared from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum PreparationInputs {
+    /// The geometry.
     Geometry,
+    /// Geometry and base parameters.
     Base,
+    /// Geometry and physical parameters.
     Parameters,
 }
 
 impl PreparationInputs {
-    /// What is wrong with what it is made of.
+    /// An expression of the first fault in these inputs, or `Ok`.
     fn check_tokens(self) -> TokenStream {
         match self {
             Self::Geometry => quote! { geometry.check() },
@@ -39,7 +41,7 @@ impl PreparationInputs {
         }
     }
 
-    /// The parameters by which it is made.
+    /// The parameters of `new`.
     fn parameter_tokens(self) -> TokenStream {
         match self {
             Self::Geometry => quote! { geometry: &Geometry<T> },
@@ -51,10 +53,10 @@ impl PreparationInputs {
     }
 }
 
-/// What a program is told about a state.
+/// The inputs of a program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum ProgramStateInputs {
-    /// Motion, and passive coordinates if Newton's method finds them.
+    /// Motion, and passive coordinates if Newton's method solves for them.
     Motion,
     /// Independent and passive coordinates.
     Pose,
@@ -62,64 +64,81 @@ pub(super) enum ProgramStateInputs {
 
 /// A program with the method that runs it.
 pub(super) struct ProgramMethod<'a> {
+    /// The program.
     pub(super) program: &'a StraightLineProgram,
     /// Name of the method.
     pub(super) name: &'a str,
     /// Name of the struct that the runtime runs.
     pub(super) item: &'a str,
+    /// Documentation of the method; empty without a method.
     pub(super) doc: String,
+    /// Its inputs.
     pub(super) inputs: ProgramStateInputs,
-    /// Names of the program's results.
+    /// Names of the program's outputs, where they have one.
     pub(super) outputs: Vec<String>,
-    /// What the method returns; none if there is no method.
+    /// Return type of the method; `None` if there is no method.
     pub(super) output: Option<TokenStream>,
-    /// What the program's results are, if that is something else.
+    /// Conversion of the outputs, if the method returns another type.
     pub(super) results: Option<ResultConversion>,
 }
 
-/// Results of a program that are made into something else.
+/// A conversion of the outputs of a program to the result of a method.
 pub(super) struct ResultConversion {
-    /// Their type.
+    /// Type of the outputs.
     pub(super) from_type: TokenStream,
-    /// What is made of them, `found`.
+    /// Expression of the result, with the outputs in `found`.
     pub(super) conversion: TokenStream,
 }
 
 /// A struct whose methods are programs.
 pub(super) struct ProgramStruct<'a> {
+    /// The model.
     pub(super) derivation: &'a Derivation,
+    /// Names of all values.
     pub(super) scope: &'a NameScope,
-    /// Its name.
+    /// Name of the struct.
     pub(super) name: &'a str,
+    /// Its documentation.
     pub(super) doc: TokenStream,
-    /// What `new` is said to do.
+    /// Documentation of `new`.
     pub(super) prepares: &'a str,
+    /// Whether struct and methods are public.
     pub(super) is_public: bool,
+    /// Arguments of `new`.
     pub(super) preparation: PreparationInputs,
+    /// Its programs.
     pub(super) functions: Vec<ProgramMethod<'a>>,
-    /// Further fields, their initialisers, what is left to do to a prepared `model`, and further methods.
+    /// Fields and methods in addition to the programs.
     pub(super) more: ExtraItems,
 }
 
-/// What a struct has besides its programs.
+/// Items of a struct in addition to its programs.
+/// Fields.
 #[derive(Default)]
 pub(super) struct ExtraItems {
+    /// Initial values of these fields.
     pub(super) fields: TokenStream,
+    /// Statements on the constructed `model`, at the end of `new`.
     pub(super) inits: TokenStream,
+    /// Methods.
     pub(super) finish: TokenStream,
     pub(super) methods: TokenStream,
 }
 
 impl ProgramStruct<'_> {
-    /// The struct, its programs, and what runs them.
+    /// The struct, its programs as methods, and the items by which the runtime runs them.
     #[allow(clippy::too_many_lines, reason = "one text from top to bottom")]
     pub(super) fn tokens(&self) -> TokenStream {
+        // Statements of all programs; precomputed values are shared. Values of the common pose are taken out of each
+        // program first.
         let mut once = PrecomputedValues::new(self.scope);
         let mut routines = Vec::new();
         for function in &self.functions {
             let pose = self.scope.pose.as_deref();
+            // A program that does not begin with the common guards keeps its own pose.
             let rest = pose.and_then(|pose| pose.remaining_program(function.program));
             let program = rest.as_ref().unwrap_or(function.program);
+            // The statements of the rest, without precomputed ones.
             let mut routine = StatementRoutine::new(program, self.scope, &function.outputs);
             once.absorb(&mut routine);
             let pose = pose.filter(|_| rest.is_some());
@@ -129,17 +148,22 @@ impl ProgramStruct<'_> {
             routines.push((routine, pose));
         }
         let name = format_ident!("{}", self.name);
+        // A field exists only if a program reads it.
         let reads =
             |wanted: fn(&Atom) -> bool| routines.iter().any(|(r, _)| r.read.iter().any(wanted));
+        // Whether any program shares the pose.
         let has_pose = routines.iter().any(|(_, pose)| pose.is_some());
         let pose_field = has_pose.then(|| quote! { pose: Pose<T>, });
         let pose_init = has_pose.then(|| quote! { pose: Pose::new(geometry), });
+        // Which inputs of the preparation are stored.
         let base = reads(|atom| matches!(atom, Atom::Base(_)));
         let physical = reads(|atom| matches!(atom, Atom::Parameter(_)));
+        // Fields and initial values come in pairs.
         let base_field = base.then(|| quote! { base: [T; N_BASE], });
         let base_init = base.then(|| quote! { base: *base, });
         let physical_field = physical.then(|| quote! { parameters: Parameters<T>, });
         let physical_init = physical.then(|| quote! { parameters: *parameters, });
+        // Other structs than `Model` contain one to solve for the passive coordinates.
         let newton = self.name != "Model"
             && self
                 .functions
@@ -147,6 +171,7 @@ impl ProgramStruct<'_> {
                 .any(|f| reads_passive(self.derivation, f.program));
         let model_field = newton.then(|| quote! { model: Model<T>, });
         let model_init = newton.then(|| quote! { model: Model::new(geometry), });
+        // Precomputed values are an array, whose entries programs bind to their names.
         let kept: Vec<Ident> = once
             .kept
             .iter()
@@ -156,11 +181,12 @@ impl ProgramStruct<'_> {
         let has_once = !kept.is_empty();
         let once_field = has_once.then(|| {
             quote! {
-                /// What does not depend on the state.
+                /// Values that do not depend on the state.
                 once: [T; #n_kept],
             }
         });
         let given = self.input_bindings(&once.read, false);
+        // Statements of `new` before the struct is built.
         let begin = has_once.then(|| {
             let statements = statements(&once.statements());
             quote! { let n = &ScalarNumbers::<T>::new(); #given #statements }
@@ -170,6 +196,7 @@ impl ProgramStruct<'_> {
             self.preparation.parameter_tokens(),
             format!(" {}", self.prepares),
         );
+        // Invalid inputs are stored, and reported by every method.
         let check = self.preparation.check_tokens();
         let ExtraItems {
             fields,
@@ -182,6 +209,7 @@ impl ProgramStruct<'_> {
                 input, geometry: *geometry, #pose_init #base_init #physical_init #once_init #model_init #inits
             }
         };
+        // Statements at the end of `new` need a name for the value.
         let new = if finish.is_empty() {
             prepared
         } else {
@@ -192,11 +220,13 @@ impl ProgramStruct<'_> {
         let functions: Vec<TokenStream> = (self.functions.iter().zip(&routines))
             .map(|(function, (routine, pose))| self.function(function, routine, *pose, &once))
             .collect();
+        // One item per program: its struct for the runtime, names and number of inputs, number of outputs.
         let items = self.functions.iter().zip(&routines).map(|(function, (routine, _))| {
             let (item, program) = (
                 format_ident!("{}", function.item),
                 format_ident!("{}_program", function.name),
             );
+            // Inputs of the program and the table of their names.
             let (inputs, names) = self.inputs(function, routine);
             let n_inputs = Literal::usize_unsuffixed(inputs.len());
             let n_outputs = Literal::usize_unsuffixed(routine.n_outputs);
@@ -206,7 +236,7 @@ impl ProgramStruct<'_> {
             #doc
             #[derive(Clone, Copy, Debug, PartialEq)]
             #visible struct #name<T> {
-                /// What is wrong with the geometry or the parameters.
+                /// The fault of the geometry or the parameters, if they have one.
                 input: Result<(), PoseError>,
                 geometry: Geometry<T>,
                 #pose_field
@@ -233,7 +263,7 @@ impl ProgramStruct<'_> {
         }
     }
 
-    /// The method of a program, and the program.
+    /// The method of a program, and the program as a generic function over the numbers of the runtime.
     fn function(
         &self,
         function: &ProgramMethod<'_>,
@@ -244,6 +274,7 @@ impl ProgramStruct<'_> {
         let program = format_ident!("{}_program", function.name);
         let (inputs, _) = self.inputs(function, routine);
         let n_inputs = Literal::usize_unsuffixed(inputs.len());
+        // Bindings in front of the statements: constants and parameters, precomputed values, inputs, pose.
         let given = self.input_bindings(&routine.read, true);
         let once = precomputed_bindings(once, routine);
         let pose = pose.map(|pose| self.pose_bindings(pose, routine));
@@ -264,8 +295,9 @@ impl ProgramStruct<'_> {
         }
     }
 
-    /// What a program reads of the pose.
+    /// The statement that binds the values of the common pose that a program reads.
     fn pose_bindings(&self, pose: &SharedPose, routine: &StatementRoutine) -> TokenStream {
+        // Results that are not read are not bound.
         let called = (0..pose.routine.results.len()).map(|k| {
             let atom = Atom::Shared(k);
             if routine.read.contains(&atom) {
@@ -274,6 +306,7 @@ impl ProgramStruct<'_> {
                 "_".to_owned()
             }
         });
+        // Coordinates are the arguments of the pose.
         let inputs = pose
             .inputs
             .iter()
@@ -283,7 +316,7 @@ impl ProgramStruct<'_> {
         line_tokens(&fill_lines("let [", called, &end))
     }
 
-    /// The method; where the passive coordinates are found by Newton's method, a second one that takes a guess.
+    /// The public method of a program. If it follows the loops, there is a second one that takes a guess.
     fn method(&self, function: &ProgramMethod<'_>) -> TokenStream {
         let Some(output) = &function.output else {
             return TokenStream::new();
@@ -292,11 +325,13 @@ impl ProgramStruct<'_> {
         let (method, at_passive) = (format_ident!("{name}"), format_ident!("{name}_at"));
         let item = format_ident!("{}", function.item);
         let doc = format!(" {}", function.doc);
+        // Every method of a state has these errors.
         let errors = quote! {
             ///
             /// # Errors
-            /// A pose out of reach or singular, or an input that is no number or too large.
+            /// A pose that is out of reach or singular, or an input that is NaN or too large.
         };
+        // The call of the program, with the conversion of its outputs if there is one.
         let run = |inputs: TokenStream| match &function.results {
             None => quote! { run_checked(&#item(self), #inputs) },
             Some(ResultConversion {
@@ -308,6 +343,7 @@ impl ProgramStruct<'_> {
             },
         };
         let visible = self.is_public.then(|| quote! { pub });
+        // Without passive coordinates to solve for, the state is enough.
         if !reads_passive(self.derivation, function.program) {
             let run = run(quote! { inputs(state) });
             return quote! {
@@ -319,13 +355,15 @@ impl ProgramStruct<'_> {
                 }
             };
         }
+        // The form with a guess.
         let near = format_ident!("{name}_near");
-        let cost = " Cost: that of finding the passive coordinates besides.";
+        let cost = " Cost: in addition, that of solving for the passive coordinates.";
         let same = format!(
-            " The same as [`Self::{name}`], with the passive coordinates of a pose near by, such as those of the last \
-             cycle; they become those of this state."
+            " The same as [`Self::{name}`], starting from the passive coordinates of a nearby pose, such as those of the \
+             last cycle; they are replaced by those of this state."
         );
         let model = self.model();
+        // With passive coordinates: solve for them, then evaluate at them.
         let run = run(quote! { inputs_with_passive(state, passive) });
         quote! {
             #[doc = #doc]
@@ -355,6 +393,7 @@ impl ProgramStruct<'_> {
         }
     }
 
+    /// The expression of the struct that solves for passive coordinates.
     fn model(&self) -> TokenStream {
         match self.preparation {
             PreparationInputs::Geometry if self.name == "Model" => quote! { self },
@@ -362,12 +401,13 @@ impl ProgramStruct<'_> {
         }
     }
 
-    /// What the inputs are called, those that are not read by nothing, and where their names are.
+    /// Patterns for the inputs, `_` for those that are not read, and the table with their names.
     fn inputs(
         &self,
         function: &ProgramMethod<'_>,
         routine: &StatementRoutine,
     ) -> (Vec<TokenStream>, TokenStream) {
+        // Whether the inputs contain passive coordinates.
         let newton = function.inputs == ProgramStateInputs::Motion
             && reads_passive(self.derivation, function.program);
         let atoms = match function.inputs {
@@ -378,6 +418,7 @@ impl ProgramStruct<'_> {
                 all.map(Atom::Coordinate).collect()
             }
         };
+        // The table by which messages name an input.
         let names = match (function.inputs, newton) {
             (ProgramStateInputs::Motion, false) => quote! { INPUTS },
             (ProgramStateInputs::Motion, true) => quote! { INPUTS_WITH_PASSIVE },
@@ -394,7 +435,8 @@ impl ProgramStruct<'_> {
         (called.collect(), names)
     }
 
-    /// Constants, parameters and base parameters that are read, by their names.
+    /// Bindings of the constants, parameters and base parameters that are read, from `self` or from the arguments of
+    /// `new`.
     fn input_bindings(&self, read: &BTreeSet<Atom>, at_state: bool) -> TokenStream {
         let owner = at_state.then(|| quote! { self. });
         parameter_bindings(
@@ -408,7 +450,7 @@ impl ProgramStruct<'_> {
     }
 }
 
-/// Names for what is read of geometry, parameters and base parameters, with `n` in scope.
+/// Bindings of what is read of geometry, parameters and base parameters; `n` must be in scope.
 pub(super) fn parameter_bindings(
     derivation: &Derivation,
     scope: &NameScope,
@@ -428,6 +470,7 @@ pub(super) fn parameter_bindings(
         .iter()
         .map(|p| p.name.as_str())
         .collect();
+    // One pattern per record, with the fields that are read.
     let record = |record: &str, names: &[&str], atom: fn(usize) -> Atom, from: &TokenStream| {
         let wanted: Vec<usize> = (0..names.len())
             .filter(|i| read.contains(&atom(*i)))
@@ -435,6 +478,7 @@ pub(super) fn parameter_bindings(
         if wanted.is_empty() {
             return TokenStream::new();
         }
+        // A field with another name in the scope is renamed in the pattern.
         let fields = wanted.iter().map(|i| {
             let (field, name) = (
                 field_identifier(names[*i]),
@@ -446,12 +490,14 @@ pub(super) fn parameter_bindings(
                 quote! { #field: #name }
             }
         });
+        // Fields that are not read are skipped.
         let rest = (wanted.len() < names.len()).then(|| quote! { , .. });
         let record = format_ident!("{record}");
         quote! { let #record { #(#fields),* #rest } = #from.as_variables(n); }
     };
     let constants = record("Geometry", &constants, Atom::Constant, geometry);
     let physical = record("Parameters", &physical, Atom::Parameter, parameters);
+    // Base parameters are entries of an array.
     let n_base = derivation.reduction.retained.len();
     let read_base = (0..n_base).filter(|k| read.contains(&Atom::Base(*k)));
     let base = array_bindings(
@@ -464,7 +510,7 @@ pub(super) fn parameter_bindings(
     quote! { #constants #physical #base #pi }
 }
 
-/// Entries of an array that are the same at every state, as variables.
+/// Entries of an array, the same at every state, as variables.
 fn array_bindings(entries: impl Iterator<Item = (Ident, usize)>, array: &str) -> TokenStream {
     let entries = entries.map(|(name, k)| format!("{name} = {k}"));
     let mut entries = entries.peekable();
@@ -474,9 +520,10 @@ fn array_bindings(entries: impl Iterator<Item = (Ident, usize)>, array: &str) ->
     line_tokens(&fill_lines(&format!("read!(n, {array}; "), entries, ");"))
 }
 
-/// What is computed once and read by a program.
+/// Bindings of the precomputed values that a program reads.
 fn precomputed_bindings(once: &PrecomputedValues, routine: &StatementRoutine) -> TokenStream {
     let places = once.kept.iter().enumerate();
+    // Positions in the array of precomputed values.
     let read = places.filter(|(_, name)| routine.kept.contains(name));
     array_bindings(
         read.map(|(k, name)| (field_identifier(name), k)),
@@ -484,11 +531,13 @@ fn precomputed_bindings(once: &PrecomputedValues, routine: &StatementRoutine) ->
     )
 }
 
-/// The struct of what programs share of a pose.
+/// The struct `Pose` with the values that several programs share: loop closure and drive lengths. Nothing if they share
+/// none.
 pub(super) fn pose(derivation: &Derivation, scope: &NameScope) -> TokenStream {
     let Some(pose) = &scope.pose else {
         return TokenStream::new();
     };
+    // Precomputed values of the pose, from the geometry.
     let given_once = parameter_bindings(
         derivation,
         scope,
@@ -515,20 +564,24 @@ pub(super) fn pose(derivation: &Derivation, scope: &NameScope) -> TokenStream {
         &TokenStream::new(),
         "",
     );
+    // Bindings of the pose itself.
     let kept = precomputed_bindings(&pose.once, &pose.routine);
     let called = |atom: &Atom| field_identifier(scope.input_name(*atom));
     let n_inputs = Literal::usize_unsuffixed(pose.inputs.len());
     let inputs = pose.inputs.iter().map(|atom| called(atom).to_string());
+    // Inputs arrive as one array.
     let inputs = line_tokens(&fill_lines("let [", inputs, "] = q;"));
     let n_results = Literal::usize_unsuffixed(pose.routine.results.len());
+    // Results are returned as an array and not put into outputs.
     let state = pose.routine.state.iter();
+    // The pose returns its results, so it stores no outputs.
     let state = state.filter(|statement| !matches!(statement, CodeStatement::Put { .. }));
     let state = statements(&state.cloned().collect::<Vec<CodeStatement>>());
     let results =
         (0..pose.routine.results.len()).map(|k| RustSyntax.name(scope.input_name(Atom::Shared(k))));
     let results = verbatim_tokens(&fill_lines("Ok(variables![", results, "])").join("\n"));
     quote! {
-        /// Where the loops close and the drives are at a pose, the same for all programs.
+        /// Pose-dependent quantities (loop closure, drive lengths) shared by all functions.
         #[derive(Clone, Copy, Debug, PartialEq)]
         struct Pose<T> {
             geometry: Geometry<T>,
@@ -557,7 +610,7 @@ pub(super) fn pose(derivation: &Derivation, scope: &NameScope) -> TokenStream {
     }
 }
 
-/// The value of a program without a state, with `geometry` in scope.
+/// The value of a program without inputs of a state, as an expression with `geometry` in scope.
 pub(super) fn single_value(
     derivation: &Derivation,
     scope: &NameScope,
@@ -568,6 +621,7 @@ pub(super) fn single_value(
     let read: BTreeSet<Atom> = routine.read_once.union(&routine.read).copied().collect();
     let given = parameter_bindings(derivation, scope, &read, &geometry, &nothing, "");
     let once = statements(&routine.once);
+    // The program has one output.
     let result = routine
         .results
         .first()

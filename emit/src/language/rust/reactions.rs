@@ -1,4 +1,4 @@
-//! What joints transmit, as a struct of its own.
+//! The struct `Reactions` of an emitted module: forces and moments that joints and loops transmit.
 
 use modelmill_codegen::{Derivation, ReactionPrograms};
 use proc_macro2::{Literal, TokenStream};
@@ -11,13 +11,14 @@ use super::program::{
 };
 use crate::tree::NameScope;
 
-/// The struct `Reactions` with its tables.
+/// The struct `Reactions`, its result type and its tables of joints and loops.
 pub(super) fn reactions(
     derivation: &Derivation,
     scope: &NameScope,
     reactions: &ReactionPrograms,
 ) -> TokenStream {
     let program = &reactions.program;
+    // Components of a vector; those that are not determined are `None`.
     let three = |places: &[Option<usize>; 3]| {
         let components = places.iter().map(|place| match place {
             Some(k) => {
@@ -28,12 +29,14 @@ pub(super) fn reactions(
         });
         quote! { [#(#components),*] }
     };
+    // One wrench per joint, one force per loop.
     let joints = reactions.joints.iter().map(|joint| {
         let (force, moment) = (three(&joint.force), three(&joint.moment));
         quote! { ::modelmill_runtime::Wrench { force: #force, moment: #moment } }
     });
     let loops = reactions.loops.iter().map(|closed| three(&closed.force));
     let made = quote! { ReactionForces { joints: [#(#joints),*], loops: [#(#loops),*] } };
+    // The program returns one array, which the method sorts into joints and loops.
     let n_outputs = Literal::usize_unsuffixed(program.outputs.len());
     let function = ProgramMethod {
         program,
@@ -51,19 +54,21 @@ pub(super) fn reactions(
             conversion: made,
         }),
     };
+    // Names, axes and counts as constants.
     let tables = tables(reactions);
     let owner = ProgramStruct {
         derivation,
         scope,
         name: "Reactions",
         doc: quote! {
-            /// What the joints transmit, for one geometry and one set of parameters: all of them, since bearings feel what no
-            /// drive feels and base parameters therefore do not hold.
+            /// Forces and moments that the joints transmit, for one geometry and one set of parameters. All parameters
+            /// are needed: bearings carry loads that no drive carries, and that base parameters therefore do not
+            /// contain.
             ///
-            /// `None` is what equations of motion do not determine at the model file's geometry, because the mechanism is
-            /// held there more often than once, such as a planar loop across its plane.
+            /// `None` is a component that the equations of motion do not determine at the model file's geometry,
+            /// because the mechanism is statically indeterminate there, such as a planar loop across its plane.
         },
-        prepares: "Prepares the recursion: what does not depend on the state is computed once.",
+        prepares: "Prepares the recursion: computes once what does not depend on the state.",
         is_public: true,
         preparation: PreparationInputs::Parameters,
         functions: vec![function],
@@ -73,14 +78,14 @@ pub(super) fn reactions(
     quote! {
         #tables
 
-        /// What the joints transmit at one state.
+        /// Forces and moments that the joints transmit at one state.
         #[derive(Clone, Copy, Debug, PartialEq)]
         pub struct ReactionForces<T> {
-            /// What each of [`JOINTS`] transmits to the side away from the base, N and N m, drive and friction in it
-            /// included: along the axes that the frame's steps reach behind the joint (those of the frame, if nothing
-            /// follows), the moment about the origin reached there.
+            /// Force and moment that each of [`JOINTS`] transmits to the side away from the base, N and N m, including
+            /// its drive and friction. They are in the axes that the frame's steps reach after the joint (those of the
+            /// frame, if no step follows); the moment is about the origin reached there.
             pub joints: [::modelmill_runtime::Wrench<T>; N_JOINTS],
-            /// For each of [`LOOPS`] the force on the side of the first point that it joins, N.
+            /// For each of [`LOOPS`] the force on the side of its first point, N.
             pub loops: [[Option<T>; 3]; N_LOOPS],
         }
 
@@ -92,6 +97,7 @@ pub(super) fn reactions(
 fn names(reactions: &ReactionPrograms) -> Vec<String> {
     let mut names = vec![String::new(); reactions.program.outputs.len()];
     let mut name = |letter: &str, of: &str, places: &[Option<usize>; 3]| {
+        // Names of joints may have characters that a variable cannot have.
         let of = of.replace(|c: char| !c.is_ascii_alphanumeric(), "_");
         for (place, axis) in places.iter().zip(["x", "y", "z"]) {
             if let Some(name) = place.and_then(|k| names.get_mut(k)) {
@@ -99,21 +105,25 @@ fn names(reactions: &ReactionPrograms) -> Vec<String> {
             }
         }
     };
+    // Force and moment of each joint.
     for joint in &reactions.joints {
         name("F", &joint.name, &joint.force);
         name("M", &joint.name, &joint.moment);
     }
+    // The force of each loop.
     for closed in &reactions.loops {
         name("F", &closed.name, &closed.force);
     }
     names
 }
 
+/// Constants of the module: names, coordinates and axes of joints and loops.
 fn tables(reactions: &ReactionPrograms) -> TokenStream {
     let n_joints = Literal::usize_unsuffixed(reactions.joints.len());
     let n_loops = Literal::usize_unsuffixed(reactions.loops.len());
     let joints = reactions.joints.iter().map(|joint| {
         let (name, coordinates) = (&joint.name, &joint.coordinates);
+        // The axis of the joint as a letter.
         let axis = ['x', 'y', 'z'][joint.axis as usize];
         quote! {
             ::modelmill_runtime::Joint { name: #name, coordinates: &[#(#coordinates),*], axis: #axis }
@@ -124,9 +134,9 @@ fn tables(reactions: &ReactionPrograms) -> TokenStream {
         quote! { ::modelmill_runtime::ClosedLoop { name: #name, axes: #axes } }
     });
     quote! {
-        /// Number of joints whose reactions are told.
+        /// Number of joints whose reactions are computed.
         pub const N_JOINTS: usize = #n_joints;
-        /// Number of loops whose forces are told.
+        /// Number of loops whose forces are computed.
         pub const N_LOOPS: usize = #n_loops;
         /// Joints, from the base outwards, in the order of [`ReactionForces::joints`].
         pub const JOINTS: [::modelmill_runtime::Joint; N_JOINTS] = [#(#joints),*];

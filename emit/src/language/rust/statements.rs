@@ -1,7 +1,7 @@
-//! Statements and expressions as text of Rust, and how that text gets through the printer of tokens.
+//! Statements and expressions as lines of Rust, and how these lines pass through the token printer.
 //!
-//! The printer knows no comments and breaks formulas early. So a line of a program travels through it as a text that
-//! stands by itself, and becomes what it says afterwards.
+//! The token printer drops comments and breaks formulas early. Therefore each line of a program travels through it as a
+//! string literal, which is replaced by its text afterwards.
 
 use modelmill_codegen::expr::Unary;
 use proc_macro2::{Literal, TokenStream};
@@ -11,13 +11,13 @@ use crate::identifier::field_identifier;
 use crate::language::syntax::LanguageSyntax;
 use crate::tree::{CodeStatement, PoseCheck};
 
-/// What a line of a program begins with on its way.
+/// First character of a string literal that stands for a line of source.
 const LINE: char = '\u{a7}';
 
-/// How wide a line of a list may be, less the indentation of a program.
+/// Maximal width of a line in a list, without the indentation of the program.
 const WIDTH: usize = 88;
 
-/// The syntax of Rust, with `n` for the arithmetic in scope.
+/// The syntax of Rust; `n`, the arithmetic of the runtime, must be in scope.
 pub(super) struct RustSyntax;
 
 impl LanguageSyntax for RustSyntax {
@@ -34,6 +34,7 @@ impl LanguageSyntax for RustSyntax {
     }
 
     fn call(&self, function: Unary, argument: &str) -> String {
+        // Sine and cosine are computed together; the unused one is dropped by the compiler.
         let name = match function {
             Unary::Sqrt => "sqrt",
             Unary::Sign => "sign",
@@ -51,8 +52,9 @@ impl LanguageSyntax for RustSyntax {
     }
 }
 
-/// Statements as tokens that become lines.
+/// Statements as tokens that [`restore_lines`] turns into lines.
 pub(super) fn statements(statements: &[CodeStatement]) -> TokenStream {
+    // Lines first, then tokens.
     let mut written = Vec::new();
     for statement in statements {
         write(statement, 0, &mut written);
@@ -60,13 +62,13 @@ pub(super) fn statements(statements: &[CodeStatement]) -> TokenStream {
     line_tokens(&written)
 }
 
-/// Lines as tokens.
+/// Lines of source as string literals.
 pub(super) fn line_tokens(written: &[String]) -> TokenStream {
     let texts = written.iter().map(|line| format!("{LINE}{line}"));
     quote! { #(#texts;)* }
 }
 
-/// Items of a list between its begin and its end, in as many lines as they need.
+/// The items of a list between `start` and `end`, filled into lines.
 pub(super) fn fill_lines(
     start: &str,
     items: impl Iterator<Item = String>,
@@ -76,6 +78,7 @@ pub(super) fn fill_lines(
     let mut items = items.peekable();
     while let Some(mut item) = items.next() {
         item.push_str(if items.peek().is_some() { "," } else { end });
+        // The first item follows `start` without a blank.
         let space = if lines.len() == 1 && lines[0] == start {
             ""
         } else {
@@ -92,29 +95,30 @@ pub(super) fn fill_lines(
     lines
 }
 
-/// An item of a list as tokens that become what it says.
+/// Source of an expression as a string literal that [`restore_lines`] replaces.
 pub(super) fn verbatim_tokens(text: &str) -> TokenStream {
     let text = format!("{LINE}{text}");
     quote! { #text }
 }
 
-/// Printed source with its lines in place.
+/// The printed source with all literals of lines replaced by their text.
 pub(super) fn restore_lines(source: &str) -> String {
     let start = format!("\"{LINE}");
     let mut text = String::with_capacity(source.len());
     for line in source.lines() {
         let mut rest = line;
+        // Each literal that begins with the marker is unescaped and written without quotes.
         while let Some(at) = rest.find(&start) {
             text.push_str(&rest[..at]);
             let literal = &rest[at..at + literal_length(&rest[at..])];
             rest = &rest[at + literal.len()..];
             let value = syn::parse_str::<syn::LitStr>(literal).map(|literal| literal.value());
             let value = value.unwrap_or_default();
-            // Several lines begin where the first one does.
+            // Further lines of a text get the indentation of the first one.
             let indent = &line[..line.len() - line.trim_start().len()];
             let value = value.trim_start_matches(LINE);
             text.push_str(&value.replace('\n', &format!("\n{indent}")));
-            // A statement brings its own end.
+            // A statement has its own semicolon.
             if rest == ";" {
                 rest = "";
             }
@@ -125,7 +129,7 @@ pub(super) fn restore_lines(source: &str) -> String {
     text
 }
 
-/// Length of the text literal that something starts with.
+/// Length in bytes of the string literal at the start of the text.
 fn literal_length(text: &str) -> usize {
     let mut escaped = false;
     for (at, c) in text.char_indices().skip(1) {
@@ -138,10 +142,12 @@ fn literal_length(text: &str) -> usize {
     text.len()
 }
 
+/// Appends a statement as lines, indented by `depth` levels.
 fn write(statement: &CodeStatement, depth: usize, lines: &mut Vec<String>) {
     let indent = "    ".repeat(depth);
     let mut line = |text: String| lines.push(format!("{indent}{text}"));
     match statement {
+        // Headings become comments.
         CodeStatement::Section(text) => line(format!("// {text}")),
         CodeStatement::Let { name, value, note } => {
             let note = note
@@ -153,7 +159,9 @@ fn write(statement: &CodeStatement, depth: usize, lines: &mut Vec<String>) {
                 RustSyntax.operand_text(value)
             ));
         }
+        // Sines and cosines of all angles of a program are computed together, in vectors.
         CodeStatement::Angles(angles) => {
+            // The list takes variables; an expression is made one first.
             let values = angles.iter().map(|angle| {
                 let value = RustSyntax.operand_text(&angle.value);
                 if angle.plain {
@@ -163,7 +171,7 @@ fn write(statement: &CodeStatement, depth: usize, lines: &mut Vec<String>) {
                 }
             });
             let mut values: Vec<String> = values.collect();
-            // The compiler makes pairs only of a number of angles that is even.
+            // The compiler pairs the lanes only if the number of angles is even, so the last one is repeated.
             if values.len() % 2 == 1 {
                 values.extend(values.last().cloned());
             }
@@ -175,10 +183,12 @@ fn write(statement: &CodeStatement, depth: usize, lines: &mut Vec<String>) {
             angle,
             requested: asked,
         } => {
+            // A value that is not needed is not bound.
             let name = |name: &Option<String>| match name {
                 Some(name) => RustSyntax.name(name),
                 None => "_".to_owned(),
             };
+            // From the list of angles, or computed here.
             let value = match asked {
                 Some(k) => format!("n.sin_cos_of(&angles, {k})"),
                 None => format!("n.sin_cos({})", RustSyntax.operand_text(angle)),
@@ -204,10 +214,12 @@ fn write(statement: &CodeStatement, depth: usize, lines: &mut Vec<String>) {
                 RustSyntax.operand_text(value)
             ));
         }
+        // A block, which returns the values that later statements read.
         CodeStatement::Group {
             statements,
             exported: handed,
         } => {
+            // The names that the block returns.
             let names: Vec<String> = handed.iter().map(|name| RustSyntax.name(name)).collect();
             let names = names.join(", ");
             if handed.is_empty() {
@@ -215,6 +227,7 @@ fn write(statement: &CodeStatement, depth: usize, lines: &mut Vec<String>) {
             } else {
                 line(format!("let ({names},) = {{"));
             }
+            // The statements of the block.
             for statement in statements {
                 write(statement, depth + 1, lines);
             }
@@ -228,7 +241,7 @@ fn write(statement: &CodeStatement, depth: usize, lines: &mut Vec<String>) {
     }
 }
 
-/// A number without a suffix.
+/// A number as an unsuffixed literal with its sign.
 pub(super) fn number_token(value: f64) -> TokenStream {
     let magnitude = Literal::f64_unsuffixed(value.abs());
     if value.is_sign_negative() {
