@@ -1,4 +1,4 @@
-//! What kinds with mechanics in place of an expression must look like: their places, symbols and dimensions.
+//! Checks kinds with mechanics in place of an expression: their places, symbols and dimensions.
 
 use crate::diagnostic::{Diagnostic, DiagnosticLog, SourceSpan};
 use crate::document::TomlKey;
@@ -7,7 +7,7 @@ use crate::mechanics::MechanicsSymbols;
 use crate::schema::EffectKindEntry;
 use crate::values::UnitByPlace;
 
-/// Checks what a kind adds: an expression at places that have one, or mechanics with their own symbols and places.
+/// Checks what a kind adds: an expression at places that allow one, or mechanics with their own symbols and places.
 /// False if it has mechanics or is faulty, so that there is no expression to check.
 pub(crate) fn check_expression_or_mechanics(
     entry: &EffectKindEntry,
@@ -26,6 +26,7 @@ pub(crate) fn check_expression_or_mechanics(
             }
             return false;
         };
+        // Parts, the base and the measured forces have no force that an expression could be added to.
         let elsewhere = places.find(|on| matches!(on, ActsOn::Part | ActsOn::Base | ActsOn::Force));
         if let (Some(found), Some(on)) = (elsewhere, &entry.on) {
             log.push(
@@ -41,7 +42,7 @@ pub(crate) fn check_expression_or_mechanics(
         if entry.parameters.is_none() && !entry.faulty && !log.syntax_broken {
             log.push(
                 Diagnostic::error(expression.ast.span, "this expression has no parameters")
-                    .label("expected `parameters` that identification can find")
+                    .label("expected `parameters` that can be identified")
                     .help("for example `parameters = { Fv = { unit = \"N s/m\" } }`"),
             );
         }
@@ -49,7 +50,7 @@ pub(crate) fn check_expression_or_mechanics(
     };
     if let Some(expression) = &entry.expression {
         log.push(
-            Diagnostic::error(expression.ast.span, "this kind says twice what it does")
+            Diagnostic::error(expression.ast.span, "this kind defines its effect twice")
                 .label("expected either `expression` or `mechanics`"),
         );
     }
@@ -68,7 +69,9 @@ pub(crate) fn check_expression_or_mechanics(
     false
 }
 
-/// Holds the symbols of a kind with mechanics against those that the mechanics have.
+/// Compares the symbols of a kind with mechanics with those that the mechanics require.
+///
+/// `what` is `parameters` or `constants`, and `expected` gives names with dimensions.
 fn check_symbols(
     entry: &EffectKindEntry,
     what: &str,
@@ -76,6 +79,7 @@ fn check_symbols(
     name_span: SourceSpan,
     log: &mut DiagnosticLog,
 ) {
+    // Both tables have the same form but different entry types.
     let found: Vec<(&TomlKey, Option<&UnitByPlace>)> = if what == "parameters" {
         let entries = entry.parameters.iter().flat_map(|table| &table.entries);
         entries.map(|(key, one)| (key, one.unit.as_ref())).collect()
@@ -87,7 +91,7 @@ fn check_symbols(
     for (key, units) in &found {
         let Some((_, dimension)) = expected.iter().find(|(name, _)| *name == key.name) else {
             log.push(
-                Diagnostic::error(key.span, format!("these mechanics know no `{}`", key.name))
+                Diagnostic::error(key.span, format!("these mechanics have no `{}`", key.name))
                     .label(if names.is_empty() {
                         format!("they have no {what}")
                     } else {
@@ -96,6 +100,7 @@ fn check_symbols(
             );
             continue;
         };
+        // The unit of the first load that the kind can have is compared.
         let unit = units.and_then(|units| {
             PlaceLoad::ALL
                 .into_iter()
@@ -110,6 +115,7 @@ fn check_symbols(
             );
         }
     }
+    // A faulty entry may contain the missing names, so nothing is reported as missing then.
     let lacking: Vec<&str> = names
         .into_iter()
         .filter(|name| !found.iter().any(|(key, _)| key.name == *name))

@@ -1,4 +1,6 @@
-//! What a kind of effect adds at a place: its expression with units settled, split into one factor per parameter.
+//! What a kind of effect adds at a place: its expression, checked for units and split into one factor per parameter.
+//!
+//! A kind and the load of a place go in; the factors that multiply its parameters come out.
 
 use std::cell::Cell;
 
@@ -10,7 +12,7 @@ use crate::scope::{FormulaRequirement, FormulaScope, SymbolMeaning, SymbolSort, 
 use crate::unit::{ModelUnit, UnitDimension};
 use crate::values::UnitByPlace;
 
-/// Symbols of a kind that have no unit where the place carries this.
+/// Parameters and constants of a kind that have no unit for this load of a place.
 pub(crate) fn symbols_without_unit(entry: &EffectKindEntry, carries: PlaceLoad) -> Vec<&str> {
     let parameters = entry
         .parameters
@@ -32,12 +34,14 @@ pub(crate) fn symbols_without_unit(entry: &EffectKindEntry, carries: PlaceLoad) 
         .collect()
 }
 
-/// The unit of a kind's parameter at a place that carries this.
+/// The unit of a kind's parameter or constant for this load of a place.
 pub(crate) fn unit_at(unit: Option<&UnitByPlace>, carries: PlaceLoad) -> Option<&ModelUnit> {
     carries.unit(unit?)
 }
 
-/// What multiplies each parameter of a kind at a place, in the order of the kind's parameters.
+/// The factor of each parameter of a kind for this load of a place, in the order of the kind's parameters.
+///
+/// `constants` gives the expressions that replace the kind's constants. Faults go to the log and give `None`.
 pub(crate) fn factors(
     entry: &EffectKindEntry,
     carries: PlaceLoad,
@@ -69,6 +73,7 @@ pub(crate) fn factors(
         },
         log,
     )?;
+    // Resolving marked the names that the expression uses.
     for (key, _) in parameters {
         if scope
             .get(&key.name)
@@ -87,6 +92,7 @@ pub(crate) fn factors(
     if log.n_errors() > before {
         return None;
     }
+    // Factors are valid only if the expression is a homogeneous linear function of the parameters.
     let mut factors = vec![Vec::new(); parameters.len()];
     if !split_into_factors(&exact, &ExactExpression::unity(), &mut factors) {
         log.push(
@@ -95,11 +101,12 @@ pub(crate) fn factors(
                 "this expression is not linear in the kind's parameters",
             )
             .label("expected a sum of terms, each with exactly one parameter as a factor")
-            .help("declare what bends the curve as a constant of the kind; a term without a parameter is known and needs a parameter with a nominal value"),
+            .help("declare nonlinear quantities as constants of the kind; multiply a known term by a parameter with a nominal value"),
         );
         return None;
     }
     Some(
+        // Terms with the same parameter are added.
         factors
             .into_iter()
             .map(|mut terms| match terms.len() {
@@ -111,6 +118,7 @@ pub(crate) fn factors(
     )
 }
 
+/// The names that the expression of a kind may use: its parameters, its constants, and the motion of its places.
 fn scope(
     entry: &EffectKindEntry,
     carries: PlaceLoad,
@@ -140,6 +148,7 @@ fn scope(
         let unit = unit_at(constant.unit.as_ref(), carries);
         let exact = constants
             .iter()
+            // A constant without an expression counts as one; the caller gives all constants of the kind.
             .find(|(name, _)| *name == key.name)
             .map_or_else(ExactExpression::unity, |(_, exact)| exact.clone());
         scope.declare(
@@ -156,9 +165,11 @@ fn scope(
             log,
         );
     }
+    // Places with a mass, the base, and the like have no motion that an expression could use.
     let Some(own) = dimensions(carries) else {
         return scope;
     };
+    // The other place has the same dimensions unless `other` states how it moves.
     let other = entry.other.map_or(carries, OtherMotion::place_load);
     let other = dimensions(other).unwrap_or(own);
     for quantity in PlaceQuantity::ALL {
@@ -181,7 +192,7 @@ fn scope(
     scope
 }
 
-/// Dimensions of position, rate, acceleration and load of a place, where it has them.
+/// Dimensions of coordinate, rate, acceleration and load of a place; `None` if it has no motion.
 fn dimensions(carries: PlaceLoad) -> Option<[UnitDimension; 4]> {
     match carries {
         PlaceLoad::Mass | PlaceLoad::Elsewhere => None,
@@ -200,11 +211,14 @@ fn dimensions(carries: PlaceLoad) -> Option<[UnitDimension; 4]> {
     }
 }
 
+/// Whether a symbol is a parameter of the kind.
 fn is_parameter(symbol: ModelSymbol) -> bool {
     matches!(symbol, ModelSymbol::Parameter(_))
 }
 
-/// Splits `factor * exact` into terms per parameter; false if it is not linear and homogeneous in them.
+/// Splits `factor * exact` into terms per parameter; false if `exact` is not linear and homogeneous in them.
+///
+/// The factor of each occurrence is appended to the list of its parameter.
 fn split_into_factors(
     exact: &ExactExpression,
     factor: &ExactExpression,
@@ -229,6 +243,7 @@ fn split_into_factors(
             factors,
         ),
         ExactExpression::Product(members) => {
+            // Exactly one member may contain parameters; all others join the factor.
             let (with, without): (Vec<&ExactExpression>, Vec<&ExactExpression>) = members
                 .iter()
                 .partition(|member| member.mentions(&is_parameter));

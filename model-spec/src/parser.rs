@@ -1,7 +1,9 @@
-//! Parser of exact expressions: `"2*r3 + d4"` becomes a tree whose every node knows its place in the file.
+//! Parser of exact expressions: `"2*r3 + d4"` becomes a tree in which every node has its place in the file.
 //!
 //! The grammar is that of everyday formulas: `+ - * / ^`, parentheses, `pi`, names, decimals,
 //! and the functions `sin cos sqrt abs sign tanh exp`. Nothing is rounded.
+//!
+//! Recursive descent: a sum contains products, a product contains powers, a power contains atoms.
 
 use num_bigint::BigInt;
 use num_rational::BigRational;
@@ -16,12 +18,14 @@ use crate::suggest;
 const DEEPEST: usize = 48;
 /// Most digits of one number, before and after the point together.
 const MOST_DIGITS: usize = 40;
-/// Largest exponent of a power, and of ten in a decimal.
+/// Largest exponent of a power. Exponents of ten in a decimal may be twice as large.
 const LARGEST_EXPONENT: i32 = 16;
 /// Largest product of exponents of powers of powers.
 const LARGEST_DEGREE: i32 = 64;
 
-/// Parses `text`, which stands in the file at `outer`, its characters from byte `inner` on if they can be told apart.
+/// Parses `text`, which stands in the file at `outer`. Its characters start at byte `inner`, if that is known.
+///
+/// A fault goes to the log and gives `None`.
 pub(crate) fn parse(
     text: &str,
     outer: SourceSpan,
@@ -53,24 +57,32 @@ pub(crate) fn parse(
     }
 }
 
+/// The state of the parser.
 struct FormulaParser<'a> {
+    /// The text of the expression.
     text: &'a str,
+    /// Position of the next character, in bytes.
     at: usize,
+    /// Levels of sums that are open now.
     depth: usize,
+    /// The place of the complete expression in the file.
     outer: SourceSpan,
+    /// Byte in the file at which the text starts, if it stands there without escapes.
     inner: Option<usize>,
 }
 
+/// A result of the parser; the error is boxed because it is large.
 type ParseResult<T> = Result<T, Box<Diagnostic>>;
 
 impl FormulaParser<'_> {
+    /// Parses the complete text; characters behind the expression are an error.
     fn parse_complete(&mut self) -> ParseResult<FormulaAst> {
         self.skip_blanks();
         if self.at == self.text.len() {
             return Err(Box::new(
                 Diagnostic::error(self.outer, "this expression is empty")
                     .label("expected a number, a name or a formula")
-                    .help("write `\"0\"` for nothing"),
+                    .help("write `\"0\"` for zero"),
             ));
         }
         let (ast, _) = self.sum()?;
@@ -81,6 +93,9 @@ impl FormulaParser<'_> {
         Ok(ast)
     }
 
+    /// Parses terms joined by `+` and `-`.
+    ///
+    /// Like all rules, it returns the tree and its degree: the largest product of nested exponents in it.
     fn sum(&mut self) -> ParseResult<(FormulaAst, i32)> {
         self.enter_level()?;
         let start = self.at;
@@ -103,6 +118,7 @@ impl FormulaParser<'_> {
             });
         }
         self.depth -= 1;
+        // A single term is returned without a sum around it.
         let ast = match <[FormulaAst; 1]>::try_from(terms) {
             Ok([only]) => only,
             Err(terms) => FormulaAst {
@@ -113,10 +129,12 @@ impl FormulaParser<'_> {
         Ok((ast, degree))
     }
 
+    /// Parses signs, then factors joined by `*` and `/`.
     fn product(&mut self) -> ParseResult<(FormulaAst, i32)> {
         self.skip_blanks();
         let start = self.at;
         let mut minus = false;
+        // Two signs in a row, as in `a - -b`, are accepted; three are not.
         let mut signs = 0;
         while let Some(sign @ ('+' | '-')) = self.peek() {
             signs += 1;
@@ -128,6 +146,7 @@ impl FormulaParser<'_> {
             self.skip_blanks();
         }
         let (first, mut degree) = self.power()?;
+        // `a/b*c/d` is collected into one numerator and one denominator.
         let mut above = vec![first];
         let mut below = Vec::new();
         loop {
@@ -164,6 +183,7 @@ impl FormulaParser<'_> {
         Ok((ast, degree))
     }
 
+    /// Parses an atom with an optional integer exponent, such as `x^2` or `x^(-1)`.
     fn power(&mut self) -> ParseResult<(FormulaAst, i32)> {
         self.skip_blanks();
         let start = self.at;
@@ -198,6 +218,7 @@ impl FormulaParser<'_> {
                 return Err(self.bad_exponent(exponent_start));
             }
         }
+        // `x^2.5` and `x^2a` are reported as exponents, not as text behind an expression.
         let after = self.peek();
         if matches!(after, Some('.')) || after.is_some_and(char::is_alphabetic) {
             return Err(self.bad_exponent(exponent_start));
@@ -212,6 +233,7 @@ impl FormulaParser<'_> {
             }
             _ => return Err(self.bad_exponent(exponent_start)),
         };
+        // Nested powers multiply their exponents; the limit keeps expanded polynomials small.
         let degree = degree.saturating_mul(exponent.abs().max(1));
         if degree > LARGEST_DEGREE {
             return Err(Box::new(
@@ -239,6 +261,7 @@ impl FormulaParser<'_> {
         ))
     }
 
+    /// Parses a number, a name, a function call or an expression in parentheses.
     fn atom(&mut self) -> ParseResult<(FormulaAst, i32)> {
         self.skip_blanks();
         let start = self.at;
@@ -273,6 +296,7 @@ impl FormulaParser<'_> {
         }
     }
 
+    /// Parses a name, `pi`, or a function with its operand in parentheses.
     fn name_or_function(&mut self) -> ParseResult<(FormulaAst, i32)> {
         let start = self.at;
         while self
@@ -323,10 +347,11 @@ impl FormulaParser<'_> {
         ))
     }
 
-    /// A decimal as an exact rational, such as `0.316` or `2.5e-3`.
+    /// Parses a decimal as an exact rational, such as `0.316` or `2.5e-3`.
     fn number(&mut self) -> ParseResult<BigRational> {
         let start = self.at;
         let mut digits = String::new();
+        // The digits are read as one integer; the decimals and the exponent give a power of ten.
         let mut n_decimals = 0_i32;
         let mut point = false;
         while let Some(found) = self.peek() {
@@ -350,6 +375,7 @@ impl FormulaParser<'_> {
             self.at += 1;
         }
         let mut ten_power = -n_decimals;
+        // An `e` counts as an exponent only if digits follow it.
         if let Some('e' | 'E') = self.peek() {
             let rest = &self.text[self.at + 1..];
             let signed = rest.trim_start_matches(['+', '-']);
@@ -388,6 +414,7 @@ impl FormulaParser<'_> {
         })
     }
 
+    /// Expects `)`; `open` is the position of the parenthesis that it closes.
     fn close_parenthesis(&mut self, open: usize) -> ParseResult<()> {
         self.skip_blanks();
         if self.peek() == Some(')') {
@@ -406,6 +433,7 @@ impl FormulaParser<'_> {
         ))
     }
 
+    /// Counts a level of nesting and fails if there are too many.
     fn enter_level(&mut self) -> ParseResult<()> {
         self.depth += 1;
         if self.depth > DEEPEST {
@@ -421,13 +449,14 @@ impl FormulaParser<'_> {
         Ok(())
     }
 
+    /// The fault of a character that cannot stand at the current position.
     fn unexpected_character(&self, found: char) -> Box<Diagnostic> {
         let span = self.span(self.at, self.at + found.len_utf8());
         let shown = found.escape_debug();
         let diagnostic = Diagnostic::error(span, format!("unexpected `{shown}` in an expression"));
         Box::new(match found {
             ')' => diagnostic.label("no parenthesis is open here, or its content is missing"),
-            '=' | '<' | '>' => diagnostic.label("an expression compares nothing"),
+            '=' | '<' | '>' => diagnostic.label("expressions have no comparisons"),
             '\u{2212}' => diagnostic
                 .label("this is a typographic minus")
                 .help("write the plain `-`"),
@@ -435,8 +464,8 @@ impl FormulaParser<'_> {
                 .label("this is a typographic product sign")
                 .help("write the plain `*`"),
             ',' => diagnostic
-                .label("expected a point in a decimal; functions have one operand")
-                .help("write `0.5`, not `0,5`"),
+                .label("a comma cannot stand here: decimals have a point, functions have one operand")
+                .help("write decimals with a point (`0.5`), one expression per entry: `[\"ax\", \"-ay\"]`"),
             _ if found.is_alphanumeric() || found == '(' => {
                 diagnostic.label("expected an operator: `+ - * / ^`")
             }
@@ -444,6 +473,7 @@ impl FormulaParser<'_> {
         })
     }
 
+    /// The fault of an exponent that starts at `start`; the mark extends to the end of the word.
     fn bad_exponent(&self, start: usize) -> Box<Diagnostic> {
         let mut end = self.at;
         while self
@@ -466,16 +496,19 @@ impl FormulaParser<'_> {
         )
     }
 
+    /// The next character, or `None` at the end.
     fn peek(&self) -> Option<char> {
         self.text[self.at..].chars().next()
     }
 
+    /// Skips blanks, tabs and line ends.
     fn skip_blanks(&mut self) {
         while let Some(' ' | '\t' | '\n' | '\r') = self.peek() {
             self.at += 1;
         }
     }
 
+    /// The place in the file of the bytes from `start` to `end` of the text.
     fn span(&self, start: usize, end: usize) -> SourceSpan {
         match self.inner {
             Some(inner) => SourceSpan {
@@ -488,6 +521,7 @@ impl FormulaParser<'_> {
     }
 }
 
+/// The negative of an expression; a number changes its sign instead.
 fn negative(ast: FormulaAst, span: SourceSpan) -> FormulaAst {
     let kind = match ast.kind {
         FormulaAstKind::Rational(value) => FormulaAstKind::Rational(-value),
@@ -499,7 +533,7 @@ fn negative(ast: FormulaAst, span: SourceSpan) -> FormulaAst {
     FormulaAst { span, kind }
 }
 
-/// Makes `a*c/(b*d)` of the chain `a/b*c/d`, its numbers collected into one, so that no chain is deep.
+/// Makes `a*c/(b*d)` of the chain `a/b*c/d` and collects its numbers into one, so that the tree is not deep.
 fn fraction(
     above: Vec<FormulaAst>,
     below: Vec<FormulaAst>,
@@ -508,6 +542,7 @@ fn fraction(
     let mut number = BigRational::one();
     let mut numerator = Vec::new();
     let mut denominator = Vec::new();
+    // Numeric factors are multiplied exactly; the others keep their order.
     for factor in above {
         match factor.kind {
             FormulaAstKind::Rational(value) => number *= value,
@@ -546,6 +581,7 @@ fn fraction(
     })
 }
 
+/// A product of factors; a single factor stands for itself.
 fn product(mut factors: Vec<FormulaAst>, span: SourceSpan) -> FormulaAst {
     if factors.len() == 1 {
         return factors.swap_remove(0);

@@ -1,7 +1,7 @@
-//! The names that an expression may use, with their meanings and dimensions.
+//! The names that an expression may use, with their values and dimensions.
 //!
-//! A parsed expression and a scope go in, an [`Exact`] comes out; every unknown name and every clash
-//! of units in it is reported.
+//! A parsed expression and a scope go in, an [`ExactExpression`] comes out. Every unknown name and every sum of
+//! different units in it is reported.
 
 use std::cell::Cell;
 use std::collections::BTreeMap;
@@ -15,16 +15,21 @@ use crate::suggest;
 use crate::unit::UnitDimension;
 use crate::values::check_not_reserved;
 
-/// What sort of thing a name stands for.
+/// The sort of quantity that a name stands for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum SymbolSort {
+    /// A known quantity of the file.
     Constant,
+    /// A dynamic parameter.
     Parameter,
+    /// A joint coordinate.
     Coordinate,
+    /// A quantity of the place of an effect, such as `rate`.
     Place,
 }
 
 impl SymbolSort {
+    /// The sort, for messages.
     fn name(self) -> &'static str {
         match self {
             Self::Constant => "a constant",
@@ -35,40 +40,45 @@ impl SymbolSort {
     }
 }
 
-/// The meaning of a name.
+/// The quantity that a name stands for.
 #[derive(Clone, Debug)]
 pub(crate) struct SymbolMeaning {
+    /// Its sort, which decides where the name may be used.
     pub(crate) sort: SymbolSort,
+    /// The expression that replaces the name.
     pub(crate) exact: ExactExpression,
-    /// Unknown where the unit was faulty; then it fits anything.
+    /// Dimension; `None` where the unit was faulty, which then fits any other.
     pub(crate) dimension: Option<UnitDimension>,
-    /// The unit as printed.
+    /// The unit as the file writes it; may be empty.
     pub(crate) unit: String,
-    /// The number that the file gives it; only constants have one.
+    /// The number that the file gives; only constants have one.
     pub(crate) value: Option<f64>,
+    /// Where the file declares it; `None` for names that the program declares.
     pub(crate) declared: Option<SourceSpan>,
+    /// Whether an expression used it; a cell, because resolving borrows the scope.
     pub(crate) used: Cell<bool>,
 }
 
-/// Names and their meanings.
+/// Names and the quantities that they stand for.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct FormulaScope {
+    /// By name.
     names: BTreeMap<String, SymbolMeaning>,
 }
 
-/// What an expression must be.
+/// What an expression must satisfy.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FormulaRequirement<'a> {
-    /// Its sorts of names.
+    /// Sorts of names that it may use.
     pub(crate) sorts: &'a [SymbolSort],
-    /// Its dimension.
+    /// Dimension that it must have.
     pub(crate) dimension: UnitDimension,
-    /// What it is, for messages: `the mass of a part`.
+    /// The quantity that it describes, for messages: `the mass of a part`.
     pub(crate) what: &'a str,
 }
 
 impl FormulaScope {
-    /// Adds a name; a second definition is reported and gives false.
+    /// Adds a name; a second definition or a reserved word is reported and gives false.
     pub(crate) fn declare(
         &mut self,
         name: &str,
@@ -100,19 +110,19 @@ impl FormulaScope {
         true
     }
 
-    /// Looks a name up.
+    /// The quantity of a name, without marking it as used.
     pub(crate) fn get(&self, name: &str) -> Option<&SymbolMeaning> {
         self.names.get(name)
     }
 
-    /// All names with their meanings.
+    /// All names in alphabetical order.
     pub(crate) fn iter(&self) -> impl Iterator<Item = (&str, &SymbolMeaning)> {
         self.names
             .iter()
             .map(|(name, meaning)| (name.as_str(), meaning))
     }
 
-    /// Looks up a name that must be of one of the given sorts, reports it otherwise, and marks it as used.
+    /// The quantity of a name, which is marked as used. Unknown names and other sorts are reported.
     pub(crate) fn look_up(
         &self,
         name: &str,
@@ -133,6 +143,7 @@ impl FormulaScope {
             .join(" or ");
         let Some(meaning) = self.names.get(name) else {
             if !log.is_full() {
+                // Candidates are collected only if the finding will be kept: large files with many faults stay fast.
                 let candidates: Vec<&str> = allowed().collect();
                 let removal = log.removal(&["constants", "parameters", "coordinates"], name);
                 log.push(
@@ -164,7 +175,7 @@ impl FormulaScope {
         Some(meaning)
     }
 
-    /// Gives an expression its meaning; faults are reported.
+    /// Resolves an expression to exact form; `None` after any error, each of which is reported.
     pub(crate) fn resolve(
         &self,
         formula: &SourceFormula,
@@ -198,7 +209,7 @@ impl FormulaScope {
         self.get(name)?.value
     }
 
-    /// Reports an expression without a finite value at the constants of the file.
+    /// Reports an expression whose value at the constants of the file is not finite.
     fn check_value(&self, ast: &FormulaAst, log: &mut DiagnosticLog) {
         if let Err(fault) = finite::value(ast, &|name| self.value(name)) {
             let declared = match &fault.piece.kind {
@@ -209,7 +220,7 @@ impl FormulaScope {
         }
     }
 
-    /// The meaning and dimension of a subexpression; `None` as a dimension fits any, as bare numbers do.
+    /// The exact form and dimension of a subexpression. A dimension of `None` fits any, as that of bare numbers does.
     pub(crate) fn resolve_ast(
         &self,
         ast: &FormulaAst,
@@ -227,6 +238,7 @@ impl FormulaScope {
             }
             FormulaAstKind::Sum(terms) => {
                 let mut sum = Vec::new();
+                // The first term with a dimension decides; all others must agree with it.
                 let mut dimension: Option<(UnitDimension, SourceSpan)> = None;
                 let mut faulty = false;
                 for term in terms {
@@ -259,6 +271,7 @@ impl FormulaScope {
             }
             FormulaAstKind::Product(factors) => {
                 let mut product = Vec::new();
+                // Bare numbers in a product do not change its dimension.
                 let mut dimension: Option<UnitDimension> = None;
                 let mut faulty = false;
                 for factor in factors {
@@ -278,6 +291,7 @@ impl FormulaScope {
                 let above = self.resolve_ast(above, sorts, log);
                 let below = self.resolve_ast(below, sorts, log);
                 let ((above, upper), (below, lower)) = (above?, below?);
+                // A bare number above or below counts as dimensionless once the other side has a dimension.
                 let dimension = match (upper, lower) {
                     (None, None) => None,
                     (upper, lower) => Some(
@@ -314,7 +328,7 @@ impl FormulaScope {
     }
 }
 
-/// The dimension of a function's value; a wrong operand is reported.
+/// The dimension of a function's value; an operand that does not fit is reported.
 #[allow(clippy::option_option)] // Outer: faulty or not; inner: fits any dimension.
 fn function_dimension(
     function: ExactFunction,
@@ -324,6 +338,7 @@ fn function_dimension(
 ) -> Option<Option<UnitDimension>> {
     match (function, operand) {
         (ExactFunction::Abs, operand) => Some(operand),
+        // The sign of any quantity is a pure number.
         (ExactFunction::Sign, _) => Some(Some(UnitDimension::ONE)),
         (ExactFunction::Sqrt, None) => Some(None),
         (ExactFunction::Sqrt, Some(found)) => {
@@ -361,7 +376,7 @@ fn function_dimension(
     }
 }
 
-/// A symbol's meaning.
+/// The entry of the scope for a symbol of the model, not used yet and without a value.
 pub(crate) fn symbol_meaning(
     sort: SymbolSort,
     symbol: ModelSymbol,

@@ -1,4 +1,6 @@
 //! The small values of a model file: names, texts, numbers, vectors, and the words for an axis.
+//!
+//! Each type reads itself from a node of the document and reports faults with its place.
 
 #[cfg(any(test, feature = "schema"))]
 use std::borrow::Cow;
@@ -14,7 +16,7 @@ use crate::schema::{SearchRangeEntry, UnitTable};
 use crate::unit::ModelUnit;
 use crate::words::words;
 
-/// Words that mean something in expressions and so name nothing else.
+/// Words with a meaning in expressions, which therefore cannot be names.
 const RESERVED: [&str; 17] = [
     "pi",
     "sin",
@@ -38,7 +40,9 @@ const RESERVED: [&str; 17] = [
 /// A name, where it is defined or where it is used.
 #[derive(Clone, Debug)]
 pub(crate) struct SpannedName {
+    /// The name, checked to be an identifier.
     pub(crate) text: String,
+    /// Where it stands.
     pub(crate) span: SourceSpan,
 }
 
@@ -57,7 +61,7 @@ impl SchemaValue for SpannedName {
     }
 }
 
-/// Whether a text is an identifier.
+/// Whether a text is an identifier: a letter, then letters, digits and `_`, at most 60 characters.
 pub(crate) fn is_name(text: &str) -> bool {
     text.len() <= 60
         && text.starts_with(|first: char| first.is_ascii_alphabetic())
@@ -66,7 +70,7 @@ pub(crate) fn is_name(text: &str) -> bool {
             .all(|found| found.is_ascii_alphanumeric() || found == '_')
 }
 
-/// Reports a name that is no identifier.
+/// Reports a name that is not an identifier; true if it is one.
 pub(crate) fn check_name(text: &str, span: SourceSpan, log: &mut DiagnosticLog) -> bool {
     let fine = is_name(text);
     if !fine {
@@ -78,7 +82,7 @@ pub(crate) fn check_name(text: &str, span: SourceSpan, log: &mut DiagnosticLog) 
     fine
 }
 
-/// Reports a name that is taken by the language of expressions.
+/// Reports a name that is a word of the expression language; true if it is not one.
 pub(crate) fn check_not_reserved(text: &str, span: SourceSpan, log: &mut DiagnosticLog) -> bool {
     let reserved = RESERVED.contains(&text);
     if reserved {
@@ -110,7 +114,9 @@ impl JsonSchema for SpannedName {
 /// Free text.
 #[derive(Clone, Debug)]
 pub(crate) struct SpannedText {
+    /// The text without its quotes; at most 4000 bytes.
     pub(crate) text: String,
+    /// Where it stands.
     pub(crate) span: SourceSpan,
 }
 
@@ -154,7 +160,9 @@ impl JsonSchema for SpannedText {
 /// A finite number.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SpannedNumber {
+    /// The value in SI units.
     pub(crate) value: f64,
+    /// Where it stands.
     pub(crate) span: SourceSpan,
 }
 
@@ -175,7 +183,7 @@ impl SchemaValue for SpannedNumber {
                 log.push(
                     Diagnostic::error(node.span, format!("`{}` is not finite", quote(text)))
                         .label("expected a finite number")
-                        .help("nothing in a mechanism is infinite; leave the entry away if it is not known"),
+                        .help("quantities of a mechanism are finite; omit the entry if its value is not known"),
                 );
                 None
             }
@@ -198,7 +206,7 @@ impl JsonSchema for SpannedNumber {
     }
 }
 
-/// Yes or no.
+/// A boolean.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct BooleanFlag(pub(crate) bool);
 
@@ -229,13 +237,17 @@ impl JsonSchema for BooleanFlag {
     }
 }
 
-/// A unit that may depend on what the place carries.
+/// A unit that may depend on the load of the place: force, torque or mass.
 #[derive(Clone, Debug)]
+// `None` where the author gives no unit: the kind does not act at such places.
 pub(crate) struct UnitByPlace {
+    /// Where the place carries a force.
     pub(crate) force: Option<ModelUnit>,
+    /// Where the place carries a torque.
     pub(crate) torque: Option<ModelUnit>,
+    /// At a point, which carries a mass.
     pub(crate) point: Option<ModelUnit>,
-    /// Elsewhere: one unit for all places serves there.
+    /// At all other places; only a single unit for all places applies there.
     pub(crate) elsewhere: Option<ModelUnit>,
 }
 
@@ -285,7 +297,7 @@ impl JsonSchema for UnitByPlace {
     }
 }
 
-/// The version of the file format.
+/// The version of the file format; only 1 exists.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SchemaVersion;
 
@@ -331,6 +343,7 @@ impl JsonSchema for SchemaVersion {
 pub(crate) struct FormulaVector {
     /// The entries; absent where one was faulty.
     pub(crate) entries: Vec<Option<SourceFormula>>,
+    /// Where the vector stands.
     pub(crate) span: SourceSpan,
 }
 
@@ -383,7 +396,7 @@ impl JsonSchema for FormulaVector {
     }
 }
 
-/// A place of a lumped mass.
+/// The place of a lumped mass.
 #[derive(Clone, Debug)]
 pub(crate) enum LumpedMassPlace {
     /// A named point.
@@ -393,6 +406,7 @@ pub(crate) enum LumpedMassPlace {
 }
 
 impl LumpedMassPlace {
+    /// Where it stands in the file.
     pub(crate) fn span(&self) -> SourceSpan {
         match self {
             Self::Point(name) => name.span,
@@ -434,7 +448,9 @@ impl JsonSchema for LumpedMassPlace {
 /// The end of a parameter's name, such as `1` in `M1`.
 #[derive(Clone, Debug)]
 pub(crate) struct NameSuffix {
+    /// The suffix: letters, digits and `_`, at most 40; it may be empty.
     pub(crate) text: String,
+    /// Where it stands.
     pub(crate) span: SourceSpan,
 }
 
@@ -501,12 +517,12 @@ words! {
     "body" => Body, "world" => World, "mixed" => Mixed
 }
 
-/// How a constant's value is found where it is not known.
+/// How the value of an unknown constant is found.
 #[derive(Clone, Debug)]
 pub(crate) enum SearchEntry {
     /// The expression is affine in it.
     Linear,
-    /// Values of a range are tried.
+    /// A grid of values in a range is tried.
     Range(SearchRangeEntry),
 }
 

@@ -1,4 +1,7 @@
-//! Parts and lumped masses: what has inertia.
+//! Parts and lumped masses: everything that has inertia.
+//!
+//! The tables `part` and `lumped_mass` go in; masses, centres and inertias as exact expressions come out. All of them
+//! are polynomials in the parameters, as the regressor requires.
 
 use num_rational::BigRational;
 use num_traits::One;
@@ -16,9 +19,11 @@ use crate::unit::UnitDimension;
 use crate::values::SpannedName;
 use crate::values::{FormulaVector, LumpedMassPlace};
 
+/// Sorts of names in masses and inertias.
 const SORTS: [SymbolSort; 2] = [SymbolSort::Constant, SymbolSort::Parameter];
 
-/// Reads the parts.
+/// Reads the parts. A part without a name has that of its frame; an unknown frame is reported and replaced by the
+/// base.
 pub(super) fn parts(
     model: &ModelEntry,
     symbols: &SymbolTable,
@@ -61,6 +66,7 @@ pub(super) fn check_unique<'a>(
     }
 }
 
+/// The inertia of a part, from `linear` or from `mass`, `centre` and `inertia`.
 fn inertial(entry: &PartEntry, symbols: &SymbolTable, log: &mut DiagnosticLog) -> PartInertia {
     let about_centre = entry.mass.is_some() || entry.centre.is_some() || entry.inertia.is_some();
     if let Some(linear) = &entry.linear {
@@ -72,6 +78,7 @@ fn inertial(entry: &PartEntry, symbols: &SymbolTable, log: &mut DiagnosticLog) -
         }
         return linear_inertial(linear, symbols, log);
     }
+    // A part with nothing at all is a mistake, unless its entries could not be read.
     if !about_centre && !log.syntax_broken && !entry.faulty {
         log.push(
             Diagnostic::error(entry.span, "this part has neither mass nor inertia")
@@ -102,6 +109,7 @@ fn inertial(entry: &PartEntry, symbols: &SymbolTable, log: &mut DiagnosticLog) -
     }
 }
 
+/// The ten linear parameters of a part: single entries first, then those of the shorthand, else zero.
 fn linear_inertial(
     linear: &LinearEntry,
     symbols: &SymbolTable,
@@ -126,7 +134,7 @@ fn linear_inertial(
             return ExactExpression::zero();
         };
         let name = format!("{symbol}{}", suffix.text);
-        // Declared above; where that failed, the fault is reported already.
+        // The shorthand was declared before; if that failed, the fault is reported already.
         let Some(meaning) = symbols.scope.get(&name) else {
             return ExactExpression::zero();
         };
@@ -134,6 +142,7 @@ fn linear_inertial(
         meaning.exact.clone()
     };
     let mut values = LINEAR.map(|(symbol, dimension)| entry(symbol, dimension, log));
+    // The order of LINEAR: six entries of the inertia, three first moments, the mass.
     let mut take = |i: usize| std::mem::replace(&mut values[i], ExactExpression::zero());
     PartInertia::Linear {
         inertia: std::array::from_fn(&mut take),
@@ -142,7 +151,7 @@ fn linear_inertial(
     }
 }
 
-/// An expression over constants and parameters, polynomial in the parameters; zero where absent or faulty.
+/// Resolves an expression over constants and parameters, polynomial in the parameters; zero if absent or faulty.
 fn quantity(
     formula: Option<&SourceFormula>,
     symbols: &SymbolTable,
@@ -165,6 +174,7 @@ fn quantity(
     exact
 }
 
+/// Resolves a position in a frame, m; zero if absent or faulty.
 fn position(
     vector_entry: Option<&FormulaVector>,
     symbols: &SymbolTable,
@@ -188,6 +198,7 @@ fn position(
     position
 }
 
+/// Reports an expression that is not a polynomial in the parameters.
 fn check_polynomial(exact: &ExactExpression, span: SourceSpan, log: &mut DiagnosticLog) {
     if !is_polynomial(exact) {
         log.push(
@@ -198,6 +209,7 @@ fn check_polynomial(exact: &ExactExpression, span: SourceSpan, log: &mut Diagnos
     }
 }
 
+/// Whether an expression is a polynomial in the parameters; constants may occur anywhere.
 fn is_polynomial(exact: &ExactExpression) -> bool {
     let free = |exact: &ExactExpression| {
         !exact.mentions(&|symbol| matches!(symbol, ModelSymbol::Parameter(_)))
@@ -209,6 +221,7 @@ fn is_polynomial(exact: &ExactExpression) -> bool {
         }
         ExactExpression::Negative(inner) => is_polynomial(inner),
         ExactExpression::Quotient(above, below) => is_polynomial(above) && free(below),
+        // A negative exponent divides by the base.
         ExactExpression::Power(base, exponent) => {
             if *exponent >= 0 {
                 is_polynomial(base)
@@ -239,6 +252,7 @@ pub(super) fn lumped_masses(
         .collect()
 }
 
+/// Reads one lumped mass; its frame is that of `on`, or that of the first point it names.
 fn lumped_mass(
     entry: &LumpedMassEntry,
     symbols: &SymbolTable,
@@ -247,6 +261,7 @@ fn lumped_mass(
     log: &mut DiagnosticLog,
 ) -> LumpedMass {
     let spots = [&entry.at, &entry.force_at, &entry.moment_at];
+    // The frame of a named point is used where `on` is absent.
     let named = spots.iter().find_map(|spot| match spot {
         Some(LumpedMassPlace::Point(name)) => points.get(&name.text),
         _ => None,
@@ -263,13 +278,14 @@ fn lumped_mass(
             {
                 log.push(
                     Diagnostic::error(entry.span, "this lumped mass sits on no frame")
-                        .label("expected `on`, the name of a frame, beside a position")
+                        .label("expected `on`, the name of a frame, together with a position")
                         .help("add `on = \"...\"`, or name a point in `at`"),
                 );
             }
             FrameIdx(0)
         }
     };
+    // Both balances need a place; `at` serves as the default of both.
     let lacking = match (&entry.at, &entry.force_at, &entry.moment_at) {
         (None, None, None) => Some("at"),
         (None, None, Some(_)) => Some("force_at"),
@@ -280,7 +296,7 @@ fn lumped_mass(
         log.push(
             Diagnostic::error(entry.span, "this lumped mass has no place")
                 .label(format!("expected `{key}`, the name of a point or a vector"))
-                .help("`at` serves both balances; `force_at` and `moment_at` differ from it where they are given"),
+                .help("`at` is the place in both balances; `force_at` and `moment_at` replace it in one of them"),
         );
     }
     let force_at = entry.force_at.as_ref().or(entry.at.as_ref());
@@ -300,7 +316,7 @@ fn lumped_mass(
     }
 }
 
-/// Warns of masses and moments of inertia whose nominal values are negative.
+/// Warns of masses and moments of inertia whose values are negative at the nominal parameters.
 pub(super) fn warn_of_negative(model: &ModelEntry, mechanism: &Mechanism, log: &mut DiagnosticLog) {
     let mut look = |exact: &ExactExpression, what: &str, unit: &str, span: SourceSpan| {
         let value = exact.evaluate(&|symbol| mechanism.symbol_nominal(symbol));
@@ -311,10 +327,11 @@ pub(super) fn warn_of_negative(model: &ModelEntry, mechanism: &Mechanism, log: &
                     format!("with nominal values {what} is {value} {unit}"),
                 )
                 .label("expected a positive value")
-                .help("check the signs here and of the nominal values of what stands here"),
+                .help("check the sign of this entry and of the nominal values of the names in it"),
             );
         }
     };
+    // The mark is on the formula if there is one, else on the place given instead.
     let place =
         |formula: Option<&SourceFormula>, or: SourceSpan| formula.map_or(or, |f| f.ast.span);
     let parts = model.part.iter().flat_map(|list| &list.entries);
@@ -355,6 +372,7 @@ pub(super) fn warn_of_negative(model: &ModelEntry, mechanism: &Mechanism, log: &
     }
 }
 
+/// The share of a lumped mass as a rational number; 1 if absent or faulty.
 fn mass_share(formula: Option<&SourceFormula>, log: &mut DiagnosticLog) -> BigRational {
     let Some(formula) = formula else {
         return BigRational::one();
@@ -369,6 +387,7 @@ fn mass_share(formula: Option<&SourceFormula>, log: &mut DiagnosticLog) -> BigRa
     })
 }
 
+/// The position of a lumped mass in its frame, m, from a vector or a point; zero if absent or faulty.
 fn lumped_mass_position(
     spot: Option<&LumpedMassPlace>,
     frame: FrameIdx,

@@ -1,4 +1,6 @@
 //! Coordinates that follow others: gears, belts, screws, differentials.
+//!
+//! The entry `follows` of a coordinate goes in; an affine function of other coordinates comes out.
 
 use std::collections::BTreeMap;
 
@@ -11,7 +13,7 @@ use crate::mechanism::CoordinateCoupling;
 use crate::schema::{CoordinateEntry, ModelEntry};
 use crate::scope::{FormulaRequirement, SymbolSort};
 
-/// Reads the couplings and gives what follows its nominal value.
+/// Reads the couplings and sets the nominal value of each coordinate that follows others.
 pub(super) fn couplings(
     model: &ModelEntry,
     symbols: &mut SymbolTable,
@@ -19,6 +21,7 @@ pub(super) fn couplings(
     log: &mut DiagnosticLog,
 ) -> Vec<CoordinateCoupling> {
     let mut found: Vec<(CoordinateCoupling, SourceSpan)> = Vec::new();
+    // Coordinates that could not be declared are reported already.
     for (key, entry) in model.coordinates.iter().flat_map(|table| &table.entries) {
         let Some(follows) = &entry.follows else {
             continue;
@@ -37,7 +40,7 @@ pub(super) fn couplings(
     found.into_iter().map(|(coupling, _)| coupling).collect()
 }
 
-/// Says what else is given that follows already.
+/// Reports entries of a coordinate that `follows` determines already.
 fn reject_unused_fields(entry: &CoordinateEntry, span: SourceSpan, log: &mut DiagnosticLog) {
     let given = [
         (entry.nominal.is_some(), "nominal"),
@@ -49,7 +52,7 @@ fn reject_unused_fields(entry: &CoordinateEntry, span: SourceSpan, log: &mut Dia
             log.push(
                 Diagnostic::error(
                     span,
-                    format!("`{name}` says nothing of a coordinate that follows others"),
+                    format!("`{name}` has no effect on a coordinate that follows others"),
                 )
                 .label(format!("delete `{name}`")),
             );
@@ -57,6 +60,7 @@ fn reject_unused_fields(entry: &CoordinateEntry, span: SourceSpan, log: &mut Dia
     }
 }
 
+/// The coupling of one coordinate; reports an expression that is not affine in others or contains a quaternion.
 fn coupling(
     follows: &SourceFormula,
     coordinate: CoordinateIdx,
@@ -73,9 +77,12 @@ fn coupling(
     let span = follows.ast.span;
     let Some(CoordinateSum { terms, offset }) = coordinate_sum(&exact) else {
         log.push(
-            Diagnostic::error(span, "a coordinate follows others in proportion")
-                .label("expected a sum of coordinates, each times constants, and of constants")
-                .help("for example `\"n*q1\"`, `\"h*q1 + s0\"` or `\"(q1 + q2)/2\"`"),
+            Diagnostic::error(
+                span,
+                "a coordinate can only be an affine function of others",
+            )
+            .label("expected a sum of coordinates, each times constants, and of constants")
+            .help("for example `\"n*q1\"`, `\"h*q1 + s0\"` or `\"(q1 + q2)/2\"`"),
         );
         return None;
     };
@@ -84,7 +91,7 @@ fn coupling(
         log.push(
             Diagnostic::error(span, "this follows no coordinate")
                 .label("expected the name of a coordinate in it")
-                .help("what stands still needs no coordinate: write the constant into the frame"),
+                .help("a constant needs no coordinate: write it into the frame"),
         );
         return None;
     }
@@ -107,13 +114,14 @@ fn coupling(
     })
 }
 
-/// Puts what follows at its nominal value; what follows itself is reported.
+/// Computes nominal values in the order of dependence; a coordinate that follows itself is reported.
 fn set_nominal(
     found: &[(CoordinateCoupling, SourceSpan)],
     symbols: &mut SymbolTable,
     places: &MechanismSpans,
     log: &mut DiagnosticLog,
 ) {
+    // Each pass takes one coupling whose coordinates all have their values; if there is none, there is a cycle.
     let mut left: Vec<&(CoordinateCoupling, SourceSpan)> = found.iter().collect();
     while !left.is_empty() {
         let waits = |coupling: &CoordinateCoupling| {
@@ -130,9 +138,9 @@ fn set_nominal(
                         symbols.coordinates[coupling.coordinate.0].name
                     ),
                 )
-                .label("by way of what it follows")
+                .label("through the coordinates that it follows")
                 .related(*span, "it follows this")
-                .help("one of the coordinates has to move by itself"),
+                .help("one of these coordinates must be independent"),
             );
             return;
         };
@@ -146,13 +154,16 @@ fn set_nominal(
     }
 }
 
-/// An expression as a sum of multiples of coordinates, and what is left.
+/// An expression as a sum of multiples of coordinates, and a term without coordinates.
 struct CoordinateSum {
+    /// Factor of each coordinate.
     terms: BTreeMap<CoordinateIdx, ExactExpression>,
+    /// The term without coordinates.
     offset: ExactExpression,
 }
 
 impl CoordinateSum {
+    /// A value that contains no coordinate.
     fn without_coordinates(offset: ExactExpression) -> Self {
         Self {
             terms: BTreeMap::new(),
@@ -160,7 +171,7 @@ impl CoordinateSum {
         }
     }
 
-    /// Does the same to every factor and to the rest.
+    /// Applies a linear function to every factor and to the offset; an offset of zero stays zero.
     fn map(self, f: impl Fn(ExactExpression) -> ExactExpression) -> Self {
         let terms = self.terms.into_iter();
         Self {
@@ -174,7 +185,7 @@ impl CoordinateSum {
     }
 }
 
-/// `None` where a coordinate stands otherwise than in proportion.
+/// Splits an expression into multiples of coordinates; `None` if it is not affine in them.
 fn coordinate_sum(exact: &ExactExpression) -> Option<CoordinateSum> {
     let mut moves = false;
     exact.for_each_symbol(&mut |symbol| moves |= matches!(symbol, ModelSymbol::Coordinate(_)));
@@ -190,12 +201,14 @@ fn coordinate_sum(exact: &ExactExpression) -> Option<CoordinateSum> {
             Some(coordinate_sum(inner)?.map(|x| ExactExpression::Negative(Box::new(x))))
         }
         ExactExpression::Quotient(above, below) => {
+            // A divisor must be free of coordinates.
             let fixed = coordinate_sum(below).filter(|below| below.terms.is_empty())?;
             let divided =
                 |x| ExactExpression::Quotient(Box::new(x), Box::new(fixed.offset.clone()));
             Some(coordinate_sum(above)?.map(divided))
         }
         ExactExpression::Product(factors) => {
+            // At most one factor may contain coordinates; all others multiply its terms.
             let mut moving: Option<CoordinateSum> = None;
             let mut others = Vec::new();
             for factor in factors {
@@ -207,6 +220,7 @@ fn coordinate_sum(exact: &ExactExpression) -> Option<CoordinateSum> {
                 }
             }
             let times = |x: ExactExpression| {
+                // Factors of one are dropped to keep the expression short.
                 let one = (x != ExactExpression::unity()).then_some(x);
                 let mut all: Vec<ExactExpression> = others.iter().cloned().chain(one).collect();
                 match all.len() {
@@ -223,6 +237,7 @@ fn coordinate_sum(exact: &ExactExpression) -> Option<CoordinateSum> {
             for term in terms {
                 let found = coordinate_sum(term)?;
                 for (i, factor) in found.terms {
+                    // Factors of the same coordinate are added.
                     let all = match sum.terms.remove(&i) {
                         Some(before) => ExactExpression::Sum(vec![before, factor]),
                         None => factor,

@@ -1,4 +1,6 @@
-//! The places of an effect: what their names mean, and what they carry.
+//! The places of an effect: what their names refer to, and the load of each.
+//!
+//! Names go in; an [`EffectPlace`] each and the common [`PlaceLoad`] come out. Faults are reported.
 
 use crate::build::frames::PointTable;
 use crate::build::symbols::SymbolTable;
@@ -14,15 +16,19 @@ use crate::schema::EffectKindEntry;
 use crate::suggest;
 use crate::values::SpannedName;
 
-/// What an effect may act on, beside the coordinates.
+/// Everything that an effect may act on, in addition to the coordinates.
 pub(crate) struct EffectTargets<'a> {
+    /// Drives with rows of the equation of motion.
     pub(crate) drives: &'a [ModelDrive],
+    /// Named points.
     pub(crate) points: &'a PointTable,
+    /// Rigid bodies.
     pub(crate) parts: &'a [ModelPart],
+    /// Lumped masses, without names that an effect could use.
     pub(crate) lumped_masses: &'a [LumpedMass],
 }
 
-/// Finds a place by its name; where several things bear it, the one that the kind may act on.
+/// Finds a place by its name. If several things have that name, the kind of effect decides which one is used.
 pub(super) fn find_place(
     name: &SpannedName,
     allowed: &[ActsOn],
@@ -39,7 +45,7 @@ pub(super) fn find_place(
         "force" => Some((ActsOn::Force, EffectPlace::Force)),
         _ => None,
     };
-    // Parts and the whole have names of their own, which a drive or a point may bear as well: the kind tells.
+    // Parts, the base and the forces have names of their own, which a drive or a point may have as well.
     if let Some((_, place)) = whole.filter(|(sort, _)| allowed.contains(sort)) {
         return Some(place);
     }
@@ -48,6 +54,7 @@ pub(super) fn find_place(
     {
         return Some(place);
     }
+    // Names of drives, coordinates and points differ from each other, so their order does not matter.
     if let Some(idx) = scene
         .drives
         .iter()
@@ -68,6 +75,7 @@ pub(super) fn find_place(
     if let Some(place) = part().or(whole.map(|(_, place)| place)) {
         return Some(place);
     }
+    // Unknown: the advice lists only names on which this kind may act.
     let mut known: Vec<&str> = Vec::new();
     let expected = match allowed {
         [ActsOn::Part] => {
@@ -102,7 +110,9 @@ pub(super) fn find_place(
     None
 }
 
-/// What the places of an effect carry; they must all carry the same, and the kind must be allowed there.
+/// The load of the places of an effect. All places must have the same load, and the kind must be allowed there.
+///
+/// `None` after any fault, each of which is reported.
 pub(super) fn common_load(
     kind: &EffectKindEntry,
     at: &OneOrMany<SpannedName>,
@@ -116,6 +126,7 @@ pub(super) fn common_load(
     let kind_name = kind.name.as_ref().map_or("", |name| name.text.as_str());
     let mut common: Option<PlaceLoad> = None;
     let mut fine = true;
+    // A kind with `other` acts at its first place only; the second one gives its motion.
     let n_acting = if kind.other.is_some() { 1 } else { names.len() };
     if let (Some(motion), [first, other, ..], Some(place)) = (kind.other, &names[..], places.get(1))
     {
@@ -148,7 +159,7 @@ pub(super) fn common_load(
             fine = false;
             continue;
         }
-        // What mechanics need of their places is checked with them.
+        // Places of mechanics are checked with the mechanics.
         if kind.mechanics.is_none() && !symbols_without_unit(kind, carries).is_empty() {
             log.push(
                 Diagnostic::error(name.span, format!("`{kind_name}` cannot act here"))
@@ -169,6 +180,7 @@ pub(super) fn common_load(
             );
             fine = false;
         }
+        // One parameter cannot be both a force and a torque.
         match common {
             Some(first) if first != carries => {
                 log.push(
@@ -184,6 +196,7 @@ pub(super) fn common_load(
             _ => common = Some(carries),
         }
     }
+    // Kinds that couple two places, and some mechanics, need an exact number of them.
     if let Some(n) = n_places(kind).filter(|n| *n != names.len()) {
         let (word, why) = match n {
             1 => ("one place", "it acts on one place at a time"),
@@ -209,7 +222,7 @@ pub(super) fn common_load(
     common.filter(|_| fine)
 }
 
-/// Whether a place moves as a kind asks of its other one.
+/// Whether the second place of an effect moves as its kind requires; reports it otherwise.
 fn has_motion(
     motion: OtherMotion,
     name: &SpannedName,
@@ -235,10 +248,10 @@ fn has_motion(
     log.push(
         Diagnostic::error(
             name.span,
-            format!("`{}` does not move as this kind asks", name.text),
+            format!("`{}` does not move as this kind requires", name.text),
         )
         .label(expected)
-        .help("the kind says in `other` whether its other place is an `angle` or a `length`"),
+        .help("the kind states in `other` whether its other place is an `angle` or a `length`"),
     );
     false
 }

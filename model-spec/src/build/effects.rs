@@ -1,4 +1,7 @@
-//! Effects of a file, by the kinds of the library and its own.
+//! Effects of a file, of kinds from the library and from the file itself.
+//!
+//! The table `effect` goes in; effects with their places, terms, constants and bodies come out. Parameters that they
+//! introduce are added to those of the file.
 
 use std::collections::BTreeMap;
 
@@ -21,7 +24,7 @@ use crate::suggest;
 use crate::unit::{ModelUnit, UnitDimension};
 use crate::values::SpannedName;
 
-/// Reads the effects; their parameters join those of the file.
+/// Reads the effects and adds their parameters to those of the file.
 pub(super) fn effects(
     model: &ModelEntry,
     own_kinds: &[&EffectKindEntry],
@@ -36,7 +39,7 @@ pub(super) fn effects(
         entries.clone().filter_map(|entry| entry.name.as_ref()),
         log,
     );
-    // What couples two places may couple each with a third.
+    // Effects that couple two places may share one of them with another effect.
     let couples = |entry: &EffectEntry| {
         let kind = entry
             .kind
@@ -54,7 +57,8 @@ pub(super) fn effects(
         .collect()
 }
 
-/// Reports what is one property of the whole, such as a tilt, and acts twice.
+/// Reports kinds that describe one property of the complete mechanism, such as a tilt of gravity, if they occur
+/// twice.
 fn check_single<'a>(
     entries: impl Iterator<Item = &'a EffectEntry>,
     kinds: &KindTable<'_>,
@@ -81,21 +85,23 @@ fn check_single<'a>(
     }
 }
 
-/// Warns of a kind that acts twice at one place with the same constants: the columns are equal, and a variant that means
-/// to override an effect without a name brings this about. What couples places is a twin if it couples the same ones;
-/// `couples` says whether it does so both ways.
+/// Warns of a kind that acts twice at one place with the same constants. Its columns are then equal. A common cause
+/// is a variant that is meant to override an effect without a name. Effects that couple two places are compared by
+/// both places; `couples` states whether the order of the places matters (`Some(false)`) or not (`Some(true)`).
 fn warn_of_twins<'a>(
     entries: impl Iterator<Item = &'a EffectEntry>,
     couples: &dyn Fn(&EffectEntry) -> Option<bool>,
     log: &mut DiagnosticLog,
 ) {
     let mut seen: BTreeMap<(&str, Vec<&str>), (&EffectEntry, &SpannedName)> = BTreeMap::new();
+    // With own constants the columns differ, so that both effects can be meant.
     for entry in entries.filter(|entry| entry.constants.is_none()) {
         let Some(kind) = &entry.kind else { continue };
         let mut all: Vec<&str> = (entry.at.iter().flat_map(|at| &at.entries))
             .map(|place| place.text.as_str())
             .collect();
         let together = couples(entry);
+        // Places of a symmetric coupling are sorted, so that both orders compare equal.
         if together != Some(false) {
             all.sort_unstable();
         }
@@ -112,7 +118,7 @@ fn warn_of_twins<'a>(
                 continue;
             }
             let remedy = if first.name.is_none() && first_place.span.file != place.span.file {
-                "to override the effect of the extended file, give it a `name` there and here the same one"
+                "to override the effect of the extended file, give both effects the same `name`"
             } else {
                 "delete one of them"
             };
@@ -129,9 +135,10 @@ fn warn_of_twins<'a>(
     }
 }
 
-/// A kind and whether it is sound.
+/// Kinds by name, each with whether it has no faults.
 type KindTable<'a> = BTreeMap<&'a str, (&'a EffectKindEntry, bool)>;
 
+/// The kinds of the library and of the file, each checked; faults and name clashes are reported.
 fn kinds<'a>(own: &[&'a EffectKindEntry], log: &mut DiagnosticLog) -> KindTable<'a> {
     let mut kinds: KindTable<'a> = BTreeMap::new();
     for entry in library_entries() {
@@ -144,6 +151,7 @@ fn kinds<'a>(own: &[&'a EffectKindEntry], log: &mut DiagnosticLog) -> KindTable<
         let Some(name) = &entry.name else { continue };
         if let Some((first, _)) = kinds.get(name.text.as_str()) {
             let first_span = first.name.as_ref().map_or(name.span, |name| name.span);
+            // Kinds of the library have no place in the user's files.
             if first_span.file == usize::MAX {
                 log.push(
                     Diagnostic::error(
@@ -158,11 +166,13 @@ fn kinds<'a>(own: &[&'a EffectKindEntry], log: &mut DiagnosticLog) -> KindTable<
             continue;
         }
         check_kind(entry, log);
+        // Faulty kinds stay in the table, so that their effects are not reported as unknown.
         let complete = (entry.mechanics.is_some()
             || entry.parameters.is_some() && entry.expression.is_some())
             && entry.on.is_some();
         kinds.insert(&name.text, (entry, complete && log.n_errors() == before));
     }
+    // A kind may refine one that is declared after it, so references are checked at the end.
     for refined in own.iter().filter_map(|entry| entry.refines.as_ref()) {
         if !kinds.contains_key(refined.text.as_str()) {
             log.push(
@@ -170,7 +180,7 @@ fn kinds<'a>(own: &[&'a EffectKindEntry], log: &mut DiagnosticLog) -> KindTable<
                     refined.span,
                     format!("unknown kind of effect `{}`", refined.text),
                 )
-                .label("expected the simpler kind that this one holds as a special case")
+                .label("expected the simpler kind that is a special case of this one")
                 .help(suggest::advice(
                     &refined.text,
                     "kinds",
@@ -182,6 +192,7 @@ fn kinds<'a>(own: &[&'a EffectKindEntry], log: &mut DiagnosticLog) -> KindTable<
     kinds
 }
 
+/// The diagnostic of an unknown kind of effect.
 fn unknown_kind(kind: &SpannedName, kinds: &KindTable<'_>) -> Diagnostic {
     let message = format!("unknown kind of effect `{}`", kind.text);
     Diagnostic::error(kind.span, message)
@@ -189,6 +200,7 @@ fn unknown_kind(kind: &SpannedName, kinds: &KindTable<'_>) -> Diagnostic {
         .help(suggest::advice(&kind.text, "kinds", kinds.keys().copied()))
 }
 
+/// Reads one effect; `None` after a fault, which is reported.
 fn effect(
     entry: &EffectEntry,
     kinds: &KindTable<'_>,
@@ -204,6 +216,7 @@ fn effect(
     let allowed: &[ActsOn] = known
         .and_then(|(kind, _)| kind.on.as_ref())
         .map_or(&[], |on| on.entries.as_slice());
+    // Places are looked up before the kind, so that unknown names are reported even for an unknown kind.
     let mut places: Vec<EffectPlace> = at
         .iter()
         .flat_map(|at| &at.entries)
@@ -227,6 +240,7 @@ fn effect(
         return None;
     }
     let carries = common_load(kind, at, &places, symbols, scene.drives, log)?;
+    // The kind and its places fit; now its constants, and the factor or the bodies of each parameter.
     let before = log.n_errors();
     let mut constants = constants(entry, kind, kind_name, symbols, carries, log);
     check_values(entry, kind, kind_name, symbols, log);
@@ -252,6 +266,7 @@ fn effect(
         .map(|name| name.text.as_str())
         .collect::<Vec<_>>()
         .join("_");
+    // Mechanics may allow only some of their parameters at a place, such as those of a planar part.
     let own = kind.mechanics.zip(places.first());
     let own =
         own.and_then(|(way, place)| Some((way, way.entry().parameters_at(*place, scene.parts)?)));
@@ -276,11 +291,12 @@ fn effect(
     }
     let mut bodies = EffectBodies::default();
     if let Some(way) = kind.mechanics.map(Mechanics::entry) {
-        // A file of one's own may list them in another order.
+        // A kind of the user's file may list the parameters in another order.
         let listed = way.parameters().iter().map(|(symbol, _)| *symbol);
         terms.sort_by_key(|term| listed.clone().position(|symbol| symbol == term.symbol));
         bodies = way.bodies(&terms, &places, scene);
     }
+    // The second place of a kind with `other` is no place of action.
     let other = kind.other.and(places.get(1).copied());
     if other.is_some() {
         places.truncate(1);
@@ -296,7 +312,7 @@ fn effect(
     })
 }
 
-/// The parameter of one term of an effect: one that the file knows, or a new one.
+/// The parameter of one term of an effect: a parameter that the file declares, or a new one.
 fn term_parameter(
     entry: &EffectEntry,
     key: &TomlKey,
@@ -312,6 +328,7 @@ fn term_parameter(
         .flat_map(|table| &table.entries)
         .find(|(name, _)| name.name == key.name)
         .map(|(_, said)| said);
+    // Without a name in the file the parameter is called after its symbol and its places.
     let named = said.and_then(|said| said.name.as_ref());
     let name = named.map_or_else(
         || format!("{}_{places_name}", key.name),
@@ -357,7 +374,7 @@ fn term_parameter(
     Some(idx)
 }
 
-/// Warns of a nominal value whose sign makes no physical sense.
+/// Warns of a nominal value whose sign contradicts the physics of the kind.
 fn warn_of_sign(
     parameter: &DynamicParameter,
     sign: Option<Sign>,
@@ -379,11 +396,13 @@ fn warn_of_sign(
             ),
         )
         .label(format!("expected a {expected} value"))
-        .help("check its sign, and whether the kind is the one that is meant"),
+        .help("check its sign, and whether this kind is intended"),
     );
 }
 
-/// The values of the kind's constants in this effect.
+/// The values of the kind's constants in this effect: its own values, else the defaults of the kind.
+///
+/// Unknown and missing constants are reported.
 fn constants(
     entry: &EffectEntry,
     kind: &EffectKindEntry,
@@ -446,7 +465,7 @@ fn constants(
     values
 }
 
-/// Reports values of the constants at which the kind's expression has no finite value, such as a Stribeck speed of 0.
+/// Reports values of constants at which the kind's expression is not finite, such as a Stribeck speed of 0.
 fn check_values(
     entry: &EffectEntry,
     kind: &EffectKindEntry,
@@ -454,6 +473,7 @@ fn check_values(
     symbols: &SymbolTable,
     log: &mut DiagnosticLog,
 ) {
+    // The value of the effect, else the default of the kind.
     let given = |name: &str| {
         let own = entry
             .constants
@@ -469,7 +489,7 @@ fn check_values(
                 .and_then(|(_, constant)| constant.value.as_ref())
         })
     };
-    // Values that are no numbers themselves are reported where they stand.
+    // A constant without a finite value of its own is reported at that constant.
     let value = |name: &str| {
         finite::value(&given(name)?.ast, &|inner| symbols.scope.value(inner))
             .ok()
@@ -481,6 +501,7 @@ fn check_values(
     let Err(fault) = finite::value(&expression.ast, &value) else {
         return;
     };
+    // The mark is on the constant that causes the fault, unless its value is a default of the library.
     let named = kind
         .constants
         .iter()
@@ -517,6 +538,7 @@ fn check_values(
     );
 }
 
+/// Reports entries of `parameters` whose names the kind does not have.
 fn check_parameter_names(entry: &EffectEntry, kind: &EffectKindEntry, log: &mut DiagnosticLog) {
     let names: Vec<&str> = kind
         .parameters

@@ -1,4 +1,8 @@
-//! Frames, in any order in the file, as a tree whose parents come first; and the points on them.
+//! Frames, in any order in the file, as a tree in which parents come first; and the points on them.
+//!
+//! Each frame becomes a list of elementary rotations and translations from its parent. Denavit-Hartenberg rows are in
+//! the
+//! order of Khalil and Kleinfinger (modified) or in the standard order.
 
 use std::collections::BTreeMap;
 
@@ -18,16 +22,18 @@ use crate::suggest;
 use crate::unit::UnitDimension;
 use crate::values::SpannedName;
 
-/// The frames with their names.
+/// The frames, and their indices by name.
 pub(super) struct FrameTree {
+    /// The base first, and each parent before its children.
     pub(super) frames: Vec<ModelFrame>,
+    /// Index of each frame by its name.
     names: BTreeMap<String, FrameIdx>,
-    /// True if two frames have one name: the name that is missed may be meant for one of them.
+    /// True if two frames have the same name. An unknown name may then be meant for one of them and is not reported.
     any_twice: bool,
 }
 
 impl FrameTree {
-    /// Looks a frame up; an unknown name is reported.
+    /// The frame of a name; an unknown name is reported.
     pub(super) fn find(&self, name: &SpannedName, log: &mut DiagnosticLog) -> Option<FrameIdx> {
         let found = self.names.get(&name.text).copied();
         if found.is_none() && !self.any_twice && !log.is_full() {
@@ -44,7 +50,7 @@ impl FrameTree {
     }
 }
 
-/// Reads the frames and sorts them so that parents come first.
+/// Reads the frames, sorts them so that parents come first, and appends their places to `places.frames`.
 pub(super) fn frames(
     model: &ModelEntry,
     symbols: &SymbolTable,
@@ -52,13 +58,14 @@ pub(super) fn frames(
     log: &mut DiagnosticLog,
 ) -> FrameTree {
     let entries: Vec<&FrameEntry> = model.frame.iter().flat_map(|list| &list.entries).collect();
+    // The first frame with a name keeps it; a second one is reported and left out.
     let mut by_name: BTreeMap<&str, usize> = BTreeMap::new();
     let mut any_twice = false;
     for (i, entry) in entries.iter().enumerate() {
         let Some(name) = &entry.name else { continue };
         if name.text == "base" {
             log.push(
-                Diagnostic::error(name.span, "`base` is the frame that is there already")
+                Diagnostic::error(name.span, "the frame `base` exists already")
                     .label("expected another name"),
             );
         } else if let Some(first) = by_name.get(name.text.as_str()) {
@@ -83,6 +90,7 @@ pub(super) fn frames(
         any_twice,
     };
     places.frames.push(None);
+    // Parents are already in the tree here; an unknown parent was reported and is replaced by the base.
     let order = parents_first(&entries, &by_name, any_twice, log);
     for i in order {
         let entry = entries[i];
@@ -106,7 +114,7 @@ pub(super) fn frames(
     tree
 }
 
-/// `S1` is defined twice.
+/// The diagnostic of a name that is defined twice.
 pub(super) fn duplicate_name(what: &str, name: &SpannedName, first: SourceSpan) -> Diagnostic {
     Diagnostic::error(
         name.span,
@@ -117,13 +125,17 @@ pub(super) fn duplicate_name(what: &str, name: &SpannedName, first: SourceSpan) 
     .help("rename one of the two, or delete it")
 }
 
-/// Indices of the entries, parents first; unknown parents and cycles are reported and hung on the base.
+/// Indices of the entries, parents first; unknown parents and cycles are reported, and such frames are fixed to the
+/// base.
+///
+/// Depth-first search from each frame towards the base.
 fn parents_first(
     entries: &[&FrameEntry],
     by_name: &BTreeMap<&str, usize>,
     any_twice: bool,
     log: &mut DiagnosticLog,
 ) -> Vec<usize> {
+    // Done frames are in the order already; a frame on the current path closes a cycle.
     #[derive(Clone, Copy, PartialEq)]
     enum FrameMark {
         New,
@@ -165,6 +177,7 @@ fn parents_first(
             };
             at = parent;
         }
+        // The path leads from a frame to its ancestors, so its reverse has parents first.
         for done in path.into_iter().rev() {
             marks[done] = FrameMark::Done;
             order.push(done);
@@ -173,7 +186,7 @@ fn parents_first(
     order
 }
 
-/// The entries that own their names, in the order of the file.
+/// Indices of the entries that keep their names, in the order of the file.
 fn by_name_order(entries: &[&FrameEntry], by_name: &BTreeMap<&str, usize>) -> Vec<usize> {
     (0..entries.len())
         .filter(|i| {
@@ -185,6 +198,7 @@ fn by_name_order(entries: &[&FrameEntry], by_name: &BTreeMap<&str, usize>) -> Ve
         .collect()
 }
 
+/// Reports frames whose parents form a cycle; `path` ends before the frame `at` is reached again.
 fn report_cycle(entries: &[&FrameEntry], path: &[usize], at: usize, log: &mut DiagnosticLog) {
     let from = path.iter().position(|&one| one == at).unwrap_or(0);
     let names: Vec<&str> = path[from..]
@@ -208,7 +222,7 @@ fn report_cycle(entries: &[&FrameEntry], path: &[usize], at: usize, log: &mut Di
     );
 }
 
-/// The steps of a frame from its parent.
+/// The steps of a frame from its parent, and how the file describes them.
 fn placement(
     entry: &FrameEntry,
     symbols: &SymbolTable,
@@ -266,14 +280,21 @@ fn placement(
     }
 }
 
+/// A Denavit-Hartenberg row.
 struct DhRow {
+    /// Length along x, m.
     a: ExactLength,
+    /// Angle about x, rad.
     alpha: ExactAngle,
+    /// Length along z, m.
     d: ExactLength,
+    /// Angle about z, rad.
     theta: ExactAngle,
+    /// The texts of `a`, `alpha`, `d` and `theta`, for print.
     texts: [String; 4],
 }
 
+/// Resolves a Denavit-Hartenberg row; omitted entries are zero.
 fn dh_row(dh: &DhEntry, symbols: &SymbolTable, log: &mut DiagnosticLog) -> DhRow {
     let text = |formula: &Option<SourceFormula>| {
         formula
@@ -289,6 +310,7 @@ fn dh_row(dh: &DhEntry, symbols: &SymbolTable, log: &mut DiagnosticLog) -> DhRow
     }
 }
 
+/// A length with its coordinates; zero if absent or faulty. `what` names it in messages.
 pub(super) fn length_or_zero(
     formula: Option<&SourceFormula>,
     symbols: &SymbolTable,
@@ -303,6 +325,7 @@ pub(super) fn length_or_zero(
         })
 }
 
+/// An angle with its coordinates; zero if absent or faulty.
 pub(super) fn angle_or_zero(
     formula: Option<&SourceFormula>,
     symbols: &SymbolTable,
@@ -313,7 +336,10 @@ pub(super) fn angle_or_zero(
         .unwrap_or_else(ExactAngle::zero)
 }
 
+/// Appends the steps of a fixed transform: translations, then rotations about z, y and x.
 fn transform_steps(
+    ///
+    /// `text` gets its description. Coordinates in a transform are reported, because it is fixed.
     transform: &TransformEntry,
     symbols: &SymbolTable,
     steps: &mut Vec<FrameStep>,
@@ -362,6 +388,7 @@ fn transform_steps(
     }
 }
 
+/// The diagnostic of a coordinate in a fixed transform; `motion` is the kind of joint to use instead.
 fn moving_transform_error(formula: &SourceFormula, motion: &str) -> Diagnostic {
     Diagnostic::error(
         formula.ast.span,
@@ -373,6 +400,7 @@ fn moving_transform_error(formula: &SourceFormula, motion: &str) -> Diagnostic {
     ))
 }
 
+/// The steps without rotations and translations by zero.
 fn without_zeros(steps: Vec<FrameStep>) -> Vec<FrameStep> {
     steps
         .into_iter()
@@ -384,14 +412,16 @@ fn without_zeros(steps: Vec<FrameStep>) -> Vec<FrameStep> {
         .collect()
 }
 
-/// The points with their names.
+/// The points, and their indices by name.
 pub(crate) struct PointTable {
+    /// The points in the order of the file.
     pub(crate) points: Vec<FramePoint>,
+    /// Index of each point by its name.
     names: BTreeMap<String, PointIdx>,
 }
 
 impl PointTable {
-    /// Looks a point up; an unknown name is reported.
+    /// The point of a name; an unknown name is reported.
     pub(super) fn find(&self, name: &SpannedName, log: &mut DiagnosticLog) -> Option<PointIdx> {
         let found = self.get(&name.text);
         if found.is_none() && !log.is_full() {
@@ -407,18 +437,18 @@ impl PointTable {
         found
     }
 
-    /// The point of a name.
+    /// The point of a name, if there is one.
     pub(super) fn get(&self, name: &str) -> Option<PointIdx> {
         self.names.get(name).copied()
     }
 
-    /// The names of all points.
+    /// The names of all points, in alphabetical order.
     pub(super) fn names(&self) -> impl Iterator<Item = &str> + Clone {
         self.names.keys().map(String::as_str)
     }
 }
 
-/// Reads the points.
+/// Reads the points and appends their places to `places.points`.
 pub(super) fn points(
     model: &ModelEntry,
     scope: &FormulaScope,

@@ -1,4 +1,7 @@
 //! Joints as elementary motions: one rotation or translation per coordinate.
+//!
+//! The entry `joint` of a frame goes in; steps from the parent frame come out. A free body with a quaternion is one
+//! step.
 
 use num_traits::One;
 
@@ -14,7 +17,7 @@ use crate::schema::JointEntry;
 use crate::scope::SymbolSort;
 use crate::values::{AxisName, QuaternionOrder, TwistName};
 
-/// The coordinates of joints with several, each with how it moves.
+/// The coordinates of a joint with several of them, each with its kind of motion.
 pub(super) fn coordinates(joint: &JointEntry) -> Vec<(&SourceFormula, CoordinateMotion)> {
     let motion = |is_angle| {
         if is_angle {
@@ -24,6 +27,7 @@ pub(super) fn coordinates(joint: &JointEntry) -> Vec<(&SourceFormula, Coordinate
         }
     };
     let mut all: Vec<(&SourceFormula, CoordinateMotion)> = Vec::new();
+    // Seven coordinates: three of the position, four of the quaternion, whose scalar part comes first or last.
     if let Some(list) = joint.free.as_ref().filter(|list| list.entries.len() == 7) {
         let scalar = match joint.quaternion {
             Some(QuaternionOrder::Wxyz) => 3,
@@ -38,7 +42,7 @@ pub(super) fn coordinates(joint: &JointEntry) -> Vec<(&SourceFormula, Coordinate
             })
             .collect();
     }
-    // How many of the first coordinates are lengths; an angle leads in a cylindrical joint.
+    // The number of coordinates at the start that are lengths; a cylindrical joint starts with its angle.
     for (list, n_lengths) in [
         (&joint.universal, 0),
         (&joint.spherical, 0),
@@ -56,7 +60,7 @@ pub(super) fn coordinates(joint: &JointEntry) -> Vec<(&SourceFormula, Coordinate
     all
 }
 
-/// Appends the motions of a joint to `steps`, and what it is for people to `text`.
+/// Appends the motions of a joint to `steps`, and its description to `text`.
 pub(super) fn steps(
     joint: &JointEntry,
     symbols: &SymbolTable,
@@ -80,9 +84,9 @@ pub(super) fn steps(
     if n_kinds != 1 {
         if !log.syntax_broken && !joint.faulty {
             log.push(
-                Diagnostic::error(joint.span, "this joint does not say how it moves")
+                Diagnostic::error(joint.span, "this joint does not specify how it moves")
                     .label("expected one of `revolute`, `prismatic`, `cylindrical`, `universal`, `spherical`, `free`")
-                    .help("for example `joint = { revolute = \"q1\", axis = \"z\" }`; leave `joint` away where nothing moves"),
+                    .help("for example `joint = { revolute = \"q1\", axis = \"z\" }`; omit `joint` where nothing moves"),
             );
         }
         return;
@@ -93,6 +97,7 @@ pub(super) fn steps(
         steps,
         log,
     };
+    // `entries` below checks the number of coordinates of joints with several of them.
     if let Some(formula) = &joint.revolute {
         text.push(format!("revolute({}, {shown})", formula.text));
         builder.rotate(axis, minus, formula);
@@ -131,7 +136,7 @@ pub(super) fn steps(
     reject_unused_axes(joint, log);
 }
 
-/// Says where an axis or axes are given that the joint has no use for.
+/// Reports axes, a quaternion or a twist that the joint cannot use.
 fn reject_unused_axes(joint: &JointEntry, log: &mut DiagnosticLog) {
     let has_quaternion = joint
         .free
@@ -141,7 +146,7 @@ fn reject_unused_axes(joint: &JointEntry, log: &mut DiagnosticLog) {
         log.push(
             Diagnostic::error(
                 joint.span,
-                "`quaternion` and `twist` say nothing of this joint",
+                "`quaternion` and `twist` do not apply to this joint",
             )
             .label("they belong to `free` with seven coordinates: three of the position and four of a quaternion"),
         );
@@ -149,7 +154,7 @@ fn reject_unused_axes(joint: &JointEntry, log: &mut DiagnosticLog) {
     if has_quaternion {
         if joint.axis.is_some() || joint.axes.is_some() {
             log.push(
-                Diagnostic::error(joint.span, "a body with a quaternion turns about no axes")
+                Diagnostic::error(joint.span, "a body with a quaternion has no axes")
                     .label("delete `axis` or `axes`"),
             );
         }
@@ -174,13 +179,14 @@ fn reject_unused_axes(joint: &JointEntry, log: &mut DiagnosticLog) {
         log.push(
             Diagnostic::error(
                 span,
-                format!("this joint has {has}, {several} says nothing of it"),
+                format!("this joint has {has}; {several} does not apply to it"),
             )
             .label(format!("expected {wanted}")),
         );
     }
 }
 
+/// The axis of a joint, whether its direction is negative, and its name; z if the file gives none.
 fn axis_of(joint: &JointEntry) -> (FrameAxis, bool, &'static str) {
     match joint.axis.unwrap_or(AxisName::Z) {
         AxisName::X => (FrameAxis::X, false, "x"),
@@ -192,9 +198,13 @@ fn axis_of(joint: &JointEntry) -> (FrameAxis, bool, &'static str) {
     }
 }
 
+/// Builds the steps of one joint.
 struct Builder<'a> {
+    /// Names that expressions may use.
     symbols: &'a SymbolTable,
+    /// Steps of the frame so far.
     steps: &'a mut Vec<FrameStep>,
+    /// Receives faults.
     log: &'a mut DiagnosticLog,
 }
 
@@ -219,13 +229,13 @@ impl Builder<'_> {
         found
     }
 
-    /// A body that hangs on nothing.
+    /// Adds the step of a free body with a quaternion.
     fn free_body(&mut self, joint: &JointEntry, text: &mut Vec<String>) {
         let Some(list) = &joint.free else { return };
         let (Some(order), Some(twist)) = (joint.quaternion, joint.twist) else {
             if !joint.faulty {
                 self.log.push(
-                    Diagnostic::error(joint.span, "a free body with a quaternion says two things more")
+                    Diagnostic::error(joint.span, "a free body with a quaternion needs two more entries")
                         .label("expected `quaternion` and `twist`")
                         .help("`quaternion = \"xyzw\"` or `\"wxyz\"` is the order of its last four coordinates")
                         .help("`twist = \"body\"`, `\"world\"` or `\"mixed\"` are the axes of velocity and force, angular velocity and moment"),
@@ -233,6 +243,7 @@ impl Builder<'_> {
             }
             return;
         };
+        // Its coordinates must be plain names, all different.
         let found: Vec<CoordinateIdx> = list
             .entries
             .iter()
@@ -241,6 +252,7 @@ impl Builder<'_> {
         let Ok([x, y, z, a, b, c, d]) = <[CoordinateIdx; 7]>::try_from(found) else {
             return;
         };
+        // The scalar part comes first, whatever the order of the file.
         let quaternion = match order {
             QuaternionOrder::Xyzw => [d, a, b, c],
             QuaternionOrder::Wxyz => [a, b, c, d],
@@ -248,7 +260,7 @@ impl Builder<'_> {
         let all = [x, y, z, a, b, c, d];
         if let Some(k) = (1..7).find(|k| all[..*k].contains(&all[*k])) {
             self.log.push(
-                Diagnostic::error(list.entries[k].ast.span, "this coordinate stands twice")
+                Diagnostic::error(list.entries[k].ast.span, "this coordinate is listed twice")
                     .label("expected seven different ones"),
             );
             return;
@@ -276,12 +288,15 @@ impl Builder<'_> {
         }));
     }
 
-    /// The coordinate that a formula is.
+    /// The coordinate that a formula consists of; anything else is reported.
     fn coordinate(&mut self, formula: &SourceFormula) -> Option<CoordinateIdx> {
         let FormulaAstKind::Name(name) = &formula.ast.kind else {
             self.log.push(
-                Diagnostic::error(formula.ast.span, "a free body moves by coordinates alone")
-                    .label("expected the name of a coordinate"),
+                Diagnostic::error(
+                    formula.ast.span,
+                    "a free body takes names of coordinates only",
+                )
+                .label("expected the name of a coordinate"),
             );
             return None;
         };
@@ -294,11 +309,12 @@ impl Builder<'_> {
         }
     }
 
+    /// Adds a rotation about an axis; `minus` reverses its direction.
     fn rotate(&mut self, axis: FrameAxis, minus: bool, formula: &SourceFormula) {
         let mut about = angle_or_zero(Some(formula), self.symbols, self.log);
         if minus {
             if !about.pi.is_one() {
-                about.pi = -about.pi; // Half a turn is the same either way.
+                about.pi = -about.pi; // Half a turn is the same in both directions.
             }
             for term in &mut about.terms {
                 term.1 = -term.1;
@@ -307,6 +323,7 @@ impl Builder<'_> {
         self.steps.push(FrameStep::Rotate(axis, about));
     }
 
+    /// Adds a translation along an axis; `minus` reverses its direction.
     fn translate(&mut self, axis: FrameAxis, minus: bool, formula: &SourceFormula) {
         let mut along = length_or_zero(
             Some(formula),
@@ -326,7 +343,7 @@ impl Builder<'_> {
         self.steps.push(FrameStep::Translate(axis, along));
     }
 
-    /// Rotations about several axes, one after the other.
+    /// Adds rotations about several axes, each turned by those before. The letters of `axes` give the order.
     fn rotations(
         &mut self,
         kind: &str,
@@ -346,6 +363,7 @@ impl Builder<'_> {
                 _ => None,
             })
             .collect();
+        // Equal neighbours would be one rotation with two coordinates.
         let is_fine = axes.len() == angles.len()
             && axes.iter().all(Option::is_some)
             && axes.windows(2).all(|pair| pair[0] != pair[1]);

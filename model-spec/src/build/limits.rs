@@ -1,4 +1,6 @@
-//! What planned motion must keep: ranges of coordinates, forces and points, and the distance from singular poses.
+//! Limits of planned motions: ranges of coordinates, forces and points, and the distance from singular poses.
+//!
+//! The table `limits` goes in, [`MotionLimits`] by index come out.
 
 use crate::diagnostic::{Diagnostic, DiagnosticLog, SourceSpan};
 use crate::exact::CoordinateIdx;
@@ -9,7 +11,7 @@ use crate::range::ValueRange;
 use crate::schema::ModelEntry;
 use crate::suggest;
 
-/// Reads the limits; names must be those of the file.
+/// Reads the limits; a name that the file does not have is reported.
 pub(super) fn limits(
     model: &ModelEntry,
     coordinates: &[JointCoordinate],
@@ -21,7 +23,7 @@ pub(super) fn limits(
     let Some(entry) = &model.limits else {
         return limits;
     };
-    // What a faulty entry would define is not reported as unknown.
+    // After an error a name may be missing only because its entry was faulty.
     let is_sound = log.n_errors() == 0;
     let ends = |range: &Option<ValueRange>| range.as_ref().map(|range| range.ends);
     for (key, one) in entry.coordinates.iter().flat_map(|named| &named.entries) {
@@ -30,6 +32,7 @@ pub(super) fn limits(
             continue;
         };
         let coordinate = &coordinates[i];
+        // Rates of passive coordinates are functions of the active ones, so they have no limits of their own.
         let of_rates = one.rate.as_ref().or(one.acceleration.as_ref());
         if let (true, Some(range)) = (coordinate.passive, of_rates) {
             log.push(
@@ -44,6 +47,7 @@ pub(super) fn limits(
                 .help("limit the rates of the active coordinates instead"),
             );
         }
+        // The nominal pose must satisfy the limits, because planning starts there.
         if let Some(range) = &one.position
             && !(range.ends[0]..=range.ends[1]).contains(&coordinate.nominal)
         {
@@ -59,6 +63,7 @@ pub(super) fn limits(
                 .help("widen the limits, or move the nominal value into them; angles are in rad"),
             );
         }
+        // A range without zero could never be met at the start and end of a motion.
         for (what, range) in [("rate", &one.rate), ("acceleration", &one.acceleration)] {
             if let Some(range) = range
                 && !(range.ends[0] < 0.0 && range.ends[1] > 0.0)
@@ -98,15 +103,18 @@ pub(super) fn limits(
             limits.singularity = Some(number.value);
         } else {
             log.push(
-                Diagnostic::error(number.span, "this is no share of the nominal pose's value")
-                    .label("expected a number between 0 and 1, such as 0.3"),
+                Diagnostic::error(
+                    number.span,
+                    "this is not a share of the value at the nominal pose",
+                )
+                .label("expected a number between 0 and 1, such as 0.3"),
             );
         }
     }
     limits
 }
 
-/// The position of a name in a list; reports a name that is not there.
+/// The position of a name in a list; an unknown name is reported, unless an earlier error may explain it.
 fn position<'a>(
     name: &str,
     span: SourceSpan,

@@ -1,4 +1,6 @@
 //! The products of parameters that should stay in the base parameters.
+//!
+//! The list `retain` goes in; powers of parameters come out, one list per product.
 
 use std::collections::BTreeMap;
 
@@ -9,7 +11,7 @@ use crate::formula::{FormulaAst, FormulaAstKind};
 use crate::schema::ModelEntry;
 use crate::scope::SymbolSort;
 
-/// Reads the products of parameters to retain.
+/// Reads the products to retain: for each, its parameters with positive exponents, in the order of the file.
 pub(super) fn retain(
     model: &ModelEntry,
     symbols: &SymbolTable,
@@ -25,6 +27,7 @@ pub(super) fn retain(
     products
 }
 
+/// Adds the powers of a product to `powers`, all multiplied by `exponent`; false after a fault.
 fn product(
     ast: &FormulaAst,
     exponent: u32,
@@ -34,7 +37,7 @@ fn product(
 ) -> bool {
     match &ast.kind {
         FormulaAstKind::Name(name) => {
-            // Naming a parameter here uses nothing: it only orders what the mechanism holds.
+            // An entry of `retain` does not count as a use of the parameter, so the mark is restored.
             let was_used = symbols
                 .scope
                 .get(name)

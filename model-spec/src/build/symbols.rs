@@ -1,4 +1,6 @@
 //! Constants, parameters and coordinates: the names that expressions may use.
+//!
+//! They are declared before anything else is read, so that every later stage can resolve expressions.
 
 use std::cell::Cell;
 
@@ -15,28 +17,33 @@ use crate::values::FormulaVector;
 
 /// Most coordinates of a mechanism.
 const MOST_COORDINATES: usize = 100;
-/// Further ones that are looked at although the file has too many.
+/// Most coordinates that are declared although the file has too many, so that uses of them are not reported as
+/// unknown.
 const DECLARED_AT_MOST: usize = 1000;
 
-/// What the names of a file stand for.
+/// The quantities that the names of a file stand for.
 pub(crate) struct SymbolTable {
+    /// All names with sort, dimension and whether they are used.
     pub(crate) scope: FormulaScope,
+    /// Constants by index.
     pub(crate) constants: Vec<ModelConstant>,
+    /// Parameters by index; effects add further ones.
     pub(super) parameters: Vec<DynamicParameter>,
-    /// Where each parameter got its nominal value; those of effects and shorthands may get one later.
+    /// Where each parameter gets its nominal value. Parameters of effects and shorthands may get one later.
     pub(super) nominal_given: Vec<Option<SourceSpan>>,
+    /// Coordinates by index.
     pub(super) coordinates: Vec<JointCoordinate>,
-    /// Coordinates that no frame mentions.
+    /// Coordinates that no frame uses.
     still: Vec<CoordinateIdx>,
 }
 
-/// What became of a parameter's name that may be declared already.
+/// The result of looking up a parameter's name that may be declared already.
 pub(super) enum ParameterLookup {
-    /// No one has declared it yet.
+    /// The name is not declared yet.
     New,
-    /// It is this parameter.
+    /// The name is that of this parameter.
     Known(ParameterIdx),
-    /// It is something else, which is reported.
+    /// The name is that of another quantity, or the parameter does not fit; this is reported.
     Faulty,
 }
 
@@ -53,10 +60,10 @@ pub(super) const LINEAR: [(&str, UnitDimension); 10] = [
     ("MZ", UnitDimension::FIRST_MOMENT),
     ("M", UnitDimension::MASS),
 ];
-/// Those of a body in the x-y plane.
+/// The linear parameters of a body in the x-y plane.
 const PLANAR: [&str; 4] = ["ZZ", "MX", "MY", "M"];
 
-/// Declares all names of a file.
+/// Declares all names of a file: constants, parameters, shorthands of parts, and coordinates.
 pub(super) fn declare(
     model: &ModelEntry,
     places: &mut MechanismSpans,
@@ -73,6 +80,7 @@ pub(super) fn declare(
     for (key, entry) in model.constants.iter().flat_map(|table| &table.entries) {
         let symbol = ModelSymbol::Constant(ConstantIdx(symbols.constants.len()));
         let unit = entry.unit.as_ref();
+        // A faulty unit fits any other, so that it is reported once only.
         let unit_text = unit.map_or("?", |unit| unit.text.as_str());
         let dimension = unit.map(|unit| unit.dimension);
         let meaning = SymbolMeaning {
@@ -116,8 +124,8 @@ pub(super) fn declare(
     symbols
 }
 
-/// Declares the names whose entries could not be read, with a meaning that fits anything:
-/// what is wrong with them is reported, and they are not unknown.
+/// Declares the names whose entries could not be read. They fit any sort of use, so that only their own fault is
+/// reported.
 fn declare_faulty(model: &ModelEntry, symbols: &mut SymbolTable, log: &mut DiagnosticLog) {
     let constants = model.constants.iter().flat_map(|table| &table.faulty);
     let parameters = model.parameters.iter().flat_map(|table| &table.faulty);
@@ -140,7 +148,7 @@ fn declare_faulty(model: &ModelEntry, symbols: &mut SymbolTable, log: &mut Diagn
     }
 }
 
-/// Reports coordinates that no joint moves by, and a mechanism without any.
+/// Reports coordinates that no joint uses, and a mechanism without any.
 pub(super) fn check_coordinates_move(
     model: &ModelEntry,
     symbols: &SymbolTable,
@@ -148,13 +156,13 @@ pub(super) fn check_coordinates_move(
     log: &mut DiagnosticLog,
 ) {
     if log.syntax_broken || model.frame.as_ref().is_some_and(|list| list.faulty) {
-        return; // A faulty frame may be the one that moves.
+        return; // A faulty frame may be the one that uses them.
     }
     for &CoordinateIdx(idx) in &symbols.still {
         log.push(
             Diagnostic::error(
                 places.coordinates[idx],
-                format!("no joint moves by `{}`", symbols.coordinates[idx].name),
+                format!("no joint uses `{}`", symbols.coordinates[idx].name),
             )
             .label("expected in `theta` or `d` of a frame, or in its `joint`")
             .help("use the coordinate in a frame, or delete it"),
@@ -174,7 +182,7 @@ pub(super) fn check_coordinates_move(
 }
 
 impl SymbolTable {
-    /// Adds a parameter; false if its name is taken.
+    /// Adds a parameter; false if its name is taken, which is reported.
     pub(super) fn declare_parameter(
         &mut self,
         parameter: DynamicParameter,
@@ -199,7 +207,8 @@ impl SymbolTable {
         fine
     }
 
-    /// The parameter of a name that a second place shares; its dimension must agree, and its nominal value if both give one.
+    /// Looks up a parameter that a second place may share. Its dimension must agree, and its nominal value if both
+    /// give one.
     pub(super) fn share_parameter(
         &mut self,
         name: &str,
@@ -260,7 +269,7 @@ impl SymbolTable {
     }
 }
 
-/// Declares the parameters that `linear = { all = "1" }` stands for.
+/// Declares the parameters of shorthands such as `linear = { all = "1" }`.
 fn declare_shorthands(model: &ModelEntry, symbols: &mut SymbolTable, log: &mut DiagnosticLog) {
     for part in model.part.iter().flat_map(|list| &list.entries) {
         let Some(linear) = &part.linear else {
@@ -274,6 +283,7 @@ fn declare_shorthands(model: &ModelEntry, symbols: &mut SymbolTable, log: &mut D
                 .nominal
                 .as_ref()
                 .and_then(|nominal| nominal_of(nominal, symbol));
+            // An explicit entry replaces the parameter, which then has no nominal value.
             let own = explicit_entry(linear, symbol);
             if !members.contains(&symbol) || own.is_some() {
                 if let Some(nominal) = nominal {
@@ -314,7 +324,7 @@ fn declare_shorthands(model: &ModelEntry, symbols: &mut SymbolTable, log: &mut D
     }
 }
 
-/// The suffix of a shorthand and the symbols that it stands for.
+/// The suffix of a shorthand and the symbols of its parameters; `None` without a shorthand.
 pub(super) fn shorthand(
     linear: &LinearEntry,
 ) -> Option<(&crate::values::NameSuffix, &'static [&'static str])> {
@@ -326,7 +336,7 @@ pub(super) fn shorthand(
     }
 }
 
-/// The entry that a body gives for one of the linear parameters.
+/// The explicit expression of a part for one of the linear parameters.
 pub(super) fn explicit_entry<'a>(
     linear: &'a LinearEntry,
     symbol: &str,
@@ -345,6 +355,7 @@ pub(super) fn explicit_entry<'a>(
     }
 }
 
+/// The nominal value that a part gives for one of the linear parameters.
 fn nominal_of(nominal: &LinearNominalEntry, symbol: &str) -> Option<crate::values::SpannedNumber> {
     match symbol {
         "XX" => nominal.xx,
@@ -360,7 +371,7 @@ fn nominal_of(nominal: &LinearNominalEntry, symbol: &str) -> Option<crate::value
     }
 }
 
-/// Declares the coordinates; whether one is an angle or a length follows from the frames.
+/// Declares the coordinates; their use in the frames decides whether each is an angle or a length.
 fn declare_coordinates(
     model: &ModelEntry,
     symbols: &mut SymbolTable,
@@ -380,10 +391,10 @@ fn declare_coordinates(
         log.push(
             Diagnostic::error(key.span, "there are too many coordinates")
                 .label(format!("at most {MOST_COORDINATES}"))
-                .help("fix joints that the recordings do not move, such as those of fingers: a frame without a joint stands still"),
+                .help("fix joints that the recordings do not move, such as those of fingers: a frame without a joint is fixed"),
         );
     }
-    // Some of those above are known as well, so that few other places of the file have a fault by them.
+    // Coordinates beyond the limit are declared too, so that their uses cause no further findings.
     for (key, entry) in entries.iter().take(DECLARED_AT_MOST) {
         let turns = angles.iter().find_map(|ast| find_name(ast, &key.name));
         let slides = lengths.iter().find_map(|ast| find_name(ast, &key.name));
@@ -401,6 +412,7 @@ fn declare_coordinates(
                 .help("declare a coordinate for each joint"),
             );
         }
+        // A coordinate with conflicting uses, or with none, has no dimension and counts as revolute.
         let of_quaternion = of_quaternion.map(|(_, motion)| motion);
         let motion = match (turns, slides) {
             (Some(turns), Some(slides)) => {
@@ -424,7 +436,7 @@ fn declare_coordinates(
                 None
             }
         };
-        // Without values a quaternion turns nothing.
+        // Without nominal values a quaternion is the identity: its scalar part is one.
         let at_rest = f64::from(u8::from(motion == Some(CoordinateMotion::QuaternionScalar)));
         let dimension = motion.map(CoordinateMotion::dimension);
         let motion = motion.unwrap_or(CoordinateMotion::Revolute);
@@ -445,19 +457,24 @@ fn declare_coordinates(
                 nominal: entry.nominal.map_or(at_rest, |number| number.value),
             });
         } else {
+            // A duplicate was not added, so it must not be reported as unused.
             let n_coordinates = symbols.coordinates.len();
             symbols.still.retain(|idx| idx.0 < n_coordinates);
         }
     }
 }
 
-/// The expressions of all frames by what they are.
+/// The expressions of all frames, by the quantity that they describe.
 struct FrameFormulas<'a> {
+    /// Angles of frames and joints.
     angles: Vec<&'a FormulaAst>,
+    /// Lengths of frames and joints.
     lengths: Vec<&'a FormulaAst>,
+    /// Components of quaternions, each with its kind.
     quaternions: Vec<(&'a FormulaAst, CoordinateMotion)>,
 }
 
+/// Collects the expressions of all frames and joints.
 fn joint_formulas(model: &ModelEntry) -> FrameFormulas<'_> {
     let mut angles: Vec<&FormulaAst> = Vec::new();
     let mut lengths: Vec<&FormulaAst> = Vec::new();
@@ -488,7 +505,7 @@ fn joint_formulas(model: &ModelEntry) -> FrameFormulas<'_> {
     }
 }
 
-/// The place of a name in an expression.
+/// The place of a name in an expression, if the expression contains it.
 fn find_name(ast: &FormulaAst, name: &str) -> Option<SourceSpan> {
     match &ast.kind {
         FormulaAstKind::Name(found) => (found == name).then_some(ast.span),
@@ -505,7 +522,7 @@ fn find_name(ast: &FormulaAst, name: &str) -> Option<SourceSpan> {
     }
 }
 
-/// Gravity in the base frame; zero if the file gives none.
+/// Gravity in the base frame, m/s^2; zero if the file gives none.
 pub(super) fn gravity(
     model: &ModelEntry,
     scope: &FormulaScope,
@@ -528,7 +545,7 @@ pub(super) fn gravity(
     )
 }
 
-/// The entries of a vector; zero where one is absent or faulty.
+/// The entries of a vector; zero for each that is absent or faulty.
 pub(super) fn vector(
     vector: &FormulaVector,
     scope: &FormulaScope,
@@ -545,12 +562,13 @@ pub(super) fn vector(
     })
 }
 
-/// Warns of constants and parameters that nothing uses.
+/// Warns of constants and parameters that no expression uses.
 pub(super) fn warn_of_unused(symbols: &SymbolTable, log: &mut DiagnosticLog) {
     for (name, meaning) in symbols.scope.iter() {
         let Some(declared) = meaning.declared.filter(|_| !meaning.used.get()) else {
             continue;
         };
+        // Unused coordinates are errors, and names of places are declared by the program.
         let what = match meaning.sort {
             SymbolSort::Constant => "constant",
             SymbolSort::Parameter => "parameter",
