@@ -1,19 +1,19 @@
-//! Variants: a file that extends another takes over its entries and overrides or removes single ones.
+//! Variants: a file that extends another one takes its entries, and overrides or removes some of them.
 //!
-//! Tables merge key by key, lists of tables by the entries' names, and inside an entry each field is replaced whole.
-//! Every value keeps its place, so that later findings point into the file at fault.
+//! Tables merge key by key, lists of tables by the names of entries. Inside of an entry each field is replaced as a
+//! unit. Every value keeps its place, so that later findings point into the faulty file.
 
 use crate::diagnostic::{Diagnostic, DiagnosticLog};
 use crate::document::{TomlKey, TomlNode, TomlTable, TomlValue, find_key, quote};
 use crate::suggest;
 
-/// Fields of which one rules the others out: a variant that sets one drops the others of the extended file.
+/// Fields that exclude each other: a variant that sets one of a group drops the others of the extended file.
 const ALTERNATIVES: [&[&[&str]]; 3] = [
     &[&["modified_dh"], &["standard_dh"], &["transform", "joint"]],
     &[&["mass", "centre", "inertia"], &["linear"]],
     &[&["joint"], &["linear"]],
 ];
-/// A field that an entry of a list must have: an entry of a variant without it can only mean to override another one.
+/// A field that each new entry of a list must have. An entry of a variant without it can only override another one.
 const REQUIRED_FIELDS: [(&str, &str); 8] = [
     ("frame", "on"),
     ("point", "on"),
@@ -24,10 +24,10 @@ const REQUIRED_FIELDS: [(&str, &str); 8] = [
     ("effect_kind", "on"),
     ("drive", "name"),
 ];
-/// Keys that are a file's own and are not taken over.
+/// Keys that belong to one file and are not taken over.
 const OWN_KEYS: [&str; 4] = ["schema", "name", "extends", "remove"];
 
-/// Applies a variant to the file that it extends.
+/// Applies a variant to the file that it extends. Removals come first, then entries override or are added.
 pub(crate) fn merge(mut base: TomlTable, variant: TomlTable, log: &mut DiagnosticLog) -> TomlTable {
     base.retain(|(key, _)| !OWN_KEYS.contains(&key.name.as_str()));
     if let Some((_, list)) = find_key(&variant, "remove") {
@@ -42,7 +42,9 @@ pub(crate) fn merge(mut base: TomlTable, variant: TomlTable, log: &mut Diagnosti
     base
 }
 
+/// Merges one top-level entry of a variant into that of the extended file.
 fn merge_section(section: &str, old: &mut TomlNode, new: TomlNode, log: &mut DiagnosticLog) {
+    // Tables of named entries merge by key, lists of tables by name; everything else is replaced.
     match (&mut old.value, new.value) {
         (TomlValue::Table(old), TomlValue::Table(new)) => {
             for (key, entry) in new {
@@ -61,6 +63,7 @@ fn merge_section(section: &str, old: &mut TomlNode, new: TomlNode, log: &mut Dia
                     .iter()
                     .all(|entry| matches!(entry.value, TomlValue::Table(_))) =>
         {
+            // Entries of the variant itself never override each other.
             let n_old = old.len();
             for entry in new {
                 let name = name_of(&entry).map(str::to_owned);
@@ -83,6 +86,7 @@ fn merge_section(section: &str, old: &mut TomlNode, new: TomlNode, log: &mut Dia
     }
 }
 
+/// Merges the fields of one entry; a value that is not a table is replaced.
 fn merge_entry(old: &mut TomlNode, new: TomlNode) {
     old.span = new.span;
     let (TomlValue::Table(old_fields), TomlValue::Table(new_fields)) = (&mut old.value, &new.value)
@@ -94,7 +98,7 @@ fn merge_entry(old: &mut TomlNode, new: TomlNode) {
         let sets = |table: &TomlTable, option: &[&str]| {
             option.iter().any(|key| find_key(table, key).is_some())
         };
-        // `joint` and `linear` stand in several kinds of entries; both sides of a choice must occur to matter.
+        // `joint` and `linear` occur in several kinds of entries, so only groups with a field on both sides matter.
         if let Some(taken) = choice.iter().find(|option| sets(new_fields, option)) {
             old_fields.retain(|(key, _)| {
                 taken.contains(&key.name.as_str())
@@ -118,7 +122,7 @@ fn merge_entry(old: &mut TomlNode, new: TomlNode) {
     }
 }
 
-/// Whether an entry lacks what a new one must have, so that it can only mean to override.
+/// Whether an entry lacks the required field of a new one, so that it can only be an override.
 fn is_partial(section: &str, entry: &TomlNode) -> bool {
     let TomlValue::Table(table) = &entry.value else {
         return false;
@@ -128,7 +132,7 @@ fn is_partial(section: &str, entry: &TomlNode) -> bool {
         .any(|(list, key)| *list == section && find_key(table, key).is_none())
 }
 
-/// What is wrong with an entry that means to override, but none that there is.
+/// The diagnostic of an entry that overrides no existing one.
 fn overrides_nothing(section: &str, entry: &TomlNode, old: &[TomlNode]) -> Diagnostic {
     let (message, advice) = match name_of(entry) {
         Some(name) => {
@@ -145,7 +149,7 @@ fn overrides_nothing(section: &str, entry: &TomlNode, old: &[TomlNode]) -> Diagn
             )
         }
         None => (
-            format!("it is not said which `{section}` this overrides"),
+            format!("this entry does not state which `{section}` it overrides"),
             Some("add its `name`".to_owned()),
         ),
     };
@@ -156,7 +160,7 @@ fn overrides_nothing(section: &str, entry: &TomlNode, old: &[TomlNode]) -> Diagn
     with_unnamed(
         Diagnostic::error(entry.span, message)
             .label(format!(
-                "expected the name of an entry there, or `{needed}` and all else that a new entry needs"
+                "expected the name of an existing entry, or `{needed}` and all other fields of a new entry"
             ))
             .help_if(advice),
         section,
@@ -165,14 +169,15 @@ fn overrides_nothing(section: &str, entry: &TomlNode, old: &[TomlNode]) -> Diagn
     )
 }
 
-/// Adds that entries without a name cannot be overridden or removed, if there are any; `wanted` is what the user may
-/// have taken for a name.
+/// Adds the advice that entries without a name cannot be overridden or removed, if there are such entries. `wanted`
+/// is a text that the user may have taken for a name, such as a kind.
 fn with_unnamed(
     diagnostic: Diagnostic,
     section: &str,
     entries: &[TomlNode],
     wanted: Option<&str>,
 ) -> Diagnostic {
+    // An entry whose kind or frame is the wanted text is the most likely one.
     let mut unnamed = entries.iter().filter(|entry| name_of(entry).is_none());
     let says = |entry: &&TomlNode| {
         let TomlValue::Table(table) = &entry.value else {
@@ -188,10 +193,10 @@ fn with_unnamed(
     };
     diagnostic
         .related(first.span, format!("this `{section}` has no name"))
-        .help("what has no `name` can be neither overridden nor removed: give it a name in the extended file")
+        .help("entries without a `name` can be neither overridden nor removed: give it a name in the extended file")
 }
 
-/// The name of an entry of a list.
+/// The name of an entry of a list, if it has one.
 fn name_of(node: &TomlNode) -> Option<&str> {
     let TomlValue::Table(table) = &node.value else {
         return None;
@@ -202,6 +207,7 @@ fn name_of(node: &TomlNode) -> Option<&str> {
     }
 }
 
+/// Removes the entries that a variant lists, as `table` or `table.name`; unknown ones are reported.
 fn remove_entries(base: &mut TomlTable, list: &TomlNode, log: &mut DiagnosticLog) {
     let TomlValue::Array(list) = &list.value else {
         return; // The reader of the merged file reports the type.
@@ -214,6 +220,7 @@ fn remove_entries(base: &mut TomlTable, list: &TomlNode, log: &mut DiagnosticLog
             Some((section, name)) => (section, Some(name)),
             None => (text.as_str(), None),
         };
+        // Names are collected before anything is removed, for the advice.
         let sections: Vec<String> = base.iter().map(|(key, _)| key.name.clone()).collect();
         let Some(position) = base.iter().position(|(key, _)| key.name == section) else {
             log.push(
@@ -248,6 +255,7 @@ fn remove_entries(base: &mut TomlTable, list: &TomlNode, log: &mut DiagnosticLog
             }
             _ => false,
         };
+        // Uses of a removed entry are reported later with this place.
         if removed {
             log.removed
                 .insert((section.to_owned(), name.to_owned()), path.span);
@@ -274,6 +282,7 @@ fn remove_entries(base: &mut TomlTable, list: &TomlNode, log: &mut DiagnosticLog
     }
 }
 
+/// The names of all entries of a table or list.
 fn entry_names(node: &TomlNode) -> Vec<String> {
     match &node.value {
         TomlValue::Table(table) => table

@@ -1,8 +1,8 @@
-//! The mechanism at its nominal pose: do the loops close there, do they settle the passive coordinates,
-//! and can the drives hold it?
+//! Checks the mechanism at its nominal pose: the loops must close there, they must determine the passive coordinates,
+//! and the drives must act on all degrees of freedom.
 //!
-//! A mechanism goes in, its passive coordinates come out refined until the loops close, by Gauss-Newton steps
-//! damped after Levenberg and Marquardt.
+//! A mechanism goes in; its passive coordinates come out refined until the loops close. The refinement uses
+//! Gauss-Newton steps with the damping of Levenberg and Marquardt.
 
 use crate::build::MechanismSpans;
 use crate::diagnostic::{Diagnostic, DiagnosticLog, SourceSpan};
@@ -11,17 +11,17 @@ use crate::kinematics::{Vec3, frame_poses, jacobian, position};
 use crate::mechanism::{CoordinateCoupling, DriveKind, FrameStep, Mechanism};
 use crate::numeric::{DenseRows, least_squares, rank};
 
-/// Passive angles may move this far, in rad, before it counts as another assembly.
+/// Passive angles may change by this much, in rad, before the result counts as another assembly.
 const FARTHEST_TURN: f64 = 0.5;
-/// Loops must close to this, relative to the size of the mechanism.
+/// Loops must close to this tolerance, relative to the size of the mechanism.
 const CLOSED: f64 = 1e-9;
-/// Pivots below this, relative to the largest, count as zero.
+/// Pivots below this share of the largest one count as zero.
 const SINGULAR: f64 = 1e-8;
-/// What is left of an equation beside others, relative to the largest, where it says nothing of its own: the digits of a file
-/// may leave that much of one which follows from them.
+/// An equation whose remainder after elimination is below this share of the largest one counts as dependent. Rounded
+/// digits of a file may leave such a remainder of an equation that follows from others.
 const DEPENDENCE_TOLERANCE: f64 = 1e-5;
 
-/// Checks the nominal pose and refines the passive coordinates there.
+/// Checks the nominal pose and refines the passive coordinates there. Each check needs the ones before it.
 pub(crate) fn check_pose(
     mechanism: &mut Mechanism,
     places: &MechanismSpans,
@@ -38,13 +38,17 @@ pub(crate) fn check_pose(
     }
 }
 
-/// Gaps of all loops, three for each, then of the couplings, the derivative of the gaps, and the size of the mechanism.
+/// Residuals of all constraints: three per loop, then one per coupling.
 pub(crate) struct LoopGaps {
+    /// Differences of the points of loops, m, then of coordinates that follow others, rad or m.
     pub(crate) values: Vec<f64>,
+    /// Derivatives of the values by all coordinates.
     pub(crate) rows: DenseRows,
+    /// Largest coordinate of a frame's origin or a point of a loop, m.
     pub(crate) size: f64,
 }
 
+/// Evaluates the constraints at the nominal values.
 pub(crate) fn loop_gaps(mechanism: &Mechanism) -> LoopGaps {
     let poses = frame_poses(mechanism);
     let mut found = LoopGaps {
@@ -64,6 +68,7 @@ pub(crate) fn loop_gaps(mechanism: &Mechanism) -> LoopGaps {
             found.size = found.size.max(one[k].abs()).max(other[k].abs());
         }
     }
+    // The size of the mechanism is the scale of all tolerances.
     for pose in &poses {
         found.size = pose
             .origin
@@ -79,7 +84,7 @@ pub(crate) fn loop_gaps(mechanism: &Mechanism) -> LoopGaps {
     found
 }
 
-/// The derivative of what follows, less what it follows, by all coordinates: one row for each coupling.
+/// Derivative of each coupling's residual by all coordinates: one row per coupling.
 fn coupling_rows(mechanism: &Mechanism) -> DenseRows {
     let value = |symbol: ModelSymbol| mechanism.symbol_nominal(symbol);
     let row = |coupling: &CoordinateCoupling| {
@@ -93,11 +98,12 @@ fn coupling_rows(mechanism: &Mechanism) -> DenseRows {
     mechanism.couplings.iter().map(row).collect()
 }
 
+/// Euclidean norm.
 fn norm(values: &[f64]) -> f64 {
     values.iter().map(|value| value * value).sum::<f64>().sqrt()
 }
 
-/// Columns of the passive coordinates, or of the others.
+/// Columns of the passive coordinates, or of the active ones.
 fn columns(mechanism: &Mechanism, rows: &DenseRows, passive: bool) -> DenseRows {
     rows.iter()
         .map(|row| {
@@ -110,7 +116,8 @@ fn columns(mechanism: &Mechanism, rows: &DenseRows, passive: bool) -> DenseRows 
         .collect()
 }
 
-/// Reports lengths and positions that have no finite value, such as the root of a negative number.
+/// Reports lengths and positions without a finite value, such as the root of a negative number; true if there are
+/// none.
 fn check_finite(mechanism: &Mechanism, places: &MechanismSpans, log: &mut DiagnosticLog) -> bool {
     let before = log.n_errors();
     let value = |symbol: ModelSymbol| mechanism.symbol_nominal(symbol);
@@ -127,7 +134,7 @@ fn check_finite(mechanism: &Mechanism, places: &MechanismSpans, log: &mut Diagno
         let finite = frame.steps.iter().all(|step| match step {
             FrameStep::Rotate(_, angle) => angle.evaluate(&value).is_finite(),
             FrameStep::Translate(_, length) => length.evaluate(&value).abs() < 1e100,
-            // Checked where its coordinates are read.
+            // Its coordinates are checked where they are read.
             FrameStep::Free(_) => true,
         });
         if !finite {
@@ -156,7 +163,8 @@ fn check_finite(mechanism: &Mechanism, places: &MechanismSpans, log: &mut Diagno
     log.n_errors() == before
 }
 
-/// Moves the passive coordinates until the loops close; false if they do not, or only far away.
+/// Changes the passive coordinates until the loops close; false if they do not close, or only far from the given
+/// values.
 fn close_loops(
     mechanism: &mut Mechanism,
     places: &MechanismSpans,
@@ -176,7 +184,7 @@ fn close_loops(
     let mut closes = true;
     for (i, closed) in mechanism.loops.iter().enumerate() {
         let gap = norm(&now.values[3 * i..3 * i + 3]);
-        // A gap that is no number is no closed loop either.
+        // Written so that a gap that is not a number counts as open.
         if gap <= CLOSED * size {
             continue;
         }
@@ -191,9 +199,10 @@ fn close_loops(
             )
             .label(format!("`{one}` and `{other}` stay {gap:.3} m apart"))
             .help("check the lengths, and the nominal values of the coordinates of both chains")
-            .help("the values of passive coordinates are only a start: they are moved until the loops close, those of active ones stay"),
+            .help("the values of passive coordinates are only a start: they are changed until the loops close, those of active ones stay fixed"),
         );
     }
+    // The residuals of the couplings follow those of the loops.
     let followers = now.values[3 * mechanism.loops.len()..].iter();
     for (coupling, gap) in mechanism.couplings.iter().zip(followers) {
         if gap.abs() <= CLOSED * size.max(1.0) {
@@ -205,12 +214,12 @@ fn close_loops(
             Diagnostic::error(
                 places.coordinates[coupling.coordinate.0],
                 format!(
-                    "the loops do not let `{}` follow at the nominal pose",
+                    "the loops contradict the coupling of `{}` at the nominal pose",
                     coordinate.name
                 ),
             )
             .label(format!(
-                "it stays {gap:.3} {} off",
+                "it stays {gap:.3} {} away",
                 coordinate.motion.unit()
             ))
             .help("check what it follows, and the nominal values of the coordinates of the loops"),
@@ -219,27 +228,29 @@ fn close_loops(
     closes && check_same_assembly(mechanism, &passive, &given, size, places, log)
 }
 
-/// What is left of the gaps when they are as small as the passive coordinates can make them.
+/// The smallest residual that the passive coordinates can reach.
 struct ClosureResidual {
+    /// The residual.
     gaps: LoopGaps,
-    /// The size of the mechanism where it started.
+    /// The size of the mechanism at the start, m.
     size: f64,
 }
 
 impl ClosureResidual {
-    /// Whether all loops close.
+    /// Whether all loops close; couplings are not checked here.
     fn is_closed(&self) -> bool {
         let mut loops = self.gaps.values.chunks(3);
         loops.all(|gap| norm(gap) <= CLOSED * self.size)
     }
 }
 
-/// Moves the passive coordinates until the loops close as well as they can.
+/// Changes the passive coordinates until the residual is as small as possible, in at most 100 steps.
 fn move_passive(mechanism: &mut Mechanism, passive: &[usize]) -> ClosureResidual {
     let at_start = loop_gaps(mechanism);
     let size = at_start.size.max(1e-6);
     let mut now = at_start;
     let mut damping = 1e-9;
+    // A step that reduces the residual is kept and the damping decreases; otherwise the damping increases.
     for _ in 0..100 {
         if norm(&now.values) <= 1e-14 * size || passive.is_empty() {
             break;
@@ -273,6 +284,7 @@ fn move_passive(mechanism: &mut Mechanism, passive: &[usize]) -> ClosureResidual
     ClosureResidual { gaps: now, size }
 }
 
+/// Reports passive coordinates that moved far from their given values; true if there are none.
 fn check_same_assembly(
     mechanism: &Mechanism,
     passive: &[usize],
@@ -286,8 +298,9 @@ fn check_same_assembly(
         let coordinate = &mechanism.coordinates[i];
         let mut followers = mechanism.couplings.iter();
         if followers.any(|coupling| coupling.coordinate.0 == i) {
-            continue; // Its value was no choice.
+            continue; // Its value was not given by the author.
         }
+        // The limit is an angle, or a share of the mechanism's size.
         let unit = coordinate.motion.unit();
         let farthest = if coordinate.motion.is_angle() {
             FARTHEST_TURN
@@ -308,7 +321,7 @@ fn check_same_assembly(
                 "given {given}, but the loops close at {:.4}, {way:.2} {unit} away",
                 coordinate.nominal
             ))
-            .help("the nominal values choose among the ways to assemble the mechanism, so they must be near the one that is meant")
+            .help("the nominal values choose among the ways to assemble the mechanism, so they must be near the intended one")
             .help(format!(
                 "if that is the assembly you mean, write `{} = {{ nominal = {:.4}, passive = true }}`",
                 coordinate.name, coordinate.nominal
@@ -318,8 +331,8 @@ fn check_same_assembly(
     fine
 }
 
-/// The derivative of the gaps as if both points of each loop stood in one place, so that loops which are still a little
-/// open do not seem to depend on coordinates that move them as a whole.
+/// Derivative of the constraints as if both points of each loop coincided. With a remaining gap the loops would seem
+/// to depend on coordinates that move both points together.
 fn constraint_rows(mechanism: &Mechanism) -> DenseRows {
     let poses = frame_poses(mechanism);
     let mut rows = DenseRows::new();
@@ -336,7 +349,7 @@ fn constraint_rows(mechanism: &Mechanism) -> DenseRows {
     rows
 }
 
-/// The loops must not tie more coordinates than are passive.
+/// Checks that the loops do not constrain more coordinates than are passive, and that some coordinate is independent.
 fn check_constraint_count(
     mechanism: &Mechanism,
     places: &MechanismSpans,
@@ -348,8 +361,8 @@ fn check_constraint_count(
     let n_passive = passive.len();
     let mut n_equations = rank(&constraint_rows(mechanism), DEPENDENCE_TOLERANCE);
     if n_equations > n_passive {
-        // Equations that follow from others, as in linkages that move against the count of their freedoms, do so only
-        // where the loops close, and not where nominal values are rounded.
+        // Overconstrained linkages have dependent equations only where the loops close, so the count is repeated at
+        // the closed pose. At rounded nominal values the equations seem independent.
         let mut closed = mechanism.clone();
         if move_passive(&mut closed, &passive).is_closed() {
             n_equations = rank(&constraint_rows(&closed), DEPENDENCE_TOLERANCE);
@@ -359,6 +372,7 @@ fn check_constraint_count(
     if n_equations <= n_passive && n_passive < n_coordinates {
         return true;
     }
+    // Without any place in the file there is nothing to report.
     let place = places.loops.first().or(places.coordinates.first());
     let Some(span) = place.copied() else {
         return false;
@@ -366,9 +380,9 @@ fn check_constraint_count(
     if n_equations < n_passive {
         log.push(
             Diagnostic::error(span, "all coordinates are passive")
-                .label("expected one at least that is not, for the others to follow")
+                .label("expected at least one independent coordinate")
                 .help(
-                    "drop `passive` where a drive acts, or say `driven = false` where nothing does",
+                    "remove `passive` where a drive acts, or write `driven = false` where nothing does",
                 ),
         );
         return false;
@@ -378,17 +392,17 @@ fn check_constraint_count(
             Diagnostic::error(
                 span,
                 format!(
-                    "this mechanism cannot move: its loops tie {} {}",
+                    "this mechanism cannot move: its loops constrain {} {}",
                     if n_coordinates == 1 { "its" } else { "all" },
                     plural(n_coordinates, "coordinate")
                 ),
             )
             .label(format!(
-                "{} at the nominal pose, and no coordinate is left",
+                "{} at the nominal pose, and no degree of freedom",
                 plural(n_equations, "independent loop equation")
             ))
             .help(
-                "each `[[loop]]` joins two points, which ties up to 2 coordinates in a plane and 3 in space: look for a loop or a link too many, or for a joint that \
+                "each `[[loop]]` joins two points, which constrains up to 2 coordinates in a plane and 3 in space: look for a loop or a link too many, or for a joint that \
                  is missing (a `[[frame]]` with a coordinate of its own)",
             )
             .help(
@@ -402,7 +416,7 @@ fn check_constraint_count(
         Diagnostic::error(
             span,
             format!(
-                "the loops tie {}, but {} passive",
+                "the loops constrain {}, but {} passive",
                 plural(n_equations, "coordinate"),
                 if n_passive == 1 {
                     "1 is".to_owned()
@@ -423,11 +437,12 @@ fn check_constraint_count(
     false
 }
 
+/// A number with its noun, such as `2 coordinates`.
 fn plural(n: usize, one: &str) -> String {
     format!("{n} {one}{}", if n == 1 { "" } else { "s" })
 }
 
-/// The loops must settle the passive coordinates.
+/// Checks that the loops determine the passive coordinates: their columns must have full rank.
 fn check_passive(mechanism: &Mechanism, places: &MechanismSpans, log: &mut DiagnosticLog) -> bool {
     let passive: Vec<usize> = (0..mechanism.coordinates.len())
         .filter(|&i| mechanism.coordinates[i].passive)
@@ -438,7 +453,7 @@ fn check_passive(mechanism: &Mechanism, places: &MechanismSpans, log: &mut Diagn
     if settled == passive.len() {
         return true;
     }
-    // Name one that is left over: without it the others still have the same rank.
+    // Report a coordinate that is not determined: without its column the rank stays the same.
     let left_over = passive.iter().enumerate().rev().find(|(k, _)| {
         let mut without = columns(mechanism, &rows, true);
         for row in &mut without {
@@ -450,10 +465,11 @@ fn check_passive(mechanism: &Mechanism, places: &MechanismSpans, log: &mut Diagn
     let diagnostic = Diagnostic::error(
         places.coordinates[i],
         format!(
-            "the loops do not settle `{}`",
+            "the loops do not determine `{}`",
             mechanism.coordinates[i].name
         ),
     );
+    // If the equations are enough, only the pose is singular; otherwise a loop is missing.
     log.push(if equations > settled {
         diagnostic
             .label("at the nominal pose this passive coordinate is free to move")
@@ -466,12 +482,14 @@ fn check_passive(mechanism: &Mechanism, places: &MechanismSpans, log: &mut Diagn
                 plural(passive.len(), "passive coordinate")
             ))
             .help("close another loop, or drive this coordinate and drop `passive`")
-            .help("if the loops should settle it, the nominal pose is singular: choose another one")
+            .help("if the loops should determine it, the nominal pose is singular: choose another one")
     });
     false
 }
 
-/// The drives must move with the degrees of freedom, one to one, at the nominal pose.
+/// Checks that the drives' rates determine the rates of the degrees of freedom at the nominal pose.
+///
+/// Rows are drives, columns active coordinates; passive rates are eliminated by the derivative of the loops.
 fn check_drives(mechanism: &Mechanism, places: &MechanismSpans, log: &mut DiagnosticLog) {
     let found = loop_gaps(mechanism);
     let poses = frame_poses(mechanism);
@@ -481,6 +499,7 @@ fn check_drives(mechanism: &Mechanism, places: &MechanismSpans, log: &mut Diagno
         match drive.kind {
             DriveKind::Joint(coordinate) => row[coordinate.0] = 1.0,
             DriveKind::Linear { from, to } => {
+                // The rate of a linear drive is the velocity of its end relative to its start, along the drive.
                 let (start, end) = (
                     position(mechanism, &poses, from),
                     position(mechanism, &poses, to),
@@ -511,7 +530,7 @@ fn check_drives(mechanism: &Mechanism, places: &MechanismSpans, log: &mut Diagno
         }
         rates.push(row);
     }
-    // Rates of the passive coordinates follow from those of the active ones.
+    // Rates of the passive coordinates follow from those of the active ones by the derivative of the loops.
     let dependent = columns(mechanism, &found.rows, true);
     let independent = columns(mechanism, &found.rows, false);
     let direct = columns(mechanism, &rates, false);
@@ -539,7 +558,7 @@ fn check_drives(mechanism: &Mechanism, places: &MechanismSpans, log: &mut Diagno
                 .sum::<f64>();
         }
     }
-    // Lengths and angles mix in one matrix; scale each row so that neither drowns.
+    // Lengths and angles have different units, so each row is scaled to length one.
     for row in &mut total {
         let size = norm(row);
         if size > 0.0 {
@@ -550,6 +569,7 @@ fn check_drives(mechanism: &Mechanism, places: &MechanismSpans, log: &mut Diagno
     }
     let held = rank(&total, 1e-7);
     if held < n_freedoms {
+        // The mark is on a drive without any effect, or on the last one.
         let weakest = total
             .iter()
             .position(|row| norm(row) == 0.0)
@@ -558,9 +578,9 @@ fn check_drives(mechanism: &Mechanism, places: &MechanismSpans, log: &mut Diagno
             log.push(
                 Diagnostic::error(
                     *span,
-                    format!("the drives hold only {held} of {n_freedoms} degrees of freedom at the nominal pose"),
+                    format!("the drives act on only {held} of {n_freedoms} degrees of freedom at the nominal pose"),
                 )
-                .label("moving this one changes nothing that the other drives do not hold already")
+                .label("the rate of this drive depends on those of the other drives there")
                 .help("choose a nominal pose away from this singularity, or drive another coordinate"),
             );
         }

@@ -1,4 +1,4 @@
-//! Ranges of values: `2.5` for what may reach 2.5 either way, `[-1, 2.5]` for two ends.
+//! Ranges of values: `2.5` for the range from -2.5 to 2.5, `[-1, 2.5]` for two ends.
 
 #[cfg(any(test, feature = "schema"))]
 use std::borrow::Cow;
@@ -14,7 +14,9 @@ use crate::values::SpannedNumber;
 /// A range with its place.
 #[derive(Clone, Debug)]
 pub(crate) struct ValueRange {
+    /// Lower and upper end, in SI units; the lower one is smaller.
     pub(crate) ends: [f64; 2],
+    /// Where the range stands.
     pub(crate) span: SourceSpan,
 }
 

@@ -1,4 +1,6 @@
-//! Differences of one part from what the model file says of it.
+//! Differences of one part from its entry in the model file.
+//!
+//! The differences are a further part on the same frame, linear in its ten parameters.
 
 use crate::build::effect_places::EffectTargets;
 use crate::diagnostic::{Diagnostic, DiagnosticLog};
@@ -24,11 +26,12 @@ const DIFFERENCES: MechanicsSymbols = &[
     ("dJzz", UnitDimension::INERTIA),
 ];
 
+/// The entry of [`crate::Mechanics::Part`].
 pub(crate) struct PartMechanics;
 
 impl MechanicsEntry for PartMechanics {
     fn description(&self) -> &'static str {
-        "mass, first moments and inertia of this part alone"
+        "mass, first moments and inertia of this part only"
     }
 
     fn introduction(&self) -> &'static str {
@@ -53,6 +56,7 @@ impl MechanicsEntry for PartMechanics {
         let EffectPlace::Part(part) = place else {
             return;
         };
+        // Names of parts may repeat; then a name does not state which part is meant.
         if !is_only_one(scene.parts, part.0) {
             log.push(
                 Diagnostic::error(
@@ -70,6 +74,7 @@ impl MechanicsEntry for PartMechanics {
         }
     }
 
+    // A quantity that is exactly zero in the file stays zero, such as those of a planar body.
     fn parameters_at(&self, place: EffectPlace, parts: &[ModelPart]) -> Option<Vec<&'static str>> {
         let EffectPlace::Part(part) = place else {
             return None;
@@ -84,17 +89,18 @@ impl MechanicsEntry for PartMechanics {
         those: &[&str],
         log: &mut DiagnosticLog,
     ) {
+        // Only parameters that the effect names are reported; the others are left out.
         let named = entry.parameters.iter().flat_map(|table| &table.entries);
         if let Some((key, _)) = named.into_iter().find(|(key, _)| key.name == symbol) {
             log.push(
                 Diagnostic::error(key.span, format!("this part has no `{symbol}`"))
-                    .label("what the part itself leaves at zero does not differ either")
+                    .label("a quantity that is exactly zero in the part has no difference")
                     .help(format!("here there are {}", those.join(", "))),
             );
         }
     }
 
-    /// The differences of each part as a further part of its frame.
+    /// The differences of each part as a further part on its frame, about the origin of that frame.
     fn bodies(
         &self,
         terms: &[EffectTerm],
@@ -128,7 +134,7 @@ impl MechanicsEntry for PartMechanics {
         }
     }
 
-    /// Where the part shares its parameters with another one.
+    /// Only if the part shares its parameters with another one; otherwise its own parameters cover the differences.
     fn has_effect_at(&self, mechanism: &Mechanism, place: EffectPlace) -> bool {
         let EffectPlace::Part(part) = place else {
             return false;
@@ -150,7 +156,7 @@ fn is_only_one(parts: &[ModelPart], part: usize) -> bool {
     same.count() == 1
 }
 
-/// The quantities that a part has, by the symbols of their differences.
+/// The symbols of the differences that a part can have: those of its quantities that are not exactly zero.
 fn components(inertial: &PartInertia) -> Vec<&'static str> {
     let (mass, moments, inertia) = match inertial {
         PartInertia::AboutCentre {
@@ -173,7 +179,7 @@ fn components(inertial: &PartInertia) -> Vec<&'static str> {
         .collect()
 }
 
-/// The parameters of mass and inertia that another part may have too.
+/// The parameters in mass and inertia of a part, which other parts may share.
 fn shared_parameters(inertial: &PartInertia) -> Vec<crate::ParameterIdx> {
     let (PartInertia::AboutCentre { mass, inertia, .. }
     | PartInertia::Linear { mass, inertia, .. }) = inertial;

@@ -8,6 +8,7 @@ use crate::mechanism::{DriveKind, EffectPlace, Mechanism, ModelDrive};
 use crate::unit::UnitDimension;
 use crate::values::SpannedName;
 
+/// The entry of [`crate::Mechanics::Rod`].
 pub(crate) struct RodMechanics;
 
 impl MechanicsEntry for RodMechanics {
@@ -16,7 +17,7 @@ impl MechanicsEntry for RodMechanics {
     }
 
     fn introduction(&self) -> &'static str {
-        "a rod that turns about the first point and slides through the second; its second and first moment about the \
+        "a rod that rotates about the first point and slides through the second; its second and first moment about the \
          first point, and its mass: "
     }
 
@@ -24,7 +25,7 @@ impl MechanicsEntry for RodMechanics {
         ActsOn::Drive
     }
 
-    /// Moments of its mass along itself, of second, first and no order.
+    /// Moments of its mass along itself, of order two, one and zero.
     fn parameters(&self) -> MechanicsSymbols {
         &[
             ("Jr", UnitDimension::INERTIA),
@@ -47,7 +48,7 @@ impl MechanicsEntry for RodMechanics {
         if !is_line(scene.drives, place) {
             log.push(
                 Diagnostic::error(name.span, "a rod cannot act here")
-                    .label("this drive is no line between two points")
+                    .label("this drive is not a line between two points")
                     .help("a rod lies along a drive with `linear = { from = ..., to = ... }`"),
             );
         }
@@ -58,6 +59,7 @@ impl MechanicsEntry for RodMechanics {
     }
 }
 
+/// Whether a place is a linear drive, which has two points.
 fn is_line(drives: &[ModelDrive], place: EffectPlace) -> bool {
     let EffectPlace::Drive(drive) = place else {
         return false;

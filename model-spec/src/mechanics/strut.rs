@@ -8,6 +8,7 @@ use crate::mechanism::{DriveKind, EffectPlace, KinematicLoop, Mechanism, ModelDr
 use crate::unit::UnitDimension;
 use crate::values::SpannedName;
 
+/// The entry of [`crate::Mechanics::Strut`].
 pub(crate) struct StrutMechanics;
 
 impl MechanicsEntry for StrutMechanics {
@@ -23,7 +24,7 @@ impl MechanicsEntry for StrutMechanics {
         ActsOn::Point
     }
 
-    /// Of no order in the distance, of first order, and of first order in its rate.
+    /// The constant force, the stiffness and the damping.
     fn parameters(&self) -> MechanicsSymbols {
         &[
             ("F0", UnitDimension::FORCE),
@@ -43,6 +44,7 @@ impl MechanicsEntry for StrutMechanics {
         scene: &EffectTargets<'_>,
         log: &mut DiagnosticLog,
     ) {
+        // Points on one frame have a constant distance, so the element has no effect.
         let frame = |place: &EffectPlace| match place {
             EffectPlace::Point(point) => Some(scene.points.points[point.0].frame),
             _ => None,
@@ -63,7 +65,8 @@ impl MechanicsEntry for StrutMechanics {
         false
     }
 
-    /// Pairs of points on which nothing else stands: whoever declares such says that something may be attached there.
+    /// Pairs of points that no loop and no drive uses. Such points are declared for elements that may be attached
+    /// there.
     fn pairs(&self, mechanism: &Mechanism) -> Option<Vec<[PointIdx; 2]>> {
         let points = &mechanism.points;
         let is_free = |p: &PointIdx| {
@@ -82,10 +85,12 @@ impl MechanicsEntry for StrutMechanics {
     }
 }
 
+/// Whether a point is an end of a loop.
 fn is_loop_end(loops: &[KinematicLoop], point: PointIdx) -> bool {
     loops.iter().any(|one| one.joins.contains(&point))
 }
 
+/// Whether a point is an end of a linear drive.
 fn is_drive_end(drives: &[ModelDrive], point: PointIdx) -> bool {
     drives.iter().any(|drive| match drive.kind {
         DriveKind::Linear { from, to } => from == point || to == point,
