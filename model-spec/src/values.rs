@@ -387,7 +387,7 @@ impl JsonSchema for FormulaVector {
 
     fn json_schema(generator: &mut SchemaGenerator) -> Schema {
         json_schema!({
-            "description": "x, y and z; z may be left away.",
+            "description": "x, y and z; z may be omitted.",
             "type": "array",
             "items": generator.subschema_for::<SourceFormula>(),
             "minItems": 2,
