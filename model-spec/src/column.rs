@@ -525,7 +525,7 @@ mod tests {
         let says = |text: &str| read(text).unwrap_err().to_string();
         assert_eq!(
             says("qm7/45"),
-            "the recording has no column `qm7`; is `qm5` meant?"
+            "the recording has no column `qm7`; did you mean `qm5`?"
         );
         assert_eq!(says("gear box"), "the recording has no column `gear box`");
         assert!(says("qm5*qm6").contains("multiplied with each other"));
@@ -535,7 +535,7 @@ mod tests {
         assert!(says("qm5/0").contains("zero") || says("qm5/0").contains("finite"));
         assert!(says("qm5 - qm5 + 1").contains("no column"));
         assert!(says("qm5 +").contains("neither the name of a column nor an expression"));
-        assert!(says("qm5 [mm]").contains("`mm` does not suit it; expected one of `rad`, `deg`"));
+        assert!(says("qm5 [mm]").contains("`mm` does not fit this quantity; expected one of `rad`, `deg`"));
     }
 
     #[test]

@@ -490,7 +490,7 @@ fn columns_may_be_sums_in_other_units() {
         ],
     );
     assert!(
-        says.contains("`mm` does not suit it") && says.contains("`deg`"),
+        says.contains("`mm` does not fit this quantity") && says.contains("`deg`"),
         "{says}"
     );
     let says = refused(

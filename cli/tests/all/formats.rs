@@ -277,7 +277,7 @@ fn columns_of_motors_are_declared() {
     }
     for (entry, word) in [
         ("joint1 = { ratio = 0 }", "zero"),
-        ("joint1 = {}", "says nothing"),
+        ("joint1 = {}", "is empty"),
         ("q1 = { ratio = 2 }", "unknown drive"),
     ] {
         let text = std::fs::read_to_string(&two_link).expect("a model");

@@ -349,7 +349,7 @@ impl RecordingFault {
                     format!("there is no column `{name}`")
                 };
                 let meant = match nearest {
-                    Some(nearest) => format!("; is `{nearest}` meant?"),
+                    Some(nearest) => format!("; did you mean `{nearest}`?"),
                     None => ".".to_owned(),
                 };
                 let how = if *by_renaming {
@@ -370,7 +370,7 @@ impl RecordingFault {
                 let all: Vec<String> = missing
                     .iter()
                     .map(|(name, nearest)| match nearest {
-                        Some(nearest) => format!("`{name}` (is `{nearest}` meant?)"),
+                        Some(nearest) => format!("`{name}` (did you mean `{nearest}`?)"),
                         None => format!("`{name}`"),
                     })
                     .collect();

@@ -223,12 +223,12 @@ fn renamings_and_missing_columns() {
     );
     assert_eq!(
         read(&[]).unwrap().column("t").unwrap_err().to_string(),
-        "run.csv: there is no column `t`; is `t_s` meant? The columns are: `t_s`, `theta1`, `F_left`. \
+        "run.csv: there is no column `t`; did you mean `t_s`? The columns are: `t_s`, `theta1`, `F_left`. \
          Map one onto it with option `columns` = `t=t_s`."
     );
     assert_eq!(
         read(&[("spindle_left", "F_lefd")]).unwrap_err().to_string(),
-        "run.csv: a renaming asks for the column `F_lefd`, which is not there; is `F_left` meant? \
+        "run.csv: a renaming asks for the column `F_lefd`, which is not there; did you mean `F_left`? \
          The columns are: `t_s`, `theta1`, `F_left`. Renamings read option `columns` = `ours=theirs`."
     );
     assert!(
