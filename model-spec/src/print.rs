@@ -179,9 +179,8 @@ enum OperandPrecedence {
 }
 
 /// Appends an expression; parentheses are added if its own precedence is below that of its context.
+/// The parser reads the same tree again.
 fn print_expression(
-    ///
-    /// The parser reads the same tree again.
     exact: &ExactExpression,
     level: OperandPrecedence,
     name: &dyn Fn(ModelSymbol) -> String,

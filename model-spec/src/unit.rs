@@ -333,7 +333,6 @@ fn parse_unit(text: &str) -> Result<UnitDimension, UnitFault> {
 /// The product of units separated by blanks, `*` or a middle dot, and their number.
 /// `offset` is the position of `text` in the complete unit, for the places of faults.
 fn factors(text: &str, offset: usize) -> Result<(UnitDimension, usize), UnitFault> {
-    ///
     let mut dimension = UnitDimension::ONE;
     let mut n_factors = 0;
     let mut at = 0;

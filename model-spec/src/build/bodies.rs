@@ -41,6 +41,7 @@ pub(super) fn parts(
             let frame = entry.on.as_ref().and_then(|on| tree.find(on, log));
             let frame = frame.unwrap_or(FrameIdx(0));
             ModelPart {
+                // Without a name of its own a part is called after its frame.
                 name: entry.name.as_ref().map_or_else(
                     || tree.frames[frame.0].name.clone(),
                     |name| name.text.clone(),
@@ -53,11 +54,13 @@ pub(super) fn parts(
 }
 
 /// Reports names that occur twice in a list.
+/// `what` names the list in messages.
 pub(super) fn check_unique<'a>(
     what: &str,
     names: impl Iterator<Item = &'a SpannedName>,
     log: &mut DiagnosticLog,
 ) {
+    // Maps each name to the place of its last occurrence.
     let mut seen = std::collections::BTreeMap::new();
     for name in names {
         if let Some(first) = seen.insert(&name.text, name.span) {
@@ -67,6 +70,7 @@ pub(super) fn check_unique<'a>(
 }
 
 /// The inertia of a part, from `linear` or from `mass`, `centre` and `inertia`.
+/// A part with both descriptions is reported, and `linear` is used.
 fn inertial(entry: &PartEntry, symbols: &SymbolTable, log: &mut DiagnosticLog) -> PartInertia {
     let about_centre = entry.mass.is_some() || entry.centre.is_some() || entry.inertia.is_some();
     if let Some(linear) = &entry.linear {
@@ -86,6 +90,7 @@ fn inertial(entry: &PartEntry, symbols: &SymbolTable, log: &mut DiagnosticLog) -
                 .help("for example `mass = \"m1\"`, `centre = [\"dc1\", 0, 0]`, `inertia = { zz = \"Ic12\" }`; or `linear = { planar = \"1\" }`"),
         );
     }
+    // The six entries in the order xx, xy, xz, yy, yz, zz; omitted ones are zero.
     let inertia = entry.inertia.as_ref();
     let entries = [
         inertia.and_then(|inertia| inertia.xx.as_ref()),
@@ -95,6 +100,7 @@ fn inertial(entry: &PartEntry, symbols: &SymbolTable, log: &mut DiagnosticLog) -
         inertia.and_then(|inertia| inertia.yz.as_ref()),
         inertia.and_then(|inertia| inertia.zz.as_ref()),
     ];
+    // All entries are resolved even if some are faulty, so that all faults are reported.
     PartInertia::AboutCentre {
         mass: quantity(
             entry.mass.as_ref(),
@@ -124,12 +130,15 @@ fn linear_inertial(
             .label("expected only one of `all` and `planar`"),
         );
     }
+    // The shorthand `all` or `planar`, if the part has one.
     let short = shorthand(linear);
+    // An explicit expression replaces the parameter of the shorthand.
     let entry = |symbol: &str, dimension: UnitDimension, log: &mut DiagnosticLog| {
         if let Some(formula) = explicit_entry(linear, symbol) {
             let what = format!("{symbol} of a part");
             return quantity(Some(formula), symbols, dimension, &what, log);
         }
+        // Without either, the entry is exactly zero, so that its column never appears.
         let Some((suffix, _)) = short.filter(|(_, members)| members.contains(&symbol)) else {
             return ExactExpression::zero();
         };
@@ -138,6 +147,7 @@ fn linear_inertial(
         let Some(meaning) = symbols.scope.get(&name) else {
             return ExactExpression::zero();
         };
+        // A parameter of a shorthand counts as used, because the part contains it.
         meaning.used.set(true);
         meaning.exact.clone()
     };
@@ -152,6 +162,7 @@ fn linear_inertial(
 }
 
 /// Resolves an expression over constants and parameters, polynomial in the parameters; zero if absent or faulty.
+/// `what` names the quantity in messages.
 fn quantity(
     formula: Option<&SourceFormula>,
     symbols: &SymbolTable,
@@ -167,6 +178,7 @@ fn quantity(
         dimension,
         what,
     };
+    // The scope reports unknown names and wrong units.
     let Some(exact) = symbols.scope.resolve(formula, wanted, log) else {
         return ExactExpression::zero();
     };
@@ -175,6 +187,7 @@ fn quantity(
 }
 
 /// Resolves a position in a frame, m; zero if absent or faulty.
+/// `what` names the position in messages.
 fn position(
     vector_entry: Option<&FormulaVector>,
     symbols: &SymbolTable,
@@ -189,6 +202,7 @@ fn position(
         dimension: UnitDimension::LENGTH,
         what,
     };
+    // Entries are resolved first; each one must also be polynomial in the parameters.
     let position = vector(entry, &symbols.scope, wanted, log);
     for (exact, formula) in position.iter().zip(&entry.entries) {
         if let Some(formula) = formula {
@@ -199,6 +213,7 @@ fn position(
 }
 
 /// Reports an expression that is not a polynomial in the parameters.
+/// Division by a parameter is the usual cause; a quantity in a divisor must be a constant.
 fn check_polynomial(exact: &ExactExpression, span: SourceSpan, log: &mut DiagnosticLog) {
     if !is_polynomial(exact) {
         log.push(
@@ -211,15 +226,18 @@ fn check_polynomial(exact: &ExactExpression, span: SourceSpan, log: &mut Diagnos
 
 /// Whether an expression is a polynomial in the parameters; constants may occur anywhere.
 fn is_polynomial(exact: &ExactExpression) -> bool {
+    // Subexpressions without parameters are unrestricted.
     let free = |exact: &ExactExpression| {
         !exact.mentions(&|symbol| matches!(symbol, ModelSymbol::Parameter(_)))
     };
+    // Sums, products and non-negative powers of polynomials are polynomials.
     match exact {
         ExactExpression::Rational(_) | ExactExpression::Pi | ExactExpression::Symbol(_) => true,
         ExactExpression::Sum(inner) | ExactExpression::Product(inner) => {
             inner.iter().all(is_polynomial)
         }
         ExactExpression::Negative(inner) => is_polynomial(inner),
+        // Divisors and operands of functions must be free of parameters.
         ExactExpression::Quotient(above, below) => is_polynomial(above) && free(below),
         // A negative exponent divides by the base.
         ExactExpression::Power(base, exponent) => {
@@ -241,6 +259,7 @@ pub(super) fn lumped_masses(
     points: &PointTable,
     log: &mut DiagnosticLog,
 ) -> Vec<LumpedMass> {
+    // A name is needed only to override a lumped mass in a variant, but it must be unique.
     let entries = model.lumped_mass.iter().flat_map(|list| &list.entries);
     check_unique(
         "lumped mass",
@@ -253,6 +272,7 @@ pub(super) fn lumped_masses(
 }
 
 /// Reads one lumped mass; its frame is that of `on`, or that of the first point it names.
+/// Its place may differ between the two balances, `force_at` and `moment_at`.
 fn lumped_mass(
     entry: &LumpedMassEntry,
     symbols: &SymbolTable,
@@ -260,6 +280,7 @@ fn lumped_mass(
     points: &PointTable,
     log: &mut DiagnosticLog,
 ) -> LumpedMass {
+    // Any of the three places may name the point that decides the frame.
     let spots = [&entry.at, &entry.force_at, &entry.moment_at];
     // The frame of a named point is used where `on` is absent.
     let named = spots.iter().find_map(|spot| match spot {
@@ -270,6 +291,7 @@ fn lumped_mass(
         (Some(on), _) => tree.find(on, log).unwrap_or(FrameIdx(0)),
         (None, Some(point)) => points.points[point.0].frame,
         (None, None) => {
+            // An unknown point is reported where its position is read.
             if !log.syntax_broken
                 && !entry.faulty
                 && !spots
@@ -299,6 +321,7 @@ fn lumped_mass(
                 .help("`at` is the place in both balances; `force_at` and `moment_at` replace it in one of them"),
         );
     }
+    // Each balance has its own place, else the common one.
     let force_at = entry.force_at.as_ref().or(entry.at.as_ref());
     let moment_at = entry.moment_at.as_ref().or(entry.at.as_ref());
     LumpedMass {
@@ -317,7 +340,9 @@ fn lumped_mass(
 }
 
 /// Warns of masses and moments of inertia whose values are negative at the nominal parameters.
+/// These are warnings only, because the equations stay valid.
 pub(super) fn warn_of_negative(model: &ModelEntry, mechanism: &Mechanism, log: &mut DiagnosticLog) {
+    // Evaluates a quantity and reports it with its value if it is negative.
     let mut look = |exact: &ExactExpression, what: &str, unit: &str, span: SourceSpan| {
         let value = exact.evaluate(&|symbol| mechanism.symbol_nominal(symbol));
         if value < 0.0 {
@@ -335,6 +360,7 @@ pub(super) fn warn_of_negative(model: &ModelEntry, mechanism: &Mechanism, log: &
     let place =
         |formula: Option<&SourceFormula>, or: SourceSpan| formula.map_or(or, |f| f.ast.span);
     let parts = model.part.iter().flat_map(|list| &list.entries);
+    // Find the formulas of the mass and of the three moments of inertia, for the place of the warning.
     for (entry, part) in parts.zip(&mechanism.parts) {
         let (mass, inertia, formulas, or) = match (&part.inertial, &entry.linear) {
             (PartInertia::Linear { mass, inertia, .. }, Some(linear)) => {
@@ -347,6 +373,7 @@ pub(super) fn warn_of_negative(model: &ModelEntry, mechanism: &Mechanism, log: &
                 | PartInertia::Linear { mass, inertia, .. },
                 _,
             ) => {
+                // A part about its centre has formulas in `mass` and `inertia`.
                 let axes = entry.inertia.as_ref();
                 let formulas = [
                     entry.mass.as_ref(),
@@ -360,11 +387,13 @@ pub(super) fn warn_of_negative(model: &ModelEntry, mechanism: &Mechanism, log: &
         let [m, x, y, z] = formulas.map(|formula| place(formula, or));
         let part = &part.name;
         look(mass, &format!("the mass of `{part}`"), "kg", m);
+        // Positions of the diagonal in xx, xy, xz, yy, yz, zz.
         for (axis, i, span) in [("x", 0, x), ("y", 3, y), ("z", 5, z)] {
             let what = format!("the moment of inertia of `{part}` about {axis}");
             look(&inertia[i], &what, "kg m^2", span);
         }
     }
+    // Lumped masses have no names that are always there, so the place in the file identifies them.
     let lumped = model.lumped_mass.iter().flat_map(|list| &list.entries);
     for (entry, lumped) in lumped.zip(&mechanism.lumped_masses) {
         let span = place(entry.mass.as_ref(), entry.span);
@@ -373,6 +402,7 @@ pub(super) fn warn_of_negative(model: &ModelEntry, mechanism: &Mechanism, log: &
 }
 
 /// The share of a lumped mass as a rational number; 1 if absent or faulty.
+/// Factors of any other kind belong into `mass`.
 fn mass_share(formula: Option<&SourceFormula>, log: &mut DiagnosticLog) -> BigRational {
     let Some(formula) = formula else {
         return BigRational::one();
@@ -388,6 +418,7 @@ fn mass_share(formula: Option<&SourceFormula>, log: &mut DiagnosticLog) -> BigRa
 }
 
 /// The position of a lumped mass in its frame, m, from a vector or a point; zero if absent or faulty.
+/// A named point must be fixed to the frame of the mass.
 fn lumped_mass_position(
     spot: Option<&LumpedMassPlace>,
     frame: FrameIdx,
@@ -405,6 +436,7 @@ fn lumped_mass_position(
             position(Some(vector), symbols, "the place of a lumped mass", log)
         }
         LumpedMassPlace::Point(name) => {
+            // An unknown point is reported by the lookup.
             let Some(idx) = points.find(name, log) else {
                 return nowhere();
             };

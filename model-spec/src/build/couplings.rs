@@ -29,11 +29,13 @@ pub(super) fn couplings(
         let Some(i) = symbols.coordinates.iter().position(|c| c.name == key.name) else {
             continue;
         };
+        // The value and the drive of such a coordinate cannot be chosen.
         reject_unused_fields(entry, key.span, log);
         if let Some(coupling) = coupling(follows, CoordinateIdx(i), symbols, log) {
             found.push((coupling, follows.ast.span));
         }
     }
+    // Nominal values are computed only if all couplings are valid.
     if log.n_errors() == 0 {
         set_nominal(&found, symbols, places, log);
     }
@@ -61,6 +63,7 @@ fn reject_unused_fields(entry: &CoordinateEntry, span: SourceSpan, log: &mut Dia
 }
 
 /// The coupling of one coordinate; reports an expression that is not affine in others or contains a quaternion.
+/// The dimension of the expression must be that of the coordinate: an angle or a length.
 fn coupling(
     follows: &SourceFormula,
     coordinate: CoordinateIdx,
@@ -73,6 +76,7 @@ fn coupling(
         dimension: own.motion.dimension(),
         what: "what this coordinate follows",
     };
+    // The scope reports unknown names and wrong units; the shape is checked below.
     let exact = symbols.scope.resolve(follows, wanted, log)?;
     let span = follows.ast.span;
     let Some(CoordinateSum { terms, offset }) = coordinate_sum(&exact) else {
@@ -87,6 +91,7 @@ fn coupling(
         return None;
     };
     let terms: Vec<(CoordinateIdx, ExactExpression)> = terms.into_iter().collect();
+    // An expression without coordinates would fix the coordinate.
     if terms.is_empty() {
         log.push(
             Diagnostic::error(span, "this follows no coordinate")
@@ -95,6 +100,7 @@ fn coupling(
         );
         return None;
     }
+    // Components of a unit quaternion are not independent of each other.
     let all = terms.iter().map(|(i, _)| *i).chain([coordinate]);
     if let Some(i) = all
         .into_iter()
@@ -115,6 +121,7 @@ fn coupling(
 }
 
 /// Computes nominal values in the order of dependence; a coordinate that follows itself is reported.
+/// `found` has the couplings with their places.
 fn set_nominal(
     found: &[(CoordinateCoupling, SourceSpan)],
     symbols: &mut SymbolTable,
@@ -124,6 +131,7 @@ fn set_nominal(
     // Each pass takes one coupling whose coordinates all have their values; if there is none, there is a cycle.
     let mut left: Vec<&(CoordinateCoupling, SourceSpan)> = found.iter().collect();
     while !left.is_empty() {
+        // A coupling waits while one of its coordinates has no value yet.
         let waits = |coupling: &CoordinateCoupling| {
             let mut terms = coupling.terms.iter();
             terms.any(|(i, _)| left.iter().any(|(other, _)| other.coordinate == *i))
@@ -144,6 +152,7 @@ fn set_nominal(
             );
             return;
         };
+        // All coordinates of this coupling have their values now.
         let (coupling, _) = left.remove(next);
         let value = |symbol: ModelSymbol| match symbol {
             ModelSymbol::Coordinate(i) => symbols.coordinates[i.0].nominal,
@@ -172,6 +181,7 @@ impl CoordinateSum {
     }
 
     /// Applies a linear function to every factor and to the offset; an offset of zero stays zero.
+    /// `f` must map zero to zero.
     fn map(self, f: impl Fn(ExactExpression) -> ExactExpression) -> Self {
         let terms = self.terms.into_iter();
         Self {
@@ -187,16 +197,19 @@ impl CoordinateSum {
 
 /// Splits an expression into multiples of coordinates; `None` if it is not affine in them.
 fn coordinate_sum(exact: &ExactExpression) -> Option<CoordinateSum> {
+    // Subexpressions without coordinates are kept as they are.
     let mut moves = false;
     exact.for_each_symbol(&mut |symbol| moves |= matches!(symbol, ModelSymbol::Coordinate(_)));
     if !moves {
         return Some(CoordinateSum::without_coordinates(exact.clone()));
     }
+    // The rules of an affine function: linear in each term, and products with at most one moving factor.
     match exact {
         ExactExpression::Symbol(ModelSymbol::Coordinate(i)) => Some(CoordinateSum {
             terms: BTreeMap::from([(*i, ExactExpression::unity())]),
             offset: ExactExpression::zero(),
         }),
+        // A sign applies to all factors and to the offset.
         ExactExpression::Negative(inner) => {
             Some(coordinate_sum(inner)?.map(|x| ExactExpression::Negative(Box::new(x))))
         }
@@ -231,6 +244,7 @@ fn coordinate_sum(exact: &ExactExpression) -> Option<CoordinateSum> {
             };
             Some(moving?.map(times))
         }
+        // Terms without coordinates are collected into the offset.
         ExactExpression::Sum(terms) => {
             let mut sum = CoordinateSum::without_coordinates(ExactExpression::zero());
             let mut fixed = Vec::new();
@@ -248,6 +262,7 @@ fn coordinate_sum(exact: &ExactExpression) -> Option<CoordinateSum> {
                     fixed.push(found.offset);
                 }
             }
+            // The offset is a sum only if it has at least two terms.
             sum.offset = match fixed.len() {
                 0 => ExactExpression::zero(),
                 1 => fixed.remove(0),

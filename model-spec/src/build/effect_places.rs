@@ -29,6 +29,8 @@ pub(crate) struct EffectTargets<'a> {
 }
 
 /// Finds a place by its name. If several things have that name, the kind of effect decides which one is used.
+/// `allowed` are the sorts of places of the kind; `scene` has the parts of the mechanism. An unknown name is
+/// reported.
 pub(super) fn find_place(
     name: &SpannedName,
     allowed: &[ActsOn],
@@ -36,10 +38,12 @@ pub(super) fn find_place(
     scene: &EffectTargets<'_>,
     log: &mut DiagnosticLog,
 ) -> Option<EffectPlace> {
+    // Parts are looked up lazily, because most effects act on drives.
     let part = || {
         let at = scene.parts.iter().position(|part| part.name == name.text)?;
         Some(EffectPlace::Part(PartIdx(at)))
     };
+    // The reserved names for the complete base and for the measured forces.
     let whole = match name.text.as_str() {
         "base" => Some((ActsOn::Base, EffectPlace::Base)),
         "force" => Some((ActsOn::Force, EffectPlace::Force)),
@@ -62,6 +66,7 @@ pub(super) fn find_place(
     {
         return Some(EffectPlace::Drive(DriveIdx(idx)));
     }
+    // Next come coordinates, then points, and at the end parts for kinds that do not act on them.
     let coordinate = symbols
         .coordinates
         .iter()
@@ -72,6 +77,7 @@ pub(super) fn find_place(
     if let Some(idx) = scene.points.get(&name.text) {
         return Some(EffectPlace::Point(idx));
     }
+    // A place of the wrong sort is returned, too: `common_load` reports it with a better message.
     if let Some(place) = part().or(whole.map(|(_, place)| place)) {
         return Some(place);
     }
@@ -97,6 +103,7 @@ pub(super) fn find_place(
             "the name of a drive, a coordinate or a point"
         }
     };
+    // A place that a variant removes is reported with the place of the removal.
     if !log.is_full() {
         let removal = log.removal(&["drive", "coordinates", "point", "part"], &name.text);
         log.push(
@@ -113,6 +120,7 @@ pub(super) fn find_place(
 /// The load of the places of an effect. All places must have the same load, and the kind must be allowed there.
 ///
 /// `None` after any fault, each of which is reported.
+/// `places` belong to the names `at`, in the same order.
 pub(super) fn common_load(
     kind: &EffectKindEntry,
     at: &OneOrMany<SpannedName>,
@@ -124,12 +132,14 @@ pub(super) fn common_load(
     let carried = |kind: DriveKind| kind.place_load(&symbols.coordinates);
     let names = &at.entries;
     let kind_name = kind.name.as_ref().map_or("", |name| name.text.as_str());
+    // The load of the first place, which all others must share.
     let mut common: Option<PlaceLoad> = None;
     let mut fine = true;
     // A kind with `other` acts at its first place only; the second one gives its motion.
     let n_acting = if kind.other.is_some() { 1 } else { names.len() };
     if let (Some(motion), [first, other, ..], Some(place)) = (kind.other, &names[..], places.get(1))
     {
+        // The second place gives its motion only, so it is checked for its motion and for being another place.
         fine = has_motion(motion, other, *place, &carried, drives, log);
         if first.text == other.text {
             log.push(
@@ -139,6 +149,7 @@ pub(super) fn common_load(
             fine = false;
         }
     }
+    // Each place on which the kind acts: its sort, its units, duplicates, and equal loads.
     for (i, (name, place)) in names.iter().zip(places).enumerate().take(n_acting) {
         let (sort, carries) = match place {
             EffectPlace::Drive(idx) => (ActsOn::Drive, carried(drives[idx.0].kind)),
@@ -160,6 +171,7 @@ pub(super) fn common_load(
             continue;
         }
         // Places of mechanics are checked with the mechanics.
+        // The kind must have units for the load of this place.
         if kind.mechanics.is_none() && !symbols_without_unit(kind, carries).is_empty() {
             log.push(
                 Diagnostic::error(name.span, format!("`{kind_name}` cannot act here"))
@@ -173,6 +185,7 @@ pub(super) fn common_load(
             fine = false;
             continue;
         }
+        // The same place twice would double the effect.
         if names[..i].iter().any(|other| other.text == name.text) {
             log.push(
                 Diagnostic::error(name.span, format!("`{}` is listed twice", name.text))
@@ -198,6 +211,7 @@ pub(super) fn common_load(
     }
     // Kinds that couple two places, and some mechanics, need an exact number of them.
     if let Some(n) = n_places(kind).filter(|n| *n != names.len()) {
+        // The reason in the advice depends on how the kind uses its places.
         let (word, why) = match n {
             1 => ("one place", "it acts on one place at a time"),
             _ if kind.mechanics.is_some() => {
@@ -223,6 +237,7 @@ pub(super) fn common_load(
 }
 
 /// Whether the second place of an effect moves as its kind requires; reports it otherwise.
+/// `carried` gives the load of a drive: a torque for revolute motion, a force for prismatic motion.
 fn has_motion(
     motion: OtherMotion,
     name: &SpannedName,
@@ -231,6 +246,7 @@ fn has_motion(
     drives: &[ModelDrive],
     log: &mut DiagnosticLog,
 ) -> bool {
+    // Only drives and coordinates move.
     let carries = match place {
         EffectPlace::Drive(idx) => Some(carried(drives[idx.0].kind)),
         EffectPlace::Coordinate(idx) => Some(carried(DriveKind::Joint(idx))),

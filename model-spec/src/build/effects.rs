@@ -25,6 +25,7 @@ use crate::unit::{ModelUnit, UnitDimension};
 use crate::values::SpannedName;
 
 /// Reads the effects and adds their parameters to those of the file.
+/// `own_kinds` are kinds of the model file and of its libraries; those of the program are added here.
 pub(super) fn effects(
     model: &ModelEntry,
     own_kinds: &[&EffectKindEntry],
@@ -32,6 +33,7 @@ pub(super) fn effects(
     scene: &EffectTargets<'_>,
     log: &mut DiagnosticLog,
 ) -> Vec<ModelEffect> {
+    // All kinds are checked once, before any effect uses them.
     let kinds = kinds(own_kinds, log);
     let entries = model.effect.iter().flat_map(|list| &list.entries);
     check_unique(
@@ -40,6 +42,7 @@ pub(super) fn effects(
         log,
     );
     // Effects that couple two places may share one of them with another effect.
+    // For kinds with exactly two places: whether they act on both. `None` for all other kinds.
     let couples = |entry: &EffectEntry| {
         let kind = entry
             .kind
@@ -50,6 +53,7 @@ pub(super) fn effects(
             (n_places(kind) == Some(2)).then_some(both_ways)
         })
     };
+    // Checks that compare effects with each other come first.
     warn_of_twins(entries.clone(), &couples, log);
     check_single(entries.clone(), &kinds, log);
     entries
@@ -64,6 +68,7 @@ fn check_single<'a>(
     kinds: &KindTable<'_>,
     log: &mut DiagnosticLog,
 ) {
+    // Kinds are compared by their mechanics, so that own kinds with other names count as equal.
     let mut seen: Vec<(Mechanics, SourceSpan)> = Vec::new();
     for name in entries.filter_map(|entry| entry.kind.as_ref()) {
         let kind = kinds.get(name.text.as_str());
@@ -93,6 +98,7 @@ fn warn_of_twins<'a>(
     couples: &dyn Fn(&EffectEntry) -> Option<bool>,
     log: &mut DiagnosticLog,
 ) {
+    // Each kind at each place, with the first effect that has it.
     let mut seen: BTreeMap<(&str, Vec<&str>), (&EffectEntry, &SpannedName)> = BTreeMap::new();
     // With own constants the columns differ, so that both effects can be meant.
     for entry in entries.filter(|entry| entry.constants.is_none()) {
@@ -106,6 +112,7 @@ fn warn_of_twins<'a>(
             all.sort_unstable();
         }
         let n_keys = if together.is_some() { 1 } else { all.len() };
+        // A coupling has one key, other effects have one for each place.
         for place in entry.at.iter().flat_map(|at| &at.entries).take(n_keys) {
             let key = if together.is_some() {
                 all.clone()
@@ -114,9 +121,11 @@ fn warn_of_twins<'a>(
             };
             let known = *seen.entry((&kind.text, key)).or_insert((entry, place));
             let (first, first_place) = known;
+            // The places of one effect are checked elsewhere.
             if std::ptr::eq(first, entry) {
                 continue;
             }
+            // An unnamed effect of another file was probably meant to be overridden.
             let remedy = if first.name.is_none() && first_place.span.file != place.span.file {
                 "to override the effect of the extended file, give both effects the same `name`"
             } else {
@@ -136,16 +145,19 @@ fn warn_of_twins<'a>(
 }
 
 /// Kinds by name, each with whether it has no faults.
+/// The flag is false for kinds whose own entries have errors.
 type KindTable<'a> = BTreeMap<&'a str, (&'a EffectKindEntry, bool)>;
 
 /// The kinds of the library and of the file, each checked; faults and name clashes are reported.
 fn kinds<'a>(own: &[&'a EffectKindEntry], log: &mut DiagnosticLog) -> KindTable<'a> {
+    // Kinds of the program are valid.
     let mut kinds: KindTable<'a> = BTreeMap::new();
     for entry in library_entries() {
         if let Some(name) = &entry.name {
             kinds.insert(&name.text, (entry, true));
         }
     }
+    // Own kinds follow; a name that exists already is refused.
     for entry in own {
         let before = log.n_errors();
         let Some(name) = &entry.name else { continue };
@@ -165,6 +177,7 @@ fn kinds<'a>(own: &[&'a EffectKindEntry], log: &mut DiagnosticLog) -> KindTable<
             }
             continue;
         }
+        // Check the kind without a model; missing entries were reported by the reader.
         check_kind(entry, log);
         // Faulty kinds stay in the table, so that their effects are not reported as unknown.
         let complete = (entry.mechanics.is_some()
@@ -201,6 +214,7 @@ fn unknown_kind(kind: &SpannedName, kinds: &KindTable<'_>) -> Diagnostic {
 }
 
 /// Reads one effect; `None` after a fault, which is reported.
+/// The kind decides which places are allowed, which parameters exist, and what multiplies each of them.
 fn effect(
     entry: &EffectEntry,
     kinds: &KindTable<'_>,
@@ -222,11 +236,13 @@ fn effect(
         .flat_map(|at| &at.entries)
         .filter_map(|name| find_place(name, allowed, symbols, scene, log))
         .collect();
+    // Without a kind nothing else can be checked.
     let kind_name = entry.kind.as_ref()?;
     let Some(&(kind, is_sound)) = known else {
         log.push(unknown_kind(kind_name, kinds));
         return None;
     };
+    // Names of parameters are compared with the symbols of the kind.
     check_parameter_names(entry, kind, log);
     let at = at?;
     if at.entries.is_empty() {
@@ -236,6 +252,7 @@ fn effect(
         );
         return None;
     }
+    // Faulty kinds and unknown places are reported already.
     if !is_sound || places.len() != at.entries.len() {
         return None;
     }
@@ -244,6 +261,7 @@ fn effect(
     let before = log.n_errors();
     let mut constants = constants(entry, kind, kind_name, symbols, carries, log);
     check_values(entry, kind, kind_name, symbols, log);
+    // Expressions give one factor per parameter; mechanics check their places and give bodies.
     let shapes = match kind.mechanics {
         None => factors(kind, carries, &constants, log)?,
         Some(way) => {
@@ -260,6 +278,7 @@ fn effect(
             Vec::new()
         }
     };
+    // Default names of parameters end with the names of all places.
     let places_name = at
         .entries
         .iter()
@@ -270,9 +289,11 @@ fn effect(
     let own = kind.mechanics.zip(places.first());
     let own =
         own.and_then(|(way, place)| Some((way, way.entry().parameters_at(*place, scene.parts)?)));
+    // One term per parameter of the kind, in the kind's order.
     let mut terms = Vec::new();
     let parameters = kind.parameters.iter().flat_map(|table| &table.entries);
     for (i, (key, parameter)) in parameters.enumerate() {
+        // Parameters that do not exist at this place are skipped, or refused if the file names them.
         if let Some((way, those)) = &own
             && !those.contains(&key.name.as_str())
         {
@@ -283,6 +304,7 @@ fn effect(
         terms.push(EffectTerm {
             symbol: key.name.clone(),
             parameter: term_parameter(entry, key, parameter, unit, &places_name, symbols, log)?,
+            // Terms of mechanics have the factor one.
             expression: shapes
                 .get(i)
                 .cloned()
@@ -301,6 +323,7 @@ fn effect(
     if other.is_some() {
         places.truncate(1);
     }
+    // A fault in any constant or term drops the effect.
     (log.n_errors() == before).then(|| ModelEffect {
         kind: kind_name.text.clone(),
         places,
@@ -313,6 +336,7 @@ fn effect(
 }
 
 /// The parameter of one term of an effect: a parameter that the file declares, or a new one.
+/// `unit` is that of the parameter at these places, and `places_name` the end of its default name.
 fn term_parameter(
     entry: &EffectEntry,
     key: &TomlKey,
@@ -322,6 +346,7 @@ fn term_parameter(
     symbols: &mut SymbolTable,
     log: &mut DiagnosticLog,
 ) -> Option<ParameterIdx> {
+    // The entry of the file for this parameter, if there is one.
     let said = entry
         .parameters
         .iter()
@@ -334,14 +359,17 @@ fn term_parameter(
         || format!("{}_{places_name}", key.name),
         |name| name.text.clone(),
     );
+    // Messages point to the name of the parameter, or to the kind if the file gives none.
     let kind_span = entry.kind.as_ref().map_or(entry.span, |kind| kind.span);
     let span = named.map_or(kind_span, |name| name.span);
     let nominal = said.and_then(|said| said.nominal);
+    // A name that is declared already shares that parameter; its unit must be the same.
     let shared = symbols.share_parameter(&name, Some(unit.dimension), span, nominal, log);
     let idx = match shared {
         ParameterLookup::Known(idx) => idx,
         ParameterLookup::Faulty => return None,
         ParameterLookup::New => {
+            // A new parameter starts with its nominal value, zero without one.
             let idx = ParameterIdx(symbols.parameters.len());
             let fine = symbols.declare_parameter(
                 DynamicParameter {
@@ -361,6 +389,7 @@ fn term_parameter(
             idx
         }
     };
+    // The sign is checked for shared parameters as well.
     let nominal_span = nominal.map_or(span, |number| number.span);
     warn_of_sign(
         &symbols.parameters[idx.0],
@@ -368,6 +397,7 @@ fn term_parameter(
         nominal_span,
         log,
     );
+    // An effect is a use of the parameter.
     if let Some(meaning) = symbols.scope.get(&symbols.parameters[idx.0].name) {
         meaning.used.set(true);
     }
@@ -375,12 +405,14 @@ fn term_parameter(
 }
 
 /// Warns of a nominal value whose sign contradicts the physics of the kind.
+/// `sign` is the one that the kind requires; without it nothing is reported.
 fn warn_of_sign(
     parameter: &DynamicParameter,
     sign: Option<Sign>,
     span: SourceSpan,
     log: &mut DiagnosticLog,
 ) {
+    // Zero is allowed for both signs: it means that no value is known.
     let value = parameter.nominal;
     let expected = match sign {
         Some(Sign::Positive) if value < 0.0 => "positive",
@@ -411,6 +443,7 @@ fn constants(
     carries: PlaceLoad,
     log: &mut DiagnosticLog,
 ) -> Vec<(String, ExactExpression)> {
+    // Unknown names first, then a value for each constant of the kind.
     let known = || kind.constants.iter().flat_map(|table| &table.entries);
     for (key, _) in entry.constants.iter().flat_map(|table| &table.entries) {
         if !known().any(|(name, _)| name.name == key.name) {
@@ -434,6 +467,7 @@ fn constants(
             .flat_map(|table| &table.entries)
             .find(|(name, _)| name.name == key.name)
             .map(|(_, formula)| formula);
+        // A constant without any value is reported with its note as the label.
         let Some(formula) = given.or(constant.value.as_ref()) else {
             log.push(
                 Diagnostic::error(
@@ -450,6 +484,7 @@ fn constants(
             );
             continue;
         };
+        // The unit of a constant depends on the load of the place.
         let dimension = unit_at(constant.unit.as_ref(), carries)
             .map_or(UnitDimension::ONE, |unit| unit.dimension);
         let what = format!("`{}`", key.name);
@@ -466,6 +501,7 @@ fn constants(
 }
 
 /// Reports values of constants at which the kind's expression is not finite, such as a Stribeck speed of 0.
+/// Kinds without an expression have nothing to evaluate.
 fn check_values(
     entry: &EffectEntry,
     kind: &EffectKindEntry,
@@ -498,6 +534,7 @@ fn check_values(
     let Some(expression) = kind.expression.as_ref() else {
         return;
     };
+    // The innermost part of the expression that has no value.
     let Err(fault) = finite::value(&expression.ast, &value) else {
         return;
     };
@@ -517,6 +554,7 @@ fn check_values(
         || format!("`{}`", kind_name.text),
         |name| format!("`{name}`"),
     );
+    // The message names the constant if the faulty part is exactly that constant.
     let is_name = matches!(&fault.piece.kind, FormulaAstKind::Name(_));
     let message = match fault.cause {
         ValueFaultCause::Divides if is_name => format!("{what} must not be zero"),
@@ -540,6 +578,7 @@ fn check_values(
 
 /// Reports entries of `parameters` whose names the kind does not have.
 fn check_parameter_names(entry: &EffectEntry, kind: &EffectKindEntry, log: &mut DiagnosticLog) {
+    // All symbols of the kind, for the comparison and for the advice.
     let names: Vec<&str> = kind
         .parameters
         .iter()

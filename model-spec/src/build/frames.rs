@@ -32,10 +32,12 @@ pub(super) struct FrameTree {
     any_twice: bool,
 }
 
+// Later stages look up parents and carriers of points by name.
 impl FrameTree {
     /// The frame of a name; an unknown name is reported.
     pub(super) fn find(&self, name: &SpannedName, log: &mut DiagnosticLog) -> Option<FrameIdx> {
         let found = self.names.get(&name.text).copied();
+        // With duplicate names an unknown name may be a consequence.
         if found.is_none() && !self.any_twice && !log.is_full() {
             let removal = log.removal(&["frame"], &name.text);
             log.push(
@@ -51,6 +53,7 @@ impl FrameTree {
 }
 
 /// Reads the frames, sorts them so that parents come first, and appends their places to `places.frames`.
+/// The base is always the frame with index 0.
 pub(super) fn frames(
     model: &ModelEntry,
     symbols: &SymbolTable,
@@ -62,6 +65,7 @@ pub(super) fn frames(
     let mut by_name: BTreeMap<&str, usize> = BTreeMap::new();
     let mut any_twice = false;
     for (i, entry) in entries.iter().enumerate() {
+        // `base` is reserved; other names must be unique.
         let Some(name) = &entry.name else { continue };
         if name.text == "base" {
             log.push(
@@ -79,6 +83,7 @@ pub(super) fn frames(
             by_name.insert(&name.text, i);
         }
     }
+    // The tree starts with the base.
     let mut tree = FrameTree {
         frames: vec![ModelFrame {
             name: "base".to_owned(),
@@ -100,6 +105,7 @@ pub(super) fn frames(
             .as_ref()
             .and_then(|on| tree.names.get(&on.text).copied())
             .unwrap_or(FrameIdx(0));
+        // Steps from the parent, as elementary rotations and translations.
         let (steps, convention) = placement(entry, symbols, log);
         tree.names
             .insert(name.text.clone(), FrameIdx(tree.frames.len()));
@@ -115,6 +121,7 @@ pub(super) fn frames(
 }
 
 /// The diagnostic of a name that is defined twice.
+/// `what` is the sort of thing, and `first` the place of the first definition.
 pub(super) fn duplicate_name(what: &str, name: &SpannedName, first: SourceSpan) -> Diagnostic {
     Diagnostic::error(
         name.span,
@@ -135,15 +142,19 @@ fn parents_first(
     any_twice: bool,
     log: &mut DiagnosticLog,
 ) -> Vec<usize> {
-    // Done frames are in the order already; a frame on the current path closes a cycle.
+    /// The state of a frame during the search.
     #[derive(Clone, Copy, PartialEq)]
     enum FrameMark {
+        /// Not visited yet.
         New,
+        /// On the path that is followed now.
         OnPath,
+        /// In the order already.
         Done,
     }
     let mut marks = vec![FrameMark::New; entries.len()];
     let mut order = Vec::new();
+    // Walk from each frame to its parent until the base, a finished frame, or a fault ends the path.
     for start in by_name_order(entries, by_name) {
         let mut path = Vec::new();
         let mut at = start;
@@ -151,6 +162,7 @@ fn parents_first(
             if marks[at] == FrameMark::Done {
                 break;
             }
+            // The path has reached one of its own frames.
             if marks[at] == FrameMark::OnPath {
                 report_cycle(entries, &path, at, log);
                 break;
@@ -161,6 +173,7 @@ fn parents_first(
             if on.text == "base" {
                 break;
             }
+            // An unknown parent is reported here only, where the names of all frames are known.
             let Some(&parent) = by_name.get(on.text.as_str()) else {
                 if !any_twice && !log.is_full() {
                     let known = by_name.keys().copied().chain(["base"]);
@@ -201,6 +214,7 @@ fn by_name_order(entries: &[&FrameEntry], by_name: &BTreeMap<&str, usize>) -> Ve
 /// Reports frames whose parents form a cycle; `path` ends before the frame `at` is reached again.
 fn report_cycle(entries: &[&FrameEntry], path: &[usize], at: usize, log: &mut DiagnosticLog) {
     let from = path.iter().position(|&one| one == at).unwrap_or(0);
+    // The cycle starts at the first occurrence of the frame on the path.
     let names: Vec<&str> = path[from..]
         .iter()
         .chain([&at])
@@ -212,6 +226,7 @@ fn report_cycle(entries: &[&FrameEntry], path: &[usize], at: usize, log: &mut Di
         .as_ref()
         .map_or(entries[at].span, |on| on.span);
     log.push(
+        // Long cycles are described by their number of frames.
         Diagnostic::error(span, "these frames hang on one another in a circle")
             .label(if names.len() > 12 {
                 format!("a circle of {} frames", names.len() - 1)
@@ -223,12 +238,14 @@ fn report_cycle(entries: &[&FrameEntry], path: &[usize], at: usize, log: &mut Di
 }
 
 /// The steps of a frame from its parent, and how the file describes them.
+/// Exactly one of the three descriptions must be given; a joint without a transform is allowed.
 fn placement(
     entry: &FrameEntry,
     symbols: &SymbolTable,
     log: &mut DiagnosticLog,
 ) -> (Vec<FrameStep>, FrameConvention) {
     let name_span = entry.name.as_ref().map_or(entry.span, |name| name.span);
+    // Count the descriptions; `transform` and `joint` belong together.
     let n_ways = usize::from(entry.modified_dh.is_some())
         + usize::from(entry.standard_dh.is_some())
         + usize::from(entry.transform.is_some() || entry.joint.is_some());
@@ -246,6 +263,7 @@ fn placement(
             .help("for example `modified_dh = { a = \"d1\", theta = \"theta1\" }`"),
         );
     }
+    // Khalil and Kleinfinger: alpha and a belong to the parent's x axis.
     if let Some(dh) = &entry.modified_dh {
         let row = dh_row(dh, symbols, log);
         let steps = vec![
@@ -256,6 +274,7 @@ fn placement(
         ];
         (without_zeros(steps), FrameConvention::ModifiedDh(row.texts))
     } else if let Some(dh) = &entry.standard_dh {
+        // Denavit and Hartenberg: theta and d belong to the parent's z axis.
         let row = dh_row(dh, symbols, log);
         let steps = vec![
             FrameStep::Rotate(FrameAxis::Z, row.theta),
@@ -267,6 +286,7 @@ fn placement(
     } else {
         let mut steps = Vec::new();
         let mut text = Vec::new();
+        // A transform comes before its joint.
         if let Some(transform) = &entry.transform {
             transform_steps(transform, symbols, &mut steps, &mut text, log);
         }
@@ -296,6 +316,7 @@ struct DhRow {
 
 /// Resolves a Denavit-Hartenberg row; omitted entries are zero.
 fn dh_row(dh: &DhEntry, symbols: &SymbolTable, log: &mut DiagnosticLog) -> DhRow {
+    // Omitted entries are printed as zero.
     let text = |formula: &Option<SourceFormula>| {
         formula
             .as_ref()
@@ -337,20 +358,21 @@ pub(super) fn angle_or_zero(
 }
 
 /// Appends the steps of a fixed transform: translations, then rotations about z, y and x.
+/// `text` gets its description. Coordinates in a transform are reported, because it is fixed.
 fn transform_steps(
-    ///
-    /// `text` gets its description. Coordinates in a transform are reported, because it is fixed.
     transform: &TransformEntry,
     symbols: &SymbolTable,
     steps: &mut Vec<FrameStep>,
     text: &mut Vec<String>,
     log: &mut DiagnosticLog,
 ) {
+    // An entry of a vector, if the vector has it.
     let entry = |vector: &Option<crate::values::FormulaVector>, i: usize| {
         vector
             .as_ref()
             .and_then(|vector| vector.entries.get(i)?.clone())
     };
+    // Vectors are printed with three entries.
     let shown = |vector: &Option<crate::values::FormulaVector>| {
         (0..3)
             .map(|i| entry(vector, i).map_or_else(|| "0".to_owned(), |formula| formula.text))
@@ -363,6 +385,7 @@ fn transform_steps(
     if transform.rpy.is_some() {
         text.push(format!("rpy({})", shown(&transform.rpy)));
     }
+    // A coordinate here would make a joint, which belongs into `joint`.
     for (i, axis) in [FrameAxis::X, FrameAxis::Y, FrameAxis::Z]
         .into_iter()
         .enumerate()
@@ -374,6 +397,7 @@ fn transform_steps(
         }
         steps.push(FrameStep::Translate(axis, along));
     }
+    // Rz(yaw) Ry(pitch) Rx(roll): the fixed-axis angles in reverse order.
     for (i, axis) in [(2, FrameAxis::Z), (1, FrameAxis::Y), (0, FrameAxis::X)] {
         let about = entry(&transform.rpy, i);
         let about = angle_or_zero(about.as_ref(), symbols, log);
@@ -402,6 +426,7 @@ fn moving_transform_error(formula: &SourceFormula, motion: &str) -> Diagnostic {
 
 /// The steps without rotations and translations by zero.
 fn without_zeros(steps: Vec<FrameStep>) -> Vec<FrameStep> {
+    // Steps by zero would only lengthen all derived expressions.
     steps
         .into_iter()
         .filter(|step| match step {
@@ -460,6 +485,7 @@ pub(super) fn points(
         points: Vec::new(),
         names: BTreeMap::new(),
     };
+    // A point with an unknown frame is kept on the base, so that its name stays known.
     for entry in model.point.iter().flat_map(|list| &list.entries) {
         let frame = entry.on.as_ref().and_then(|on| tree.find(on, log));
         let at = entry.at.as_ref().map_or_else(
@@ -474,6 +500,7 @@ pub(super) fn points(
             },
         );
         let Some(name) = &entry.name else { continue };
+        // Points with the same name are reported; the first one stays.
         if let Some(first) = points.names.get(&name.text) {
             log.push(duplicate_name("point", name, places.points[first.0]));
             continue;
