@@ -49,11 +49,13 @@ pub(crate) fn angle(
         }
         return None;
     }
+    // Dimensions and values of the complete expression.
     scope.resolve(formula, wanted, log)?;
     // The shape: a multiple of pi, and a factor for each symbol.
     let mut sum = ExactAngleSum::default();
     collect_angle(&formula.ast, &BigRational::one(), scope, &mut sum, log)?;
     let twelve = BigRational::from_integer(BigInt::from(12));
+    // Only these angles have sines and cosines with square roots of 2 and 3.
     if !(&sum.pi * &twelve).is_integer() {
         log.push(
             Diagnostic::error(
@@ -69,6 +71,7 @@ pub(crate) fn angle(
     let two = BigRational::from_integer(BigInt::from(2));
     let turns = (&sum.pi / &two).round();
     let mut pi = sum.pi - turns * &two;
+    // Minus half a turn equals half a turn.
     if pi == -BigRational::one() {
         pi = BigRational::one();
     }
@@ -107,6 +110,7 @@ fn check_angle_symbols(ast: &FormulaAst, scope: &FormulaScope, log: &mut Diagnos
                 && meaning.unit != "rad"
                 && meaning.dimension.is_some()
             {
+                // Marked as used, so that it is not reported a second time as unused.
                 meaning.used.set(true);
                 let diagnostic = Diagnostic::error(ast.span, format!("`{name}` is not an angle"))
                     .label(format!("its unit is `{}`, expected `rad`", meaning.unit));
@@ -116,6 +120,7 @@ fn check_angle_symbols(ast: &FormulaAst, scope: &FormulaScope, log: &mut Diagnos
                 });
             }
         }
+        // All operands are checked, so that each wrong constant is reported.
         FormulaAstKind::Sum(inner) | FormulaAstKind::Product(inner) => {
             for one in inner {
                 check_angle_symbols(one, scope, log);
@@ -144,6 +149,8 @@ struct ExactAngleSum {
 }
 
 /// Adds `factor` times an expression to `sum`; `None` after a fault, which is reported.
+///
+/// `factor` is the product of the numbers and signs on the path to this node.
 fn collect_angle(
     ast: &FormulaAst,
     factor: &BigRational,
@@ -153,6 +160,7 @@ fn collect_angle(
 ) -> Option<()> {
     match &ast.kind {
         FormulaAstKind::Rational(value) if value.is_zero() => Some(()),
+        // A bare number could be degrees, so only multiples of pi are accepted.
         FormulaAstKind::Rational(_) => {
             log.push(
                 Diagnostic::error(ast.span, "an angle cannot be a bare number")
@@ -165,6 +173,7 @@ fn collect_angle(
             sum.pi += factor;
             Some(())
         }
+        // Each use of a symbol adds to its factor.
         FormulaAstKind::Name(name) => {
             let meaning = scope.get(name)?;
             let ExactExpression::Symbol(symbol) = meaning.exact else {
@@ -228,6 +237,7 @@ pub(crate) fn length(
     let exact = scope.resolve(formula, wanted, log)?;
     let mut offset = Vec::new();
     let mut coordinates: BTreeMap<_, BigRational> = BTreeMap::new();
+    // The offset is a list of terms here, and one expression below.
     if !split_length(&exact, &BigRational::one(), &mut offset, &mut coordinates) {
         log.push(
             Diagnostic::error(
@@ -258,6 +268,7 @@ fn split_length(
     offset: &mut Vec<ExactExpression>,
     coordinates: &mut BTreeMap<crate::CoordinateIdx, BigRational>,
 ) -> bool {
+    // Parts without coordinates belong to the offset.
     if !exact.mentions(&|symbol| matches!(symbol, ModelSymbol::Coordinate(_))) {
         if !exact.is_zero() {
             offset.push(scale_exact(exact, factor));
@@ -265,6 +276,7 @@ fn split_length(
         return true;
     }
     match exact {
+        // A coordinate by itself: the accumulated factor belongs to it.
         ExactExpression::Symbol(ModelSymbol::Coordinate(coordinate)) => {
             *coordinates.entry(*coordinate).or_default() += factor;
             true

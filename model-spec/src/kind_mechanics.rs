@@ -13,8 +13,10 @@ pub(crate) fn check_expression_or_mechanics(
     entry: &EffectKindEntry,
     log: &mut DiagnosticLog,
 ) -> bool {
+    // Messages point to the name of the kind, or to its table if it has none.
     let name_span = entry.name.as_ref().map_or(entry.span, |name| name.span);
     let mut places = entry.on.iter().flat_map(|on| &on.entries);
+    // First case: no mechanics, so an expression is required, at places that have a force or a mass.
     let Some(way) = entry.mechanics else {
         let Some(expression) = &entry.expression else {
             if !entry.faulty && !log.syntax_broken {
@@ -39,6 +41,7 @@ pub(crate) fn check_expression_or_mechanics(
             );
             return false;
         }
+        // Without parameters there is nothing that a fit could estimate.
         if entry.parameters.is_none() && !entry.faulty && !log.syntax_broken {
             log.push(
                 Diagnostic::error(expression.ast.span, "this expression has no parameters")
@@ -48,6 +51,7 @@ pub(crate) fn check_expression_or_mechanics(
         }
         return true;
     };
+    // Second case: mechanics, which replace the expression and fix places and symbols.
     if let Some(expression) = &entry.expression {
         log.push(
             Diagnostic::error(expression.ast.span, "this kind defines its effect twice")
@@ -64,6 +68,7 @@ pub(crate) fn check_expression_or_mechanics(
                 .label(format!("expected only {}", on.description())),
         );
     }
+    // The symbols of the file must be exactly those of the mechanics.
     check_symbols(entry, "parameters", way.parameters(), name_span, log);
     check_symbols(entry, "constants", way.constants(), name_span, log);
     false
@@ -87,6 +92,7 @@ fn check_symbols(
         let entries = entry.constants.iter().flat_map(|table| &table.entries);
         entries.map(|(key, one)| (key, one.unit.as_ref())).collect()
     };
+    // Each symbol of the file must be known, with the right dimension.
     let names: Vec<&str> = expected.iter().map(|(name, _)| *name).collect();
     for (key, units) in &found {
         let Some((_, dimension)) = expected.iter().find(|(name, _)| *name == key.name) else {

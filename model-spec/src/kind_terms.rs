@@ -13,6 +13,8 @@ use crate::unit::{ModelUnit, UnitDimension};
 use crate::values::UnitByPlace;
 
 /// Parameters and constants of a kind that have no unit for this load of a place.
+///
+/// Such a kind cannot act at a place with this load.
 pub(crate) fn symbols_without_unit(entry: &EffectKindEntry, carries: PlaceLoad) -> Vec<&str> {
     let parameters = entry
         .parameters
@@ -26,6 +28,7 @@ pub(crate) fn symbols_without_unit(entry: &EffectKindEntry, carries: PlaceLoad) 
         .map(|(key, constant)| (key, &constant.unit));
     parameters
         .chain(constants)
+        // A missing unit was reported by the reader, so it does not count here.
         .filter(|(_, unit)| {
             unit.as_ref()
                 .is_some_and(|unit| carries.unit(unit).is_none())
@@ -48,10 +51,12 @@ pub(crate) fn factors(
     constants: &[(String, ExactExpression)],
     log: &mut DiagnosticLog,
 ) -> Option<Vec<ExactExpression>> {
+    // The scope has the symbols of the kind only; names of the model are not known in it.
     let before = log.n_errors();
     let expression = entry.expression.as_ref()?;
     let parameters = &entry.parameters.as_ref()?.entries;
     let scope = scope(entry, carries, constants, log);
+    // The name of the expression in messages states for which load it was checked.
     let what = format!(
         "where the place carries a {}, what this kind adds",
         if carries == PlaceLoad::Mass {
@@ -60,6 +65,7 @@ pub(crate) fn factors(
             carries.name()
         }
     );
+    // The dimension of the expression must be that of the load.
     let exact = scope.resolve(
         expression,
         FormulaRequirement {
@@ -95,6 +101,7 @@ pub(crate) fn factors(
     // Factors are valid only if the expression is a homogeneous linear function of the parameters.
     let mut factors = vec![Vec::new(); parameters.len()];
     if !split_into_factors(&exact, &ExactExpression::unity(), &mut factors) {
+        // A term without a parameter, or with two of them, is not linear.
         log.push(
             Diagnostic::error(
                 expression.ast.span,
@@ -119,6 +126,8 @@ pub(crate) fn factors(
 }
 
 /// The names that the expression of a kind may use: its parameters, its constants, and the motion of its places.
+///
+/// `constants` gives the expressions of the kind's constants; the units of all symbols are those for this load.
 fn scope(
     entry: &EffectKindEntry,
     carries: PlaceLoad,
@@ -130,6 +139,7 @@ fn scope(
         .parameters
         .iter()
         .flat_map(|parameters| &parameters.entries);
+    // Parameters by their index in the kind, which the split uses.
     for (i, (key, parameter)) in parameters.enumerate() {
         let unit = unit_at(parameter.unit.as_ref(), carries);
         let symbol = ModelSymbol::Parameter(ParameterIdx(i));
@@ -140,6 +150,7 @@ fn scope(
             log,
         );
     }
+    // Constants with the expressions of the effect.
     for (key, constant) in entry
         .constants
         .iter()
@@ -172,6 +183,7 @@ fn scope(
     // The other place has the same dimensions unless `other` states how it moves.
     let other = entry.other.map_or(carries, OtherMotion::place_load);
     let other = dimensions(other).unwrap_or(own);
+    // Coordinate, rate, acceleration and load of the place, then those of the other place.
     for quantity in PlaceQuantity::ALL {
         let dimension = match quantity {
             PlaceQuantity::Coordinate => own[0],
@@ -225,6 +237,7 @@ fn split_into_factors(
     factors: &mut [Vec<ExactExpression>],
 ) -> bool {
     match exact {
+        // A parameter by itself: the accumulated factor belongs to it.
         ExactExpression::Symbol(ModelSymbol::Parameter(ParameterIdx(i))) => {
             match factors.get_mut(*i) {
                 Some(terms) => {
@@ -234,6 +247,7 @@ fn split_into_factors(
                 None => false,
             }
         }
+        // Sums and signs are passed on to their operands.
         ExactExpression::Sum(terms) => terms
             .iter()
             .all(|term| split_into_factors(term, factor, factors)),
@@ -261,6 +275,7 @@ fn split_into_factors(
             };
             split_into_factors(linear, &product, factors)
         }
+        // Divisors join the factor and must be free of parameters.
         ExactExpression::Quotient(above, below) => {
             !below.mentions(&is_parameter)
                 && split_into_factors(

@@ -28,11 +28,14 @@ const REQUIRED_FIELDS: [(&str, &str); 8] = [
 const OWN_KEYS: [&str; 4] = ["schema", "name", "extends", "remove"];
 
 /// Applies a variant to the file that it extends. Removals come first, then entries override or are added.
+///
+/// `base` is the table of the extended file. Faults go to the log.
 pub(crate) fn merge(mut base: TomlTable, variant: TomlTable, log: &mut DiagnosticLog) -> TomlTable {
     base.retain(|(key, _)| !OWN_KEYS.contains(&key.name.as_str()));
     if let Some((_, list)) = find_key(&variant, "remove") {
         remove_entries(&mut base, list, log);
     }
+    // Then each entry of the variant is merged or added.
     for (key, node) in variant {
         match base.iter_mut().find(|(old, _)| old.name == key.name) {
             Some((_, old)) => merge_section(&key.name, old, node, log),
@@ -43,10 +46,13 @@ pub(crate) fn merge(mut base: TomlTable, variant: TomlTable, log: &mut Diagnosti
 }
 
 /// Merges one top-level entry of a variant into that of the extended file.
+///
+/// `section` is the name of the entry, `old` its value in the extended file.
 fn merge_section(section: &str, old: &mut TomlNode, new: TomlNode, log: &mut DiagnosticLog) {
     // Tables of named entries merge by key, lists of tables by name; everything else is replaced.
     match (&mut old.value, new.value) {
         (TomlValue::Table(old), TomlValue::Table(new)) => {
+            // Named entries: known names are merged, new ones are added at the end.
             for (key, entry) in new {
                 match old.iter_mut().find(|(name, _)| name.name == key.name) {
                     Some((old_key, old_entry)) => {
@@ -57,6 +63,7 @@ fn merge_section(section: &str, old: &mut TomlNode, new: TomlNode, log: &mut Dia
                 }
             }
         }
+        // Lists of tables: entries are found by the value of their field `name`.
         (TomlValue::Array(old), TomlValue::Array(new))
             if !new.is_empty()
                 && new
@@ -70,6 +77,7 @@ fn merge_section(section: &str, old: &mut TomlNode, new: TomlNode, log: &mut Dia
                 let known = old[..n_old]
                     .iter_mut()
                     .find(|other| name.is_some() && name_of(other) == name.as_deref());
+                // An entry without the required fields must override an existing one.
                 match known {
                     Some(known) => merge_entry(known, entry),
                     None if is_partial(section, &entry) && !log.syntax_broken => {
@@ -87,6 +95,8 @@ fn merge_section(section: &str, old: &mut TomlNode, new: TomlNode, log: &mut Dia
 }
 
 /// Merges the fields of one entry; a value that is not a table is replaced.
+///
+/// The merged entry has the place of the variant, because that is where the user edits.
 fn merge_entry(old: &mut TomlNode, new: TomlNode) {
     old.span = new.span;
     let (TomlValue::Table(old_fields), TomlValue::Table(new_fields)) = (&mut old.value, &new.value)
@@ -94,6 +104,7 @@ fn merge_entry(old: &mut TomlNode, new: TomlNode) {
         old.value = new.value;
         return;
     };
+    // A variant that sets one alternative removes the others, such as `standard_dh` instead of `modified_dh`.
     for choice in ALTERNATIVES {
         let sets = |table: &TomlTable, option: &[&str]| {
             option.iter().any(|key| find_key(table, key).is_some())
@@ -111,6 +122,7 @@ fn merge_entry(old: &mut TomlNode, new: TomlNode) {
     let TomlValue::Table(new_fields) = new.value else {
         return;
     };
+    // Fields of the variant replace fields of the same name.
     for (key, value) in new_fields {
         match old_fields
             .iter_mut()
@@ -127,12 +139,15 @@ fn is_partial(section: &str, entry: &TomlNode) -> bool {
     let TomlValue::Table(table) = &entry.value else {
         return false;
     };
+    // Sections without a required field have complete entries only.
     REQUIRED_FIELDS
         .iter()
         .any(|(list, key)| *list == section && find_key(table, key).is_none())
 }
 
 /// The diagnostic of an entry that overrides no existing one.
+///
+/// `old` are the entries of the extended file.
 fn overrides_nothing(section: &str, entry: &TomlNode, old: &[TomlNode]) -> Diagnostic {
     let (message, advice) = match name_of(entry) {
         Some(name) => {
@@ -153,6 +168,7 @@ fn overrides_nothing(section: &str, entry: &TomlNode, old: &[TomlNode]) -> Diagn
             Some("add its `name`".to_owned()),
         ),
     };
+    // The field that would make it a new entry.
     let needed = REQUIRED_FIELDS
         .iter()
         .find(|(list, _)| *list == section)
@@ -183,6 +199,7 @@ fn with_unnamed(
         let TomlValue::Table(table) = &entry.value else {
             return false;
         };
+        // Kind and frame are the texts that users take for names.
         let texts = ["kind", "on"].map(|key| find_key(table, key).map(|(_, node)| &node.value));
         texts
             .iter()
@@ -208,6 +225,8 @@ fn name_of(node: &TomlNode) -> Option<&str> {
 }
 
 /// Removes the entries that a variant lists, as `table` or `table.name`; unknown ones are reported.
+///
+/// `base` is the table of the extended file, `list` the value of `remove`.
 fn remove_entries(base: &mut TomlTable, list: &TomlNode, log: &mut DiagnosticLog) {
     let TomlValue::Array(list) = &list.value else {
         return; // The reader of the merged file reports the type.
@@ -216,6 +235,7 @@ fn remove_entries(base: &mut TomlTable, list: &TomlNode, log: &mut DiagnosticLog
         let TomlValue::Text { text, .. } = &path.value else {
             continue;
         };
+        // `table.name` removes one entry, `table` a complete section.
         let (section, name) = match text.split_once('.') {
             Some((section, name)) => (section, Some(name)),
             None => (text.as_str(), None),
@@ -242,6 +262,7 @@ fn remove_entries(base: &mut TomlTable, list: &TomlNode, log: &mut DiagnosticLog
             continue;
         };
         let names: Vec<String> = entry_names(&base[position].1);
+        // Tables remove by key, lists by the name of the entry.
         let removed = match &mut base[position].1.value {
             TomlValue::Table(table) => {
                 let before = table.len();
@@ -260,6 +281,7 @@ fn remove_entries(base: &mut TomlTable, list: &TomlNode, log: &mut DiagnosticLog
             log.removed
                 .insert((section.to_owned(), name.to_owned()), path.span);
         }
+        // An unknown name is reported with the names that exist.
         if !removed && !log.is_full() {
             let entries = match &base[position].1.value {
                 TomlValue::Array(entries) => entries.as_slice(),

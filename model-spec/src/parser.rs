@@ -32,6 +32,7 @@ pub(crate) fn parse(
     inner: Option<usize>,
     log: &mut DiagnosticLog,
 ) -> Option<FormulaAst> {
+    // Very long texts are refused before anything is allocated for them.
     if text.len() > LONGEST_FORMULA {
         log.push(
             Diagnostic::error(outer, "this expression is too long")
@@ -77,6 +78,7 @@ type ParseResult<T> = Result<T, Box<Diagnostic>>;
 impl FormulaParser<'_> {
     /// Parses the complete text; characters behind the expression are an error.
     fn parse_complete(&mut self) -> ParseResult<FormulaAst> {
+        // An empty text has no first character that could be marked.
         self.skip_blanks();
         if self.at == self.text.len() {
             return Err(Box::new(
@@ -85,6 +87,7 @@ impl FormulaParser<'_> {
                     .help("write `\"0\"` for zero"),
             ));
         }
+        // The degree is needed only inside of the parser.
         let (ast, _) = self.sum()?;
         self.skip_blanks();
         if let Some(found) = self.peek() {
@@ -97,10 +100,12 @@ impl FormulaParser<'_> {
     ///
     /// Like all rules, it returns the tree and its degree: the largest product of nested exponents in it.
     fn sum(&mut self) -> ParseResult<(FormulaAst, i32)> {
+        // Each level of parentheses enters one sum, so depth is counted here.
         self.enter_level()?;
         let start = self.at;
         let (first, mut degree) = self.product()?;
         let mut terms = vec![first];
+        // Terms until something else than a sign follows.
         loop {
             self.skip_blanks();
             let sign = self.peek();
@@ -109,6 +114,7 @@ impl FormulaParser<'_> {
             }
             let sign_at = self.at;
             self.at += 1;
+            // The degree of a sum is the largest one of its terms.
             let (term, term_degree) = self.product()?;
             degree = degree.max(term_degree);
             terms.push(if sign == Some('-') {
@@ -145,6 +151,7 @@ impl FormulaParser<'_> {
             self.at += 1;
             self.skip_blanks();
         }
+        // The first factor; all further ones follow an operator.
         let (first, mut degree) = self.power()?;
         // `a/b*c/d` is collected into one numerator and one denominator.
         let mut above = vec![first];
@@ -156,6 +163,7 @@ impl FormulaParser<'_> {
                 break;
             }
             self.at += 1;
+            // `**` is the power of other languages, so it gets a message of its own.
             if operator == Some('*') && self.peek() == Some('*') {
                 let span = self.span(self.at - 1, self.at + 1);
                 return Err(Box::new(
@@ -165,18 +173,21 @@ impl FormulaParser<'_> {
             }
             let (factor, factor_degree) = self.power()?;
             degree = degree.max(factor_degree);
+            // Factors and divisors are collected separately.
             if operator == Some('*') {
                 above.push(factor);
             } else {
                 below.push(factor);
             }
         }
+        // A single factor stands for itself, without a product around it.
         let span = self.span(start, self.at);
         let mut ast = if above.len() == 1 && below.is_empty() {
             above.swap_remove(0)
         } else {
             fraction(above, below, span)?
         };
+        // The sign of the term is applied to the complete product.
         if minus {
             ast = negative(ast, span);
         }
@@ -187,6 +198,7 @@ impl FormulaParser<'_> {
     fn power(&mut self) -> ParseResult<(FormulaAst, i32)> {
         self.skip_blanks();
         let start = self.at;
+        // The base, then an optional `^`.
         let (base, degree) = self.atom()?;
         self.skip_blanks();
         if self.peek() != Some('^') {
@@ -194,6 +206,7 @@ impl FormulaParser<'_> {
         }
         self.at += 1;
         self.skip_blanks();
+        // The exponent is an integer, optionally in parentheses and with a sign.
         let exponent_start = self.at;
         let bracket = self.peek() == Some('(');
         if bracket {
@@ -209,7 +222,9 @@ impl FormulaParser<'_> {
         while self.peek().is_some_and(|found| found.is_ascii_digit()) {
             self.at += 1;
         }
+        // An empty text of digits fails below.
         let digits = &self.text[digits_start..self.at];
+        // A parenthesis of the exponent must be closed.
         if bracket {
             self.skip_blanks();
             if self.peek() == Some(')') {
@@ -223,6 +238,7 @@ impl FormulaParser<'_> {
         if matches!(after, Some('.')) || after.is_some_and(char::is_alphabetic) {
             return Err(self.bad_exponent(exponent_start));
         }
+        // Exponents are limited, because powers are expanded later.
         let exponent = match digits.parse::<i32>() {
             Ok(value) if value <= LARGEST_EXPONENT => {
                 if minus {
@@ -244,6 +260,7 @@ impl FormulaParser<'_> {
                 .label(format!("exponents multiply to at most {LARGEST_DEGREE}")),
             ));
         }
+        // Zero to a negative power is found here if the base is a number; other cases are found with values.
         if exponent < 0 && matches!(&base.kind, FormulaAstKind::Rational(value) if value.is_zero())
         {
             return Err(Box::new(Diagnostic::error(
@@ -264,9 +281,11 @@ impl FormulaParser<'_> {
     /// Parses a number, a name, a function call or an expression in parentheses.
     fn atom(&mut self) -> ParseResult<(FormulaAst, i32)> {
         self.skip_blanks();
+        // The first character decides the rule.
         let start = self.at;
         match self.peek() {
             Some('(') => {
+                // The expression in parentheses gets the place of the parentheses.
                 self.at += 1;
                 let (mut inner, degree) = self.sum()?;
                 self.close_parenthesis(start)?;
@@ -286,6 +305,7 @@ impl FormulaParser<'_> {
             }
             Some(found) if found.is_ascii_alphabetic() || found == '_' => self.name_or_function(),
             Some(found) => Err(self.unexpected_character(found)),
+            // The text ends where an operand must follow.
             None => {
                 let span = self.span(self.at.saturating_sub(1), self.at);
                 Err(Box::new(
@@ -299,6 +319,7 @@ impl FormulaParser<'_> {
     /// Parses a name, `pi`, or a function with its operand in parentheses.
     fn name_or_function(&mut self) -> ParseResult<(FormulaAst, i32)> {
         let start = self.at;
+        // A name: a letter or `_`, then letters, digits and `_`.
         while self
             .peek()
             .is_some_and(|found| found.is_ascii_alphanumeric() || found == '_')
@@ -308,6 +329,7 @@ impl FormulaParser<'_> {
         let name = self.text[start..self.at].to_owned();
         let span = self.span(start, self.at);
         self.skip_blanks();
+        // Without a parenthesis it is a name, or a function without its operand.
         if self.peek() != Some('(') {
             if FUNCTIONS.iter().any(|(function, _)| *function == name) {
                 return Err(Box::new(
@@ -322,6 +344,7 @@ impl FormulaParser<'_> {
             };
             return Ok((FormulaAst { span, kind }, 1));
         }
+        // A name before a parenthesis must be a function.
         let known = FUNCTIONS.iter().map(|(function, _)| *function);
         let Some(&(_, function)) = FUNCTIONS.iter().find(|(function, _)| *function == name) else {
             let diagnostic =
@@ -333,6 +356,7 @@ impl FormulaParser<'_> {
                 known,
             ))));
         };
+        // The operand is a complete expression.
         let open = self.at;
         self.at += 1;
         let (inner, degree) = self.sum()?;
@@ -363,6 +387,7 @@ impl FormulaParser<'_> {
                 '.' if !point => point = true,
                 _ => break,
             }
+            // Digits are limited, because exact numbers grow without bound.
             if digits.len() > MOST_DIGITS {
                 return Err(Box::new(
                     Diagnostic::error(
@@ -384,6 +409,7 @@ impl FormulaParser<'_> {
             if n_digits > 0 && n_signs <= 1 {
                 let exponent = rest[..n_signs + n_digits].parse::<i32>();
                 self.at += 1 + n_signs + n_digits;
+                // An exponent that does not fit an integer is out of range, too.
                 match exponent {
                     Ok(exponent) if exponent.abs() <= 2 * LARGEST_EXPONENT => {
                         ten_power += exponent;
@@ -400,12 +426,14 @@ impl FormulaParser<'_> {
                 }
             }
         }
+        // A lone point has no digits.
         let Ok(value) = digits.parse::<BigInt>() else {
             return Err(Box::new(
                 Diagnostic::error(self.span(start, self.at), "this is not a number")
                     .label("expected digits"),
             ));
         };
+        // The exact value: an integer times or over a power of ten.
         let ten = BigInt::from(10);
         Ok(if ten_power >= 0 {
             BigRational::from_integer(value * Pow::pow(ten, ten_power.unsigned_abs()))
@@ -421,9 +449,11 @@ impl FormulaParser<'_> {
             self.at += 1;
             return Ok(());
         }
+        // Another character stands where the parenthesis should be closed.
         if let Some(found) = self.peek() {
             return Err(self.unexpected_character(found));
         }
+        // The text ends; the mark is on the opening parenthesis.
         Err(Box::new(
             Diagnostic::error(
                 self.span(open, open + 1),
@@ -454,6 +484,7 @@ impl FormulaParser<'_> {
         let span = self.span(self.at, self.at + found.len_utf8());
         let shown = found.escape_debug();
         let diagnostic = Diagnostic::error(span, format!("unexpected `{shown}` in an expression"));
+        // Frequent mistakes get their own message.
         Box::new(match found {
             ')' => diagnostic.label("no parenthesis is open here, or its content is missing"),
             '=' | '<' | '>' => diagnostic.label("expressions have no comparisons"),
@@ -475,6 +506,7 @@ impl FormulaParser<'_> {
 
     /// The fault of an exponent that starts at `start`; the mark extends to the end of the word.
     fn bad_exponent(&self, start: usize) -> Box<Diagnostic> {
+        // Extend the mark over letters, digits and points.
         let mut end = self.at;
         while self
             .text
@@ -510,6 +542,7 @@ impl FormulaParser<'_> {
 
     /// The place in the file of the bytes from `start` to `end` of the text.
     fn span(&self, start: usize, end: usize) -> SourceSpan {
+        // Without known positions the complete value is marked.
         match self.inner {
             Some(inner) => SourceSpan {
                 file: self.outer.file,
@@ -549,6 +582,7 @@ fn fraction(
             _ => numerator.push(factor),
         }
     }
+    // Division by the number zero is found here, by other expressions when values are known.
     for factor in below {
         match factor.kind {
             FormulaAstKind::Rational(value) if value.is_zero() => {
@@ -561,6 +595,7 @@ fn fraction(
             _ => denominator.push(factor),
         }
     }
+    // A numeric factor of one is dropped, unless nothing else is above.
     if !number.is_one() || numerator.is_empty() {
         numerator.insert(
             0,

@@ -27,9 +27,11 @@ pub(crate) fn check_pose(
     places: &MechanismSpans,
     log: &mut DiagnosticLog,
 ) {
+    // Values that are not finite would make all other checks fail.
     if !check_finite(mechanism, places, log) {
         return;
     }
+    // Then: the number of constraints, closure, the passive coordinates, and the drives.
     if check_constraint_count(mechanism, places, log)
         && close_loops(mechanism, places, log)
         && check_passive(mechanism, places, log)
@@ -56,6 +58,7 @@ pub(crate) fn loop_gaps(mechanism: &Mechanism) -> LoopGaps {
         rows: Vec::new(),
         size: 0.0,
     };
+    // Three rows per loop: differences of positions and of Jacobians.
     for closed in &mechanism.loops {
         let [one, other] = closed.joins.map(|point| position(mechanism, &poses, point));
         let left = jacobian(mechanism, &poses, closed.joins[0], one);
@@ -75,6 +78,7 @@ pub(crate) fn loop_gaps(mechanism: &Mechanism) -> LoopGaps {
             .iter()
             .fold(found.size, |size, x| size.max(x.abs()));
     }
+    // One row per coupling: the coordinate minus what it follows.
     let value = |symbol: ModelSymbol| mechanism.symbol_nominal(symbol);
     for (coupling, row) in mechanism.couplings.iter().zip(coupling_rows(mechanism)) {
         let own = mechanism.coordinates[coupling.coordinate.0].nominal;
@@ -89,6 +93,7 @@ fn coupling_rows(mechanism: &Mechanism) -> DenseRows {
     let value = |symbol: ModelSymbol| mechanism.symbol_nominal(symbol);
     let row = |coupling: &CoordinateCoupling| {
         let mut row = vec![0.0; mechanism.coordinates.len()];
+        // The derivative of `coordinate - sum of factor * other`.
         row[coupling.coordinate.0] = 1.0;
         for (i, factor) in &coupling.terms {
             row[i.0] -= factor.evaluate(&value);
@@ -104,6 +109,8 @@ fn norm(values: &[f64]) -> f64 {
 }
 
 /// Columns of the passive coordinates, or of the active ones.
+///
+/// `passive` selects which ones.
 fn columns(mechanism: &Mechanism, rows: &DenseRows, passive: bool) -> DenseRows {
     rows.iter()
         .map(|row| {
@@ -121,6 +128,7 @@ fn columns(mechanism: &Mechanism, rows: &DenseRows, passive: bool) -> DenseRows 
 fn check_finite(mechanism: &Mechanism, places: &MechanismSpans, log: &mut DiagnosticLog) -> bool {
     let before = log.n_errors();
     let value = |symbol: ModelSymbol| mechanism.symbol_nominal(symbol);
+    // Messages name what has no value.
     let mut report = |span: Option<SourceSpan>, what: &str| {
         if let Some(span) = span {
             log.push(
@@ -130,6 +138,7 @@ fn check_finite(mechanism: &Mechanism, places: &MechanismSpans, log: &mut Diagno
             );
         }
     };
+    // Frames: all angles and lengths of their steps.
     for (i, frame) in mechanism.frames.iter().enumerate() {
         let finite = frame.steps.iter().all(|step| match step {
             FrameStep::Rotate(_, angle) => angle.evaluate(&value).is_finite(),
@@ -144,6 +153,7 @@ fn check_finite(mechanism: &Mechanism, places: &MechanismSpans, log: &mut Diagno
             );
         }
     }
+    // Points: all entries of their positions.
     for (i, point) in mechanism.points.iter().enumerate() {
         if point
             .at
@@ -165,6 +175,8 @@ fn check_finite(mechanism: &Mechanism, places: &MechanismSpans, log: &mut Diagno
 
 /// Changes the passive coordinates until the loops close; false if they do not close, or only far from the given
 /// values.
+///
+/// The nominal values of the passive coordinates in `mechanism` are the result.
 fn close_loops(
     mechanism: &mut Mechanism,
     places: &MechanismSpans,
@@ -176,11 +188,13 @@ fn close_loops(
     let passive: Vec<usize> = (0..mechanism.coordinates.len())
         .filter(|&i| mechanism.coordinates[i].passive)
         .collect();
+    // The given values are kept, to measure how far the coordinates moved.
     let given: Vec<f64> = passive
         .iter()
         .map(|&i| mechanism.coordinates[i].nominal)
         .collect();
     let ClosureResidual { gaps: now, size } = move_passive(mechanism, &passive);
+    // Each loop that stays open is reported with its gap.
     let mut closes = true;
     for (i, closed) in mechanism.loops.iter().enumerate() {
         let gap = norm(&now.values[3 * i..3 * i + 3]);
@@ -209,6 +223,7 @@ fn close_loops(
             continue;
         }
         closes = false;
+        // The gap of a coupling is an angle or a length, in the unit of the coordinate.
         let coordinate = &mechanism.coordinates[coupling.coordinate.0];
         log.push(
             Diagnostic::error(
@@ -245,8 +260,11 @@ impl ClosureResidual {
 }
 
 /// Changes the passive coordinates until the residual is as small as possible, in at most 100 steps.
+///
+/// The Levenberg-Marquardt damping is scaled by the square of the size, as the entries of the normal equations are.
 fn move_passive(mechanism: &mut Mechanism, passive: &[usize]) -> ClosureResidual {
     let at_start = loop_gaps(mechanism);
+    // A lower limit of the size avoids tolerances of zero.
     let size = at_start.size.max(1e-6);
     let mut now = at_start;
     let mut damping = 1e-9;
@@ -255,11 +273,13 @@ fn move_passive(mechanism: &mut Mechanism, passive: &[usize]) -> ClosureResidual
         if norm(&now.values) <= 1e-14 * size || passive.is_empty() {
             break;
         }
+        // Singular equations get more damping and are solved again.
         let rows = columns(mechanism, &now.rows, true);
         let Some(step) = least_squares(&rows, &now.values, damping * size * size) else {
             damping = f64::max(damping * 10.0, 1e-12);
             continue;
         };
+        // Take the step, and keep it only if the residual decreases.
         let before: Vec<f64> = passive
             .iter()
             .map(|&i| mechanism.coordinates[i].nominal)
@@ -285,6 +305,8 @@ fn move_passive(mechanism: &mut Mechanism, passive: &[usize]) -> ClosureResidual
 }
 
 /// Reports passive coordinates that moved far from their given values; true if there are none.
+///
+/// `given` are the values of the file, `size` the size of the mechanism, m.
 fn check_same_assembly(
     mechanism: &Mechanism,
     passive: &[usize],
@@ -296,6 +318,7 @@ fn check_same_assembly(
     let mut fine = true;
     for (&i, given) in passive.iter().zip(given) {
         let coordinate = &mechanism.coordinates[i];
+        // Coordinates that follow others have no given value.
         let mut followers = mechanism.couplings.iter();
         if followers.any(|coupling| coupling.coordinate.0 == i) {
             continue; // Its value was not given by the author.
@@ -337,6 +360,7 @@ fn constraint_rows(mechanism: &Mechanism) -> DenseRows {
     let poses = frame_poses(mechanism);
     let mut rows = DenseRows::new();
     for closed in &mechanism.loops {
+        // Both Jacobians are taken at the position of the first point.
         let at = position(mechanism, &poses, closed.joins[0]);
         let [left, right] = closed
             .joins
@@ -359,6 +383,7 @@ fn check_constraint_count(
         .filter(|&i| mechanism.coordinates[i].passive)
         .collect();
     let n_passive = passive.len();
+    // The number of independent equations at the nominal values.
     let mut n_equations = rank(&constraint_rows(mechanism), DEPENDENCE_TOLERANCE);
     if n_equations > n_passive {
         // Overconstrained linkages have dependent equations only where the loops close, so the count is repeated at
@@ -369,6 +394,7 @@ fn check_constraint_count(
         }
     }
     let n_coordinates = mechanism.coordinates.len();
+    // Normal case: enough passive coordinates, and at least one active one.
     if n_equations <= n_passive && n_passive < n_coordinates {
         return true;
     }
@@ -377,6 +403,7 @@ fn check_constraint_count(
     let Some(span) = place.copied() else {
         return false;
     };
+    // First fault: every coordinate is passive.
     if n_equations < n_passive {
         log.push(
             Diagnostic::error(span, "all coordinates are passive")
@@ -387,6 +414,7 @@ fn check_constraint_count(
         );
         return false;
     }
+    // Second fault: the equations leave no degree of freedom.
     if n_equations >= n_coordinates {
         log.push(
             Diagnostic::error(
@@ -412,6 +440,7 @@ fn check_constraint_count(
         );
         return false;
     }
+    // Third fault: too few passive coordinates.
     log.push(
         Diagnostic::error(
             span,
@@ -447,6 +476,7 @@ fn check_passive(mechanism: &Mechanism, places: &MechanismSpans, log: &mut Diagn
     let passive: Vec<usize> = (0..mechanism.coordinates.len())
         .filter(|&i| mechanism.coordinates[i].passive)
         .collect();
+    // The rank of the passive columns, and that of all columns.
     let rows = loop_gaps(mechanism).rows;
     let settled = rank(&columns(mechanism, &rows, true), SINGULAR);
     let equations = rank(&rows, SINGULAR);
@@ -494,6 +524,7 @@ fn check_drives(mechanism: &Mechanism, places: &MechanismSpans, log: &mut Diagno
     let found = loop_gaps(mechanism);
     let poses = frame_poses(mechanism);
     let mut rates: DenseRows = Vec::new();
+    // One row per drive: the derivative of its angle or length by all coordinates.
     for (i, drive) in mechanism.drives.iter().enumerate() {
         let mut row = vec![0.0; mechanism.coordinates.len()];
         match drive.kind {
@@ -504,6 +535,7 @@ fn check_drives(mechanism: &Mechanism, places: &MechanismSpans, log: &mut Diagno
                     position(mechanism, &poses, from),
                     position(mechanism, &poses, to),
                 );
+                // A linear drive without a length has no direction.
                 let along: Vec3 = std::array::from_fn(|k| end[k] - start[k]);
                 let length = norm(&along);
                 if length.is_nan() || length <= 1e-12 * found.size {
@@ -535,6 +567,7 @@ fn check_drives(mechanism: &Mechanism, places: &MechanismSpans, log: &mut Diagno
     let independent = columns(mechanism, &found.rows, false);
     let direct = columns(mechanism, &rates, false);
     let through = columns(mechanism, &rates, true);
+    // The number of degrees of freedom, without scalar parts of quaternions.
     let n_active = direct.first().map_or(0, Vec::len);
     let rated = mechanism
         .coordinates
@@ -542,6 +575,7 @@ fn check_drives(mechanism: &Mechanism, places: &MechanismSpans, log: &mut Diagno
         .filter(|c| !c.passive && c.motion.has_rate());
     let n_freedoms = rated.count();
     let mut total = direct;
+    // For each active coordinate: the rates of the passive ones, and their part in the rates of the drives.
     for j in 0..n_active {
         if dependent.first().is_none_or(Vec::is_empty) {
             break;
@@ -567,6 +601,7 @@ fn check_drives(mechanism: &Mechanism, places: &MechanismSpans, log: &mut Diagno
             }
         }
     }
+    // The drives determine the motion if this matrix has full rank.
     let held = rank(&total, 1e-7);
     if held < n_freedoms {
         // The mark is on a drive without any effect, or on the last one.

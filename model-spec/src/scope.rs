@@ -85,6 +85,7 @@ impl FormulaScope {
         meaning: SymbolMeaning,
         log: &mut DiagnosticLog,
     ) -> bool {
+        // A second definition is reported with the place of the first one.
         if let (Some(span), Some(first)) = (meaning.declared, self.names.get(name)) {
             let mut diagnostic =
                 Diagnostic::error(span, format!("`{}` is defined twice", quote(name)))
@@ -101,6 +102,7 @@ impl FormulaScope {
             log.push(diagnostic);
             return false;
         }
+        // Names of the program have no place and may be reserved words.
         if let Some(span) = meaning.declared
             && !check_not_reserved(name, span, log)
         {
@@ -123,6 +125,8 @@ impl FormulaScope {
     }
 
     /// The quantity of a name, which is marked as used. Unknown names and other sorts are reported.
+    ///
+    /// `sorts` are those that may be used at this place.
     pub(crate) fn look_up(
         &self,
         name: &str,
@@ -130,12 +134,14 @@ impl FormulaScope {
         sorts: &[SymbolSort],
         log: &mut DiagnosticLog,
     ) -> Option<&SymbolMeaning> {
+        // Names of the right sorts, for the advice.
         let allowed = || {
             self.names
                 .iter()
                 .filter(|(_, meaning)| sorts.contains(&meaning.sort))
                 .map(|(name, _)| name.as_str())
         };
+        // The list of sorts for the label, such as `a constant or a parameter`.
         let list = sorts
             .iter()
             .map(|sort| sort.name())
@@ -156,6 +162,7 @@ impl FormulaScope {
             }
             return None;
         };
+        // A wrong use counts as a use, so that the name is not reported as unused, too.
         meaning.used.set(true);
         if !sorts.contains(&meaning.sort) {
             let diagnostic = Diagnostic::error(
@@ -176,6 +183,8 @@ impl FormulaScope {
     }
 
     /// Resolves an expression to exact form; `None` after any error, each of which is reported.
+    ///
+    /// `wanted` gives the sorts of names, the dimension, and the name of the quantity in messages.
     pub(crate) fn resolve(
         &self,
         formula: &SourceFormula,
@@ -183,6 +192,7 @@ impl FormulaScope {
         log: &mut DiagnosticLog,
     ) -> Option<ExactExpression> {
         let before = log.n_errors();
+        // First the names, then the value at the constants of the file, then the dimension.
         let (exact, dimension) = self.resolve_ast(&formula.ast, wanted.sorts, log)?;
         self.check_value(&formula.ast, log);
         if let Some(found) = dimension
@@ -210,6 +220,8 @@ impl FormulaScope {
     }
 
     /// Reports an expression whose value at the constants of the file is not finite.
+    ///
+    /// Parts with coordinates or parameters have no value and are not reported.
     fn check_value(&self, ast: &FormulaAst, log: &mut DiagnosticLog) {
         if let Err(fault) = finite::value(ast, &|name| self.value(name)) {
             let declared = match &fault.piece.kind {
@@ -227,6 +239,7 @@ impl FormulaScope {
         sorts: &[SymbolSort],
         log: &mut DiagnosticLog,
     ) -> Option<(ExactExpression, Option<UnitDimension>)> {
+        // Bare numbers fit any dimension.
         match &ast.kind {
             FormulaAstKind::Rational(value) => {
                 Some((ExactExpression::Rational(value.clone()), None))
@@ -236,6 +249,7 @@ impl FormulaScope {
                 let meaning = self.look_up(name, ast.span, sorts, log)?;
                 Some((meaning.exact.clone(), meaning.dimension))
             }
+            // Terms of a sum must have the same dimension.
             FormulaAstKind::Sum(terms) => {
                 let mut sum = Vec::new();
                 // The first term with a dimension decides; all others must agree with it.
@@ -249,6 +263,7 @@ impl FormulaScope {
                     sum.push(exact);
                     match (dimension, found) {
                         (None, Some(found)) => dimension = Some((found, term.span)),
+                        // Both places are marked: the term, and the first term with a dimension.
                         (Some((first, first_span)), Some(found)) if first != found => {
                             log.push(
                                 Diagnostic::error(
@@ -287,6 +302,7 @@ impl FormulaScope {
                 }
                 (!faulty).then_some((ExactExpression::Product(product), dimension))
             }
+            // A quotient has the quotient of the dimensions.
             FormulaAstKind::Quotient(above, below) => {
                 let above = self.resolve_ast(above, sorts, log);
                 let below = self.resolve_ast(below, sorts, log);
@@ -309,6 +325,7 @@ impl FormulaScope {
                 let (exact, dimension) = self.resolve_ast(inner, sorts, log)?;
                 Some((ExactExpression::Negative(Box::new(exact)), dimension))
             }
+            // An integer power multiplies all exponents of the dimension.
             FormulaAstKind::Power(base, exponent) => {
                 let (exact, dimension) = self.resolve_ast(base, sorts, log)?;
                 Some((
@@ -341,6 +358,7 @@ fn function_dimension(
         // The sign of any quantity is a pure number.
         (ExactFunction::Sign, _) => Some(Some(UnitDimension::ONE)),
         (ExactFunction::Sqrt, None) => Some(None),
+        // The square root halves all exponents of the dimension.
         (ExactFunction::Sqrt, Some(found)) => {
             let root = found.square_root();
             if root.is_none() {
@@ -355,6 +373,7 @@ fn function_dimension(
             ExactFunction::Sin | ExactFunction::Cos | ExactFunction::Tanh | ExactFunction::Exp,
             operand,
         ) => {
+            // All other functions need a pure number or an angle.
             if let Some(found) = operand
                 && found != UnitDimension::ONE
             {

@@ -62,6 +62,8 @@ impl SchemaValue for SpannedName {
 }
 
 /// Whether a text is an identifier: a letter, then letters, digits and `_`, at most 60 characters.
+///
+/// Generated code uses names of models, so they must be identifiers there.
 pub(crate) fn is_name(text: &str) -> bool {
     text.len() <= 60
         && text.starts_with(|first: char| first.is_ascii_alphabetic())
@@ -83,6 +85,8 @@ pub(crate) fn check_name(text: &str, span: SourceSpan, log: &mut DiagnosticLog) 
 }
 
 /// Reports a name that is a word of the expression language; true if it is not one.
+///
+/// These are functions, quantities of a place, `base`, and the time `t`.
 pub(crate) fn check_not_reserved(text: &str, span: SourceSpan, log: &mut DiagnosticLog) -> bool {
     let reserved = RESERVED.contains(&text);
     if reserved {
@@ -128,6 +132,7 @@ impl SchemaValue for SpannedText {
         let TomlValue::Text { text, .. } = &node.value else {
             return wrong_type::<Self>(node, log);
         };
+        // Notes are printed on pages and in messages, so their length is limited.
         if text.len() > 4000 {
             log.push(
                 Diagnostic::error(node.span, "this text is too long")
@@ -174,6 +179,7 @@ impl SchemaValue for SpannedNumber {
         let TomlValue::Number { text, .. } = &node.value else {
             return wrong_type::<Self>(node, log);
         };
+        // TOML has `inf` and `nan`, which no quantity of a mechanism may be.
         match text.parse::<f64>() {
             Ok(value) if value.is_finite() => Some(Self {
                 value,
@@ -256,6 +262,7 @@ impl SchemaValue for UnitByPlace {
     const EXAMPLE: &'static str = "{ force = \"N\", torque = \"N m\" }";
 
     fn read(node: &TomlNode, log: &mut DiagnosticLog) -> Option<Self> {
+        // One unit serves all places.
         match &node.value {
             TomlValue::Text { .. } => {
                 let unit = ModelUnit::read(node, log)?;
@@ -266,6 +273,7 @@ impl SchemaValue for UnitByPlace {
                     elsewhere: Some(unit),
                 })
             }
+            // Units by place leave other places without a unit.
             TomlValue::Table(table) => {
                 let table = UnitTable::from_table(table, node.span, log);
                 Some(Self {
@@ -309,6 +317,7 @@ impl SchemaValue for SchemaVersion {
         let TomlValue::Number { text, .. } = &node.value else {
             return wrong_type::<Self>(node, log);
         };
+        // Another version is reported, and reading continues with the rules of this one.
         if text != "1" {
             log.push(
                 Diagnostic::error(
@@ -339,6 +348,8 @@ impl JsonSchema for SchemaVersion {
 }
 
 /// Three expressions, or two in the x-y plane.
+///
+/// In the x-y plane the third entry is zero.
 #[derive(Clone, Debug)]
 pub(crate) struct FormulaVector {
     /// The entries; absent where one was faulty.
@@ -355,6 +366,7 @@ impl SchemaValue for FormulaVector {
         let TomlValue::Array(array) = &node.value else {
             return wrong_type::<Self>(node, log);
         };
+        // Other lengths are refused, because it is unclear which entry is missing.
         if !(2..=3).contains(&array.len()) {
             log.push(
                 Diagnostic::error(
@@ -369,6 +381,7 @@ impl SchemaValue for FormulaVector {
             );
             return None;
         }
+        // A faulty entry is `None`; its fault is reported by the reader of expressions.
         Some(Self {
             entries: array
                 .iter()
@@ -419,6 +432,7 @@ impl SchemaValue for LumpedMassPlace {
     const EXPECTED: &'static str = "the name of a point, or a vector";
     const EXAMPLE: &'static str = "\"R3m\"";
 
+    // A text is the name of a point, a list is a position.
     fn read(node: &TomlNode, log: &mut DiagnosticLog) -> Option<Self> {
         match &node.value {
             TomlValue::Text { .. } => SpannedName::read(node, log).map(Self::Point),
@@ -459,6 +473,7 @@ impl SchemaValue for NameSuffix {
     const EXAMPLE: &'static str = "\"1\"";
 
     fn read(node: &TomlNode, log: &mut DiagnosticLog) -> Option<Self> {
+        // Numbers are allowed, because suffixes are often indices.
         let (TomlValue::Text { text, .. }
         | TomlValue::Number {
             text,
@@ -467,6 +482,7 @@ impl SchemaValue for NameSuffix {
         else {
             return wrong_type::<Self>(node, log);
         };
+        // The suffix may start with a digit, unlike a name.
         let fine = text.len() <= 40
             && text
                 .chars()
@@ -531,10 +547,12 @@ impl SchemaValue for SearchEntry {
     const EXAMPLE: &'static str = "{ from = 0.01, to = 1, of = \"rate\" }";
 
     fn read(node: &TomlNode, log: &mut DiagnosticLog) -> Option<Self> {
+        // The word `linear`, or a table with a range.
         match &node.value {
             TomlValue::Text { text, .. } if text == "linear" => Some(Self::Linear),
             TomlValue::Table(table) => {
                 let range = SearchRangeEntry::from_table(table, node.span, log);
+                // Both bounds must be present to be compared.
                 if let (Some(from), Some(to)) = (range.from, range.to)
                     && from.value >= to.value
                 {

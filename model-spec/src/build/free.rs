@@ -16,6 +16,7 @@ use crate::schema::ModelEntry;
 
 /// The free bodies, each with the index of the frame that it moves.
 fn free_bodies(tree: &FrameTree) -> impl Iterator<Item = (usize, &FreeBody)> {
+    // Indices of frames are kept, because checks need the place of the frame in the file.
     let steps = tree.frames.iter().enumerate();
     steps.flat_map(|(i, frame)| {
         let of_frame = frame.steps.iter();
@@ -33,6 +34,7 @@ pub(super) fn split_shared_drives(
     symbols: &SymbolTable,
     drives: &mut Vec<ModelDrive>,
 ) -> Vec<ModelDrive> {
+    // Degrees of freedom: active coordinates with a rate.
     let coordinates = symbols.coordinates.iter();
     let freedoms = coordinates
         .filter(|c| !c.passive && c.motion.has_rate())
@@ -41,6 +43,7 @@ pub(super) fn split_shared_drives(
         .loops
         .as_ref()
         .is_some_and(|list| !list.entries.is_empty());
+    // With loops or passive coordinates a surplus drive is an error instead.
     let has_passive = symbols.coordinates.iter().any(|c| c.passive);
     if drives.len() <= freedoms || freedoms == 0 || has_loops || has_passive {
         return Vec::new();
@@ -49,6 +52,8 @@ pub(super) fn split_shared_drives(
 }
 
 /// Adds a row for every degree of freedom without a drive, or for all of them if drives share the rows.
+///
+/// Rows are inserted into the drives of `drives`, and their places into `places.drives`.
 pub(super) fn add_rows(
     model: &ModelEntry,
     symbols: &SymbolTable,
@@ -65,11 +70,13 @@ pub(super) fn add_rows(
     // Rows of a free body: its position, then the vector part of its quaternion as rates of rotation.
     let mut of_bodies = Vec::new();
     for (frame, body) in free_bodies(tree) {
+        // A free body is checked before its rows are made.
         check_free_body(symbols, tree, frame, body, places, log);
         let [_, qx, qy, qz] = body.quaternion;
         of_bodies.extend(body.position);
         of_bodies.extend([qx, qy, qz]);
     }
+    // Undriven joints, or all joints if drives share the rows.
     let mut undriven = undriven_coordinates(model, symbols, places, drives, log);
     // Shared drives act on all joints, so every joint gets a row without a drive.
     if !shared.is_empty() {
@@ -78,6 +85,7 @@ pub(super) fn add_rows(
             .filter(|i| symbols.coordinates[i.0].motion.has_rate() && !of_bodies.contains(i))
             .collect();
     }
+    // A row is not needed where a drive acts directly on the coordinate.
     let driven: Vec<CoordinateIdx> = drives
         .iter()
         .filter_map(|drive| match drive.kind {
@@ -85,6 +93,7 @@ pub(super) fn add_rows(
             DriveKind::Linear { .. } => None,
         })
         .collect();
+    // The force of such a row is called `on_` and the coordinate.
     let row = |i: CoordinateIdx| ModelDrive {
         name: format!("on_{}", symbols.coordinates[i.0].name),
         kind: DriveKind::Joint(i),
@@ -124,6 +133,8 @@ pub(super) fn add_rows(
 }
 
 /// Coordinates of joints with `driven = false`; contradictions to `passive` and to drives are reported.
+///
+/// Components of quaternions are skipped, because their joint states how the body moves.
 fn undriven_coordinates(
     model: &ModelEntry,
     symbols: &SymbolTable,
@@ -132,6 +143,7 @@ fn undriven_coordinates(
     log: &mut DiagnosticLog,
 ) -> Vec<CoordinateIdx> {
     let mut found = Vec::new();
+    // Only coordinates with `driven = false` count.
     for (key, entry) in model.coordinates.iter().flat_map(|table| &table.entries) {
         if entry.driven.is_none_or(|flag| flag.0) {
             continue;
@@ -143,6 +155,7 @@ fn undriven_coordinates(
         if coordinate.motion.is_quaternion() {
             continue; // The joint decides for all coordinates of the body.
         }
+        // Passive coordinates have no row of their own.
         if coordinate.passive {
             log.push(
                 Diagnostic::error(
@@ -156,6 +169,7 @@ fn undriven_coordinates(
             );
             continue;
         }
+        // A drive on the coordinate contradicts the entry.
         let kind = DriveKind::Joint(CoordinateIdx(i));
         if let Some(at) = drives.iter().position(|drive| drive.kind == kind) {
             log.push(
@@ -175,6 +189,8 @@ fn undriven_coordinates(
 }
 
 /// Reports a free body that is not on the base, has passive coordinates, or shares its coordinates.
+///
+/// `frame` is the frame that the body moves.
 fn check_free_body(
     symbols: &SymbolTable,
     tree: &FrameTree,
@@ -187,6 +203,7 @@ fn check_free_body(
     let Some(span) = places.frames.get(frame).copied().flatten() else {
         return;
     };
+    // The coordinates are the pose in the base frame, so no other step may come before or after.
     if here.parent != FrameIdx(0) || here.steps.len() != 1 {
         log.push(
             Diagnostic::error(
@@ -197,6 +214,7 @@ fn check_free_body(
             .help("write `on = \"base\"` and omit `transform`; a frame on the body may have one"),
         );
     }
+    // None of the seven coordinates may be passive.
     let all = body.position.iter().chain(&body.quaternion);
     for i in all.clone() {
         if symbols.coordinates[i.0].passive {
@@ -247,6 +265,7 @@ fn check_free_body(
 }
 
 /// Whether a step of a frame depends on a coordinate.
+/// A rotation depends on it by a term, a translation by a factor, a free body by its coordinates.
 fn is_moved_by(step: &FrameStep, coordinate: CoordinateIdx) -> bool {
     match step {
         FrameStep::Rotate(_, angle) => angle
@@ -263,6 +282,8 @@ fn is_moved_by(step: &FrameStep, coordinate: CoordinateIdx) -> bool {
 }
 
 /// Reports linear drives between two free bodies, or between a free body and the base.
+///
+/// `spans` are the places of the drives, in their order.
 pub(super) fn check_linear_drives(
     tree: &FrameTree,
     drives: &[ModelDrive],
@@ -270,6 +291,7 @@ pub(super) fn check_linear_drives(
     spans: &[SourceSpan],
     log: &mut DiagnosticLog,
 ) {
+    // Both ends must move with the same free body, or with none.
     let root = free_body_finder(tree);
     for (drive, span) in drives.iter().zip(spans) {
         if let DriveKind::Linear { from, to } = drive.kind
@@ -298,6 +320,8 @@ pub(super) fn check_loops(
 }
 
 /// The diagnostic of a drive or loop with ends on different sides of a free body.
+///
+/// `what` is the sort of thing, with its article.
 fn free_body_crossing(span: SourceSpan, what: &str) -> Diagnostic {
     Diagnostic::error(
         span,
@@ -312,6 +336,7 @@ fn free_body_finder(tree: &FrameTree) -> impl Fn(&PointTable, PointIdx) -> Optio
     // Parents come before their children, so one pass is enough.
     let mut of_frame: BTreeMap<usize, usize> = BTreeMap::new();
     for (i, frame) in tree.frames.iter().enumerate() {
+        // A frame belongs to the free body of its parent, unless it is one itself.
         let is_free = frame
             .steps
             .iter()

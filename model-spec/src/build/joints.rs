@@ -18,6 +18,8 @@ use crate::scope::SymbolSort;
 use crate::values::{AxisName, QuaternionOrder, TwistName};
 
 /// The coordinates of a joint with several of them, each with its kind of motion.
+///
+/// Joints with one coordinate are not listed; their expression may be more than a name.
 pub(super) fn coordinates(joint: &JointEntry) -> Vec<(&SourceFormula, CoordinateMotion)> {
     let motion = |is_angle| {
         if is_angle {
@@ -26,6 +28,7 @@ pub(super) fn coordinates(joint: &JointEntry) -> Vec<(&SourceFormula, Coordinate
             CoordinateMotion::Prismatic
         }
     };
+    // Only one of the lists is present in a valid joint.
     let mut all: Vec<(&SourceFormula, CoordinateMotion)> = Vec::new();
     // Seven coordinates: three of the position, four of the quaternion, whose scalar part comes first or last.
     if let Some(list) = joint.free.as_ref().filter(|list| list.entries.len() == 7) {
@@ -51,6 +54,7 @@ pub(super) fn coordinates(joint: &JointEntry) -> Vec<(&SourceFormula, Coordinate
         let entries = list.iter().flat_map(|list| &list.entries).enumerate();
         all.extend(entries.map(|(i, formula)| (formula, motion(i >= n_lengths))));
     }
+    // A cylindrical joint has its angle first, then its displacement.
     let cylindrical = joint.cylindrical.iter().flat_map(|list| &list.entries);
     all.extend(
         cylindrical
@@ -61,6 +65,8 @@ pub(super) fn coordinates(joint: &JointEntry) -> Vec<(&SourceFormula, Coordinate
 }
 
 /// Appends the motions of a joint to `steps`, and its description to `text`.
+///
+/// A joint without a kind, or with several of them, is reported and has no steps.
 pub(super) fn steps(
     joint: &JointEntry,
     symbols: &SymbolTable,
@@ -68,6 +74,7 @@ pub(super) fn steps(
     text: &mut Vec<String>,
     log: &mut DiagnosticLog,
 ) {
+    // Exactly one kind of joint must be given.
     let n_kinds = [joint.revolute.is_some(), joint.prismatic.is_some()]
         .into_iter()
         .chain(
@@ -91,6 +98,7 @@ pub(super) fn steps(
         }
         return;
     }
+    // Axis and direction of joints with one axis.
     let (axis, minus, shown) = axis_of(joint);
     let mut builder = Builder {
         symbols,
@@ -98,6 +106,7 @@ pub(super) fn steps(
         log,
     };
     // `entries` below checks the number of coordinates of joints with several of them.
+    // A revolute and a prismatic joint have one step each.
     if let Some(formula) = &joint.revolute {
         text.push(format!("revolute({}, {shown})", formula.text));
         builder.rotate(axis, minus, formula);
@@ -127,6 +136,7 @@ pub(super) fn steps(
         joint.free.as_ref(),
         "three coordinates of its position and three angles, or seven with a quaternion",
     ) {
+        // The six coordinates of a free joint: translations along x, y and z, then three rotations.
         text.push(format!("translation({}, {}, {})", x.text, y.text, z.text));
         for (axis, formula) in [(FrameAxis::X, x), (FrameAxis::Y, y), (FrameAxis::Z, z)] {
             builder.translate(axis, false, &formula);
@@ -137,6 +147,8 @@ pub(super) fn steps(
 }
 
 /// Reports axes, a quaternion or a twist that the joint cannot use.
+///
+/// `axis` belongs to joints with one axis, `axes` to those with several, `quaternion` and `twist` to free bodies.
 fn reject_unused_axes(joint: &JointEntry, log: &mut DiagnosticLog) {
     let has_quaternion = joint
         .free
@@ -151,6 +163,7 @@ fn reject_unused_axes(joint: &JointEntry, log: &mut DiagnosticLog) {
             .label("they belong to `free` with seven coordinates: three of the position and four of a quaternion"),
         );
     }
+    // The orientation of a body with a quaternion needs no axes.
     if has_quaternion {
         if joint.axis.is_some() || joint.axes.is_some() {
             log.push(
@@ -160,6 +173,7 @@ fn reject_unused_axes(joint: &JointEntry, log: &mut DiagnosticLog) {
         }
         return;
     }
+    // Joints with one axis use `axis`, all others use `axes`.
     let one = joint.revolute.is_some() || joint.prismatic.is_some() || joint.cylindrical.is_some();
     let (unused, wanted) = if one {
         (
@@ -210,6 +224,8 @@ struct Builder<'a> {
 
 impl Builder<'_> {
     /// The coordinates of a joint with `N` of them; another number is reported.
+    ///
+    /// `expected` describes the coordinates for the message.
     fn entries<const N: usize>(
         &mut self,
         list: Option<&EntryList<SourceFormula>>,
@@ -230,6 +246,9 @@ impl Builder<'_> {
     }
 
     /// Adds the step of a free body with a quaternion.
+    ///
+    /// `text` gets its description. Its coordinates, the order of its quaternion and the axes of its twist must be
+    /// given.
     fn free_body(&mut self, joint: &JointEntry, text: &mut Vec<String>) {
         let Some(list) = &joint.free else { return };
         let (Some(order), Some(twist)) = (joint.quaternion, joint.twist) else {
@@ -258,6 +277,7 @@ impl Builder<'_> {
             QuaternionOrder::Wxyz => [a, b, c, d],
         };
         let all = [x, y, z, a, b, c, d];
+        // A coordinate in two roles would tie them to each other.
         if let Some(k) = (1..7).find(|k| all[..*k].contains(&all[*k])) {
             self.log.push(
                 Diagnostic::error(list.entries[k].ast.span, "this coordinate is listed twice")
@@ -265,6 +285,7 @@ impl Builder<'_> {
             );
             return;
         }
+        // Axes of velocity, then of angular velocity, and their name for print.
         let (linear, angular, axes) = match twist {
             TwistName::Body => (TwistAxes::Body, TwistAxes::Body, "body"),
             TwistName::World => (TwistAxes::World, TwistAxes::World, "world"),
@@ -290,6 +311,7 @@ impl Builder<'_> {
 
     /// The coordinate that a formula consists of; anything else is reported.
     fn coordinate(&mut self, formula: &SourceFormula) -> Option<CoordinateIdx> {
+        // A free body needs names, because its rates are those of the body itself.
         let FormulaAstKind::Name(name) = &formula.ast.kind else {
             self.log.push(
                 Diagnostic::error(
@@ -311,6 +333,7 @@ impl Builder<'_> {
 
     /// Adds a rotation about an axis; `minus` reverses its direction.
     fn rotate(&mut self, axis: FrameAxis, minus: bool, formula: &SourceFormula) {
+        // The negative angle: all terms change their sign, and so does the multiple of pi.
         let mut about = angle_or_zero(Some(formula), self.symbols, self.log);
         if minus {
             if !about.pi.is_one() {
@@ -325,6 +348,7 @@ impl Builder<'_> {
 
     /// Adds a translation along an axis; `minus` reverses its direction.
     fn translate(&mut self, axis: FrameAxis, minus: bool, formula: &SourceFormula) {
+        // The negative length: the offset and all factors change their sign.
         let mut along = length_or_zero(
             Some(formula),
             self.symbols,
@@ -344,6 +368,8 @@ impl Builder<'_> {
     }
 
     /// Adds rotations about several axes, each turned by those before. The letters of `axes` give the order.
+    ///
+    /// `kind` is the name of the joint for `text`. Without `axes` they are xy or zyx.
     fn rotations(
         &mut self,
         kind: &str,
@@ -351,6 +377,7 @@ impl Builder<'_> {
         angles: &[SourceFormula],
         text: &mut Vec<String>,
     ) {
+        // The order of the axes, from the file or the default.
         let given = joint.axes.as_ref();
         let usual = if angles.len() == 2 { "xy" } else { "zyx" };
         let written = given.map_or(usual, |axes| axes.text.as_str());
@@ -380,6 +407,7 @@ impl Builder<'_> {
         }
         let names: Vec<&str> = angles.iter().map(|angle| angle.text.as_str()).collect();
         text.push(format!("{kind}({}, {written})", names.join(", ")));
+        // A letter that is not an axis was reported; z replaces it so that the frame keeps its coordinates.
         for (axis, angle) in axes.into_iter().zip(angles) {
             self.rotate(axis.unwrap_or(FrameAxis::Z), false, angle);
         }

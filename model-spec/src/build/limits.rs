@@ -12,6 +12,8 @@ use crate::schema::ModelEntry;
 use crate::suggest;
 
 /// Reads the limits; a name that the file does not have is reported.
+///
+/// Coordinates, drives and points are those of the mechanism, in their order.
 pub(super) fn limits(
     model: &ModelEntry,
     coordinates: &[JointCoordinate],
@@ -26,6 +28,7 @@ pub(super) fn limits(
     // After an error a name may be missing only because its entry was faulty.
     let is_sound = log.n_errors() == 0;
     let ends = |range: &Option<ValueRange>| range.as_ref().map(|range| range.ends);
+    // Limits of coordinates: position, rate and acceleration.
     for (key, one) in entry.coordinates.iter().flat_map(|named| &named.entries) {
         let names = coordinates.iter().map(|c| c.name.as_str());
         let Some(i) = position(&key.name, key.span, "coordinate", names, is_sound, log) else {
@@ -75,6 +78,7 @@ pub(super) fn limits(
                 );
             }
         }
+        // All ranges of one coordinate are kept together.
         limits.coordinates.push((
             CoordinateIdx(i),
             CoordinateBounds {
@@ -84,6 +88,7 @@ pub(super) fn limits(
             },
         ));
     }
+    // Limits of forces of drives.
     for (key, one) in entry.drives.iter().flat_map(|named| &named.entries) {
         let names = drives.iter().map(|d| d.name.as_str());
         let found = position(&key.name, key.span, "drive", names, is_sound, log);
@@ -91,6 +96,7 @@ pub(super) fn limits(
             limits.forces.push((DriveIdx(i), force));
         }
     }
+    // Boxes of points, one range per axis.
     for (key, one) in entry.points.iter().flat_map(|named| &named.entries) {
         let names = points.iter().map(|p| p.name.as_str());
         if let Some(i) = position(&key.name, key.span, "point", names, is_sound, log) {
@@ -98,6 +104,7 @@ pub(super) fn limits(
             limits.points.push((PointIdx(i), ranges));
         }
     }
+    // The distance from singular poses is a share between 0 and 1, both excluded.
     if let Some(number) = &entry.singularity {
         if number.value > 0.0 && number.value < 1.0 {
             limits.singularity = Some(number.value);
@@ -115,6 +122,8 @@ pub(super) fn limits(
 }
 
 /// The position of a name in a list; an unknown name is reported, unless an earlier error may explain it.
+///
+/// `what` is the sort of thing in the singular; `is_sound` is false after an earlier error.
 fn position<'a>(
     name: &str,
     span: SourceSpan,

@@ -12,6 +12,8 @@ use crate::schema::ModelEntry;
 use crate::scope::SymbolSort;
 
 /// Reads the products to retain: for each, its parameters with positive exponents, in the order of the file.
+///
+/// Their order is that of preference: the most wanted product comes first.
 pub(super) fn retain(
     model: &ModelEntry,
     symbols: &SymbolTable,
@@ -28,6 +30,8 @@ pub(super) fn retain(
 }
 
 /// Adds the powers of a product to `powers`, all multiplied by `exponent`; false after a fault.
+///
+/// Only names of parameters, products of them, and positive powers are allowed.
 fn product(
     ast: &FormulaAst,
     exponent: u32,
@@ -36,6 +40,7 @@ fn product(
     log: &mut DiagnosticLog,
 ) -> bool {
     match &ast.kind {
+        // A name must be that of a parameter.
         FormulaAstKind::Name(name) => {
             // An entry of `retain` does not count as a use of the parameter, so the mark is restored.
             let was_used = symbols
@@ -55,6 +60,7 @@ fn product(
             }
             true
         }
+        // All factors are read, so that each fault is reported.
         FormulaAstKind::Product(factors) => {
             let mut fine = true;
             for factor in factors {
@@ -62,6 +68,7 @@ fn product(
             }
             fine
         }
+        // Nested powers multiply their exponents.
         FormulaAstKind::Power(base, power) if *power > 0 => product(
             base,
             exponent.saturating_mul(power.unsigned_abs()),

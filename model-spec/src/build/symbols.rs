@@ -64,6 +64,8 @@ pub(super) const LINEAR: [(&str, UnitDimension); 10] = [
 const PLANAR: [&str; 4] = ["ZZ", "MX", "MY", "M"];
 
 /// Declares all names of a file: constants, parameters, shorthands of parts, and coordinates.
+///
+/// The places of coordinates are appended to `places.coordinates`.
 pub(super) fn declare(
     model: &ModelEntry,
     places: &mut MechanismSpans,
@@ -77,6 +79,7 @@ pub(super) fn declare(
         coordinates: Vec::new(),
         still: Vec::new(),
     };
+    // Constants, with the dimension of their unit; one without a value counts as 1, because the fault is reported.
     for (key, entry) in model.constants.iter().flat_map(|table| &table.entries) {
         let symbol = ModelSymbol::Constant(ConstantIdx(symbols.constants.len()));
         let unit = entry.unit.as_ref();
@@ -103,6 +106,7 @@ pub(super) fn declare(
             });
         }
     }
+    // Parameters, whose nominal value is zero if the file gives none.
     for (key, entry) in model.parameters.iter().flat_map(|table| &table.entries) {
         let unit = entry.unit.as_ref();
         symbols.declare_parameter(
@@ -118,6 +122,7 @@ pub(super) fn declare(
             log,
         );
     }
+    // Shorthands declare parameters of parts; coordinates need the frames.
     declare_shorthands(model, &mut symbols, log);
     declare_coordinates(model, &mut symbols, places, log);
     declare_faulty(model, &mut symbols, log);
@@ -134,6 +139,7 @@ fn declare_faulty(model: &ModelEntry, symbols: &mut SymbolTable, log: &mut Diagn
         .map(|key| (key, SymbolSort::Constant))
         .chain(parameters.map(|key| (key, SymbolSort::Parameter)))
         .chain(coordinates.map(|key| (key, SymbolSort::Coordinate)));
+    // A dimension of `None` fits any other, so that uses cause no further findings.
     for (key, sort) in all {
         let meaning = SymbolMeaning {
             sort,
@@ -149,6 +155,8 @@ fn declare_faulty(model: &ModelEntry, symbols: &mut SymbolTable, log: &mut Diagn
 }
 
 /// Reports coordinates that no joint uses, and a mechanism without any.
+///
+/// Nothing is reported if a frame is faulty, because it may be the one that uses the coordinate.
 pub(super) fn check_coordinates_move(
     model: &ModelEntry,
     symbols: &SymbolTable,
@@ -158,6 +166,7 @@ pub(super) fn check_coordinates_move(
     if log.syntax_broken || model.frame.as_ref().is_some_and(|list| list.faulty) {
         return; // A faulty frame may be the one that uses them.
     }
+    // An unused coordinate would have a zero column in every Jacobian.
     for &CoordinateIdx(idx) in &symbols.still {
         log.push(
             Diagnostic::error(
@@ -168,6 +177,7 @@ pub(super) fn check_coordinates_move(
             .help("use the coordinate in a frame, or delete it"),
         );
     }
+    // A mechanism whose coordinates are all faulty has reported that already.
     let faulty = model
         .coordinates
         .as_ref()
@@ -183,6 +193,8 @@ pub(super) fn check_coordinates_move(
 
 impl SymbolTable {
     /// Adds a parameter; false if its name is taken, which is reported.
+    ///
+    /// `nominal_given` is the place of its nominal value, if the file gives one.
     pub(super) fn declare_parameter(
         &mut self,
         parameter: DynamicParameter,
@@ -209,6 +221,8 @@ impl SymbolTable {
 
     /// Looks up a parameter that a second place may share. Its dimension must agree, and its nominal value if both
     /// give one.
+    ///
+    /// `span` is the second use, and `nominal` the value that it gives.
     pub(super) fn share_parameter(
         &mut self,
         name: &str,
@@ -217,9 +231,11 @@ impl SymbolTable {
         nominal: Option<crate::values::SpannedNumber>,
         log: &mut DiagnosticLog,
     ) -> ParameterLookup {
+        // A new name is declared by the caller.
         let Some(meaning) = self.scope.get(name) else {
             return ParameterLookup::New;
         };
+        // The name may belong to a constant or a coordinate.
         let ExactExpression::Symbol(ModelSymbol::Parameter(idx)) = meaning.exact else {
             let diagnostic = Diagnostic::error(span, format!("`{name}` is not a parameter"))
                 .label("expected the name of a parameter, or a new name");
@@ -229,6 +245,7 @@ impl SymbolTable {
             });
             return ParameterLookup::Faulty;
         };
+        // Both uses must have the same dimension.
         if let (Some(wanted), Some(found)) = (dimension, meaning.dimension)
             && wanted != found
         {
@@ -244,6 +261,7 @@ impl SymbolTable {
             });
             return ParameterLookup::Faulty;
         }
+        // At most one nominal value may be given, or the same one twice.
         if let Some(nominal) = nominal {
             match self.nominal_given[idx.0] {
                 #[allow(clippy::float_cmp)] // The same number twice is the same text.
@@ -270,6 +288,8 @@ impl SymbolTable {
 }
 
 /// Declares the parameters of shorthands such as `linear = { all = "1" }`.
+///
+/// Parts with the same suffix share these parameters.
 fn declare_shorthands(model: &ModelEntry, symbols: &mut SymbolTable, log: &mut DiagnosticLog) {
     for part in model.part.iter().flat_map(|list| &list.entries) {
         let Some(linear) = &part.linear else {
@@ -278,6 +298,7 @@ fn declare_shorthands(model: &ModelEntry, symbols: &mut SymbolTable, log: &mut D
         let Some((suffix, members)) = shorthand(linear) else {
             continue;
         };
+        // All ten symbols are visited, so that nominal values without a parameter are reported.
         for (symbol, dimension) in LINEAR {
             let nominal = linear
                 .nominal
@@ -304,6 +325,7 @@ fn declare_shorthands(model: &ModelEntry, symbols: &mut SymbolTable, log: &mut D
                 }
                 continue;
             }
+            // A parameter with this name may exist already, from another part or from the table of parameters.
             let name = format!("{symbol}{}", suffix.text);
             let shared = symbols.share_parameter(&name, Some(dimension), suffix.span, nominal, log);
             if matches!(shared, ParameterLookup::New) {
@@ -325,6 +347,8 @@ fn declare_shorthands(model: &ModelEntry, symbols: &mut SymbolTable, log: &mut D
 }
 
 /// The suffix of a shorthand and the symbols of its parameters; `None` without a shorthand.
+///
+/// The suffix ends the names of all of them, such as `1` in `ZZ1`.
 pub(super) fn shorthand(
     linear: &LinearEntry,
 ) -> Option<(&crate::values::NameSuffix, &'static [&'static str])> {
@@ -372,12 +396,15 @@ fn nominal_of(nominal: &LinearNominalEntry, symbol: &str) -> Option<crate::value
 }
 
 /// Declares the coordinates; their use in the frames decides whether each is an angle or a length.
+///
+/// The places of coordinates are appended to `places.coordinates`.
 fn declare_coordinates(
     model: &ModelEntry,
     symbols: &mut SymbolTable,
     places: &mut MechanismSpans,
     log: &mut DiagnosticLog,
 ) {
+    // Expressions of all frames, sorted by the quantity that they describe.
     let FrameFormulas {
         angles,
         lengths,
@@ -396,6 +423,7 @@ fn declare_coordinates(
     }
     // Coordinates beyond the limit are declared too, so that their uses cause no further findings.
     for (key, entry) in entries.iter().take(DECLARED_AT_MOST) {
+        // The first use as an angle, as a length, and in a quaternion.
         let turns = angles.iter().find_map(|ast| find_name(ast, &key.name));
         let slides = lengths.iter().find_map(|ast| find_name(ast, &key.name));
         let of_quaternion = quaternions
@@ -414,6 +442,7 @@ fn declare_coordinates(
         }
         // A coordinate with conflicting uses, or with none, has no dimension and counts as revolute.
         let of_quaternion = of_quaternion.map(|(_, motion)| motion);
+        // Exactly one of the uses decides the kind of motion.
         let motion = match (turns, slides) {
             (Some(turns), Some(slides)) => {
                 log.push(
@@ -438,6 +467,7 @@ fn declare_coordinates(
         };
         // Without nominal values a quaternion is the identity: its scalar part is one.
         let at_rest = f64::from(u8::from(motion == Some(CoordinateMotion::QuaternionScalar)));
+        // The dimension is unknown if the kind of motion is; then it fits any use.
         let dimension = motion.map(CoordinateMotion::dimension);
         let motion = motion.unwrap_or(CoordinateMotion::Revolute);
         let symbol = ModelSymbol::Coordinate(CoordinateIdx(symbols.coordinates.len()));
@@ -448,6 +478,7 @@ fn declare_coordinates(
             motion.unit(),
             Some(key.span),
         );
+        // A name that is taken is reported by the scope.
         if symbols.scope.declare(&key.name, meaning, log) {
             places.coordinates.push(key.span);
             symbols.coordinates.push(JointCoordinate {
@@ -475,11 +506,14 @@ struct FrameFormulas<'a> {
 }
 
 /// Collects the expressions of all frames and joints.
+///
+/// Transforms are not included, because they cannot contain coordinates.
 fn joint_formulas(model: &ModelEntry) -> FrameFormulas<'_> {
     let mut angles: Vec<&FormulaAst> = Vec::new();
     let mut lengths: Vec<&FormulaAst> = Vec::new();
     let mut quaternions = Vec::new();
     for frame in model.frame.iter().flat_map(|list| &list.entries) {
+        // Both conventions of Denavit and Hartenberg have the same entries.
         for dh in frame.modified_dh.iter().chain(&frame.standard_dh) {
             angles.extend(dh.alpha.iter().chain(&dh.theta).map(|formula| &formula.ast));
             lengths.extend(dh.a.iter().chain(&dh.d).map(|formula| &formula.ast));
@@ -487,6 +521,7 @@ fn joint_formulas(model: &ModelEntry) -> FrameFormulas<'_> {
         if let Some(joint) = &frame.joint {
             angles.extend(joint.revolute.iter().map(|formula| &formula.ast));
             lengths.extend(joint.prismatic.iter().map(|formula| &formula.ast));
+            // Joints with several coordinates state the kind of each of them.
             for (formula, motion) in crate::build::joints::coordinates(joint) {
                 match motion {
                     CoordinateMotion::Revolute => angles.push(&formula.ast),
@@ -508,6 +543,7 @@ fn joint_formulas(model: &ModelEntry) -> FrameFormulas<'_> {
 /// The place of a name in an expression, if the expression contains it.
 fn find_name(ast: &FormulaAst, name: &str) -> Option<SourceSpan> {
     match &ast.kind {
+        // Leaves first, then the operands in the order of the text.
         FormulaAstKind::Name(found) => (found == name).then_some(ast.span),
         FormulaAstKind::Sum(inner) | FormulaAstKind::Product(inner) => {
             inner.iter().find_map(|one| find_name(one, name))
@@ -546,6 +582,8 @@ pub(super) fn gravity(
 }
 
 /// The entries of a vector; zero for each that is absent or faulty.
+///
+/// `wanted` is what each entry must be, with its name in messages.
 pub(super) fn vector(
     vector: &FormulaVector,
     scope: &FormulaScope,
@@ -563,6 +601,8 @@ pub(super) fn vector(
 }
 
 /// Warns of constants and parameters that no expression uses.
+///
+/// Parameters of effects and shorthands count as used by these.
 pub(super) fn warn_of_unused(symbols: &SymbolTable, log: &mut DiagnosticLog) {
     for (name, meaning) in symbols.scope.iter() {
         let Some(declared) = meaning.declared.filter(|_| !meaning.used.get()) else {

@@ -1,4 +1,6 @@
 //! A delay of the recorded forces relative to the motion.
+//!
+//! Equations and generated code do not contain it; it is applied where recordings are prepared.
 
 use crate::exact::ModelSymbol;
 use crate::kinds::ActsOn;
@@ -32,6 +34,7 @@ impl MechanicsEntry for DelayMechanics {
             ModelSymbol::Constant(idx) => constants[idx.0].value,
             _ => f64::NAN,
         };
+        // Without a value the delay is zero.
         let time = effect.constants.iter().find(|(name, _)| name == "T");
         time.map_or(0.0, |(_, time)| time.evaluate(&value))
     }

@@ -53,6 +53,7 @@ impl MechanicsEntry for PartMechanics {
         scene: &EffectTargets<'_>,
         log: &mut DiagnosticLog,
     ) {
+        // Only parts reach this check; other places are refused before.
         let EffectPlace::Part(part) = place else {
             return;
         };
@@ -67,6 +68,7 @@ impl MechanicsEntry for PartMechanics {
                 .help("give the parts names of their own: `name = \"...\"` in `[[part]]`"),
             );
         } else if components(&scene.parts[part.0].inertial).is_empty() {
+            // Without mass and inertia all differences would be exactly zero.
             log.push(
                 Diagnostic::error(name.span, "this part has neither mass nor inertia")
                     .label("there is nothing that could differ"),
@@ -107,6 +109,7 @@ impl MechanicsEntry for PartMechanics {
         places: &[EffectPlace],
         scene: &EffectTargets<'_>,
     ) -> EffectBodies {
+        // The parameter of a difference, or zero if the effect does not have it.
         let value = |i: usize| {
             let term = terms.iter().find(|term| term.symbol == DIFFERENCES[i].0);
             term.map_or_else(ExactExpression::zero, |term| {
@@ -118,6 +121,7 @@ impl MechanicsEntry for PartMechanics {
                 return None;
             };
             let part = &scene.parts[part.0];
+            // The further part is linear in the differences, about the origin of the frame.
             Some(ModelPart {
                 name: part.name.clone(),
                 frame: part.frame,
@@ -139,6 +143,7 @@ impl MechanicsEntry for PartMechanics {
         let EffectPlace::Part(part) = place else {
             return false;
         };
+        // Another part with one of the same parameters ties the two parts together.
         let parts = &mechanism.parts;
         let own = shared_parameters(&parts[part.0].inertial);
         let mut others = parts.iter().enumerate().filter(|(i, _)| *i != part.0);
@@ -157,6 +162,7 @@ fn is_only_one(parts: &[ModelPart], part: usize) -> bool {
 }
 
 /// The symbols of the differences that a part can have: those of its quantities that are not exactly zero.
+/// Mass, moments and inertia in the order of the differences.
 fn components(inertial: &PartInertia) -> Vec<&'static str> {
     let (mass, moments, inertia) = match inertial {
         PartInertia::AboutCentre {
@@ -180,6 +186,7 @@ fn components(inertial: &PartInertia) -> Vec<&'static str> {
 }
 
 /// The parameters in mass and inertia of a part, which other parts may share.
+/// The centre is not included, because it describes one part only.
 fn shared_parameters(inertial: &PartInertia) -> Vec<crate::ParameterIdx> {
     let (PartInertia::AboutCentre { mass, inertia, .. }
     | PartInertia::Linear { mass, inertia, .. }) = inertial;

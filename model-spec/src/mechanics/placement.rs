@@ -40,6 +40,7 @@ impl MechanicsEntry for PlacementMechanics {
         scene: &EffectTargets<'_>,
         log: &mut DiagnosticLog,
     ) {
+        // The effect corrects only masses with two different places.
         if displaced_masses(place, &scene.points.points, scene.lumped_masses).is_empty() {
             log.push(
                 Diagnostic::error(
@@ -63,6 +64,7 @@ impl MechanicsEntry for PlacementMechanics {
         let mut bodies = EffectBodies::default();
         for term in terms {
             let mass = ExactExpression::Symbol(ModelSymbol::Parameter(term.parameter));
+            // All lumped masses at all places of the effect share the parameter.
             let all = places.iter().flat_map(|place| {
                 displaced_masses(*place, &scene.points.points, scene.lumped_masses)
             });
@@ -89,6 +91,7 @@ impl MechanicsEntry for PlacementMechanics {
 
     /// Places with the same masses belong together, because these are shares of one mass.
     fn groups(&self, mechanism: &Mechanism, places: &[EffectPlace]) -> Option<Vec<Vec<usize>>> {
+        // Groups by the list of masses at each place.
         let mut groups: Vec<(Vec<&ExactExpression>, Vec<usize>)> = Vec::new();
         for (i, place) in places.iter().enumerate() {
             let lumps = displaced_masses(*place, &mechanism.points, &mechanism.lumped_masses);
@@ -103,6 +106,7 @@ impl MechanicsEntry for PlacementMechanics {
 }
 
 /// Lumped masses whose forces are taken at a point, and whose moments are taken at another one.
+/// Such a mass is on the frame of the point, and its forces act exactly there.
 fn displaced_masses<'a>(
     place: EffectPlace,
     points: &[FramePoint],

@@ -1,4 +1,6 @@
 //! A slender rod along a linear drive, such as its screw.
+//!
+//! Its generalised force is derived in `regressor/mechanics` of `modelmill-codegen`.
 
 use crate::build::effect_places::EffectTargets;
 use crate::diagnostic::{Diagnostic, DiagnosticLog};
@@ -45,6 +47,7 @@ impl MechanicsEntry for RodMechanics {
         scene: &EffectTargets<'_>,
         log: &mut DiagnosticLog,
     ) {
+        // A rod needs the line between the two points of a drive.
         if !is_line(scene.drives, place) {
             log.push(
                 Diagnostic::error(name.span, "a rod cannot act here")

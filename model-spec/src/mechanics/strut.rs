@@ -1,4 +1,6 @@
 //! A passive element along the line between two points, such as a gas strut, a spring or a damper.
+//!
+//! It has a constant force, a stiffness and a damping along the line, so that it is linear in its parameters.
 
 use crate::build::effect_places::EffectTargets;
 use crate::diagnostic::{Diagnostic, DiagnosticLog};
@@ -69,11 +71,13 @@ impl MechanicsEntry for StrutMechanics {
     /// there.
     fn pairs(&self, mechanism: &Mechanism) -> Option<Vec<[PointIdx; 2]>> {
         let points = &mechanism.points;
+        // Points of loops and drives have another purpose.
         let is_free = |p: &PointIdx| {
             !is_loop_end(&mechanism.loops, *p) && !is_drive_end(&mechanism.drives, *p)
         };
         let free: Vec<PointIdx> = (0..points.len()).map(PointIdx).filter(is_free).collect();
         let mut pairs = Vec::new();
+        // Each pair of free points on different frames.
         for (i, one) in free.iter().enumerate() {
             for other in &free[i + 1..] {
                 if points[one.0].frame != points[other.0].frame {

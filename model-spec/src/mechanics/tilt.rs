@@ -1,4 +1,6 @@
 //! A base that is rotated by Rz(tz) Ry(ty) Rx(tx) relative to the frame in which gravity is given.
+//!
+//! Gravity is rotated instead of the base, so that all frames stay as they are.
 
 use crate::build::symbols::SymbolTable as Names;
 use crate::diagnostic::DiagnosticLog;
@@ -52,6 +54,7 @@ impl MechanicsEntry for TiltMechanics {
         log: &mut DiagnosticLog,
     ) -> Option<Vec<(String, ExactExpression)>> {
         let mut named = Vec::new();
+        // Zero angles would only lengthen the expressions of gravity.
         for (symbol, angle) in values {
             if angle.is_zero() {
                 continue;
@@ -65,6 +68,7 @@ impl MechanicsEntry for TiltMechanics {
             let name = format!("{symbol}_base");
             let idx = ConstantIdx(names.constants.len());
             let value = angle.evaluate(&|_| 0.0);
+            // The name must be new in the model; a clash is reported at the kind of the effect.
             let mut meaning = symbol_meaning(
                 SymbolSort::Constant,
                 ModelSymbol::Constant(idx),
@@ -97,6 +101,7 @@ impl MechanicsEntry for TiltMechanics {
     ) -> [ExactExpression; 3] {
         // Each rotation mixes the two components that are not along its axis.
         for (symbol, [from, to]) in [("tz", [0, 1]), ("ty", [2, 0]), ("tx", [1, 2])] {
+            // An angle of zero was dropped, so its rotation is skipped.
             let Some((_, angle)) = effect.constants.iter().find(|(name, _)| name == symbol) else {
                 continue;
             };
