@@ -105,6 +105,7 @@ impl ConstantSubstitutes {
             if !constant.is_angle {
                 // Zero is decided relative to the largest constant of the same unit.
                 let alike = constants.iter().filter(|c| c.unit == constant.unit);
+                // Values of the same unit, this one included.
                 let largest = alike.map(|c| c.value.abs()).fold(0.0, f64::max);
                 of.push(SubstituteValue::Number(
                     if constant.value.abs() < ROUNDING_SHARE * largest {
@@ -140,6 +141,7 @@ impl ConstantSubstitutes {
 
     /// An expression with all constants replaced.
     fn exact(&self, exact: &ExactExpression) -> ExactExpression {
+        // Operands are replaced one by one; the shape of the expression stays.
         let inner = |a: &ExactExpression| Box::new(self.exact(a));
         let all = |operands: &[ExactExpression]| operands.iter().map(|a| self.exact(a)).collect();
         match exact {
@@ -171,6 +173,7 @@ impl ConstantSubstitutes {
     fn angle(&self, angle: &ExactAngle) -> ExactAngle {
         let mut pi = angle.pi.clone();
         let mut terms: Vec<(ModelSymbol, i32)> = Vec::new();
+        // Terms with the same constant are added.
         for (symbol, n) in &angle.terms {
             let symbol = match symbol {
                 ModelSymbol::Constant(i) => match &self.values[i.0] {
@@ -197,6 +200,7 @@ impl ConstantSubstitutes {
 
     /// Replaces constants in the inertias of parts and in lumped masses.
     fn bodies(&self, parts: &mut [ModelPart], lumped_masses: &mut [LumpedMass]) {
+        // Both forms of an inertia have the same quantities to replace.
         for part in parts {
             let (PartInertia::AboutCentre {
                 mass,

@@ -169,9 +169,9 @@ impl Mechanism {
 /// Fails when it names a column that does not exist, is not affine, or has a unit that does not fit the quantity.
 ///
 /// ```
-/// use modelmill_spec::{Quantity, read_column};
+/// use modelmill_spec::{ColumnQuantity, read_column};
 /// let names = ["time_s".to_owned(), "qm5".to_owned(), "qm6".to_owned()];
-/// let sum = read_column("(qm6 - qm5)/32 [deg]", Quantity::Angle(0), &names, &|_| None)?;
+/// let sum = read_column("(qm6 - qm5)/32 [deg]", ColumnQuantity::Angle(0), &names, &|_| None)?;
 /// assert_eq!(sum.terms[1].0, "qm5");
 /// assert!((sum.terms[1].1 + std::f64::consts::PI / 180.0 / 32.0).abs() < 1e-18);
 /// # Ok::<(), modelmill_spec::ColumnFault>(())

@@ -136,6 +136,7 @@ fn parse_closed(text: &str, file: usize, log: &mut DiagnosticLog) -> TomlTable {
     errors.sort_by_key(|error| error.span().map_or(0, |range| range.start));
     let is_model = root.get_ref().contains_key("schema");
     let mut last: Option<usize> = None;
+    // Faults are kept in a list first, and reported below.
     let mut found = Vec::new();
     for error in &errors {
         log.syntax_broken = true;
@@ -184,6 +185,7 @@ fn syntax_error(span: SourceSpan, message: &str) -> Diagnostic {
             .label("expected one value, texts and expressions in quotes")
             .help("separate the entries of `{ }` and `[ ]` by commas");
     }
+    // Advice depends on words in the message of the parser.
     let help = if message.contains("recurs") {
         "nest arrays and tables at most 80 deep; a model needs four levels"
     } else if message.contains("duplicate key") {
@@ -226,6 +228,7 @@ fn node(value: toml::Spanned<DeValue<'_>>, text: &str, file: usize) -> TomlNode 
         end: range.end,
     };
     let value = match value.into_inner() {
+        // The place of the content is needed to mark parts of expressions.
         DeValue::String(string) => {
             // The content starts behind one, three or four characters of quotes (and line feed), if it has no
             // escapes.

@@ -180,16 +180,16 @@ pub struct AdoptedValues {
 /// Fails if the text is not TOML, or if its table `identified` has another form than this function writes.
 ///
 /// ```
-/// use modelmill_spec::edit::{Adopted, adopt};
-/// let values = Adopted {
+/// use modelmill_spec::edit::{AdoptedValues, write_identified};
+/// let values = AdoptedValues {
 ///     comment: "from a fit".to_owned(),
 ///     base: vec![("m*l".to_owned(), 2.5)],
-///     ..Adopted::default()
+///     ..AdoptedValues::default()
 /// };
-/// let text = adopt("name = \"arm\" # mine\n", &values).unwrap();
+/// let text = write_identified("name = \"arm\" # mine\n", &values).unwrap();
 /// assert_eq!(text, "name = \"arm\" # mine\n\n[identified]\n# from a fit\nbase = [\n  \
 ///                   { expression = \"m*l\", value = 2.5 },\n]\n");
-/// assert_eq!(adopt(&text, &values).unwrap(), text);
+/// assert_eq!(write_identified(&text, &values).unwrap(), text);
 /// ```
 pub fn write_identified(text: &str, values: &AdoptedValues) -> Result<String, String> {
     let mut log = DiagnosticLog::default();

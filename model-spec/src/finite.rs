@@ -70,6 +70,7 @@ pub(crate) fn value<'a>(
         }
         FormulaAstKind::Apply(function, inner) => {
             let x = value(inner, known)?;
+            // A root of a negative number has no real value.
             if let (ExactFunction::Sqrt, Some(x)) = (function, x)
                 && x < 0.0
             {
@@ -112,6 +113,7 @@ fn fold<'a>(
 impl ValueFault<'_> {
     /// The diagnostic; `declared` is the place of the faulty name, if the part is a name only.
     pub(crate) fn report(&self, declared: Option<SourceSpan>) -> Diagnostic {
+        // What was found, and what to do about it.
         let (message, help) = match self.cause {
             ValueFaultCause::Divides => (
                 "this divides by zero",

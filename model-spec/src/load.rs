@@ -123,7 +123,7 @@ pub fn load_file_with(
 ///     part = [{ on = "arm", linear = { planar = "1" } }]
 ///     drive = [{ name = "motor", joint = "angle" }]
 /// "#;
-/// let files = modelmill_boundary::files::Memory::default();
+/// let files = modelmill_boundary::files::MemoryFiles::default();
 /// let loaded = modelmill_spec::load("pendulum.toml", text, &files).unwrap();
 /// let names: Vec<_> = loaded.mechanism.parameters.iter().map(|p| p.name.as_str()).collect();
 /// assert_eq!(names, ["ZZ1", "MX1", "MY1", "M1"]);

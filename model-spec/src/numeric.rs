@@ -9,6 +9,7 @@ pub(crate) type DenseRows = Vec<Vec<f64>>;
 pub(crate) fn rank(rows: &DenseRows, tolerance: f64) -> usize {
     let mut rows = rows.clone();
     let n_columns = rows.first().map_or(0, Vec::len);
+    // The tolerance is relative to the largest entry.
     let largest = rows
         .iter()
         .flatten()
@@ -30,6 +31,7 @@ pub(crate) fn rank(rows: &DenseRows, tolerance: f64) -> usize {
             }
         }
         let (i, j, size) = pivot;
+        // All remaining entries are rounding, so the rank is reached.
         if size <= tolerance * largest {
             break;
         }
@@ -72,11 +74,13 @@ pub(crate) fn least_squares(
             matrix[i][n] += row[i] * r;
         }
     }
+    // Damping on the diagonal makes singular equations solvable.
     for (i, row) in matrix.iter_mut().enumerate() {
         row[i] += damping;
     }
     // Gaussian elimination with partial pivoting.
     for k in 0..n {
+        // The largest entry of the column becomes the pivot.
         let best = (k..n).max_by(|&i, &j| matrix[i][k].abs().total_cmp(&matrix[j][k].abs()))?;
         if matrix[best][k] == 0.0 || !matrix[best][k].is_finite() {
             return None;
@@ -96,5 +100,6 @@ pub(crate) fn least_squares(
         let known: f64 = (k + 1..n).map(|j| matrix[k][j] * x[j]).sum();
         x[k] = (matrix[k][n] - known) / matrix[k][k];
     }
+    // Overflow in the solution counts as singular.
     x.iter().all(|entry| entry.is_finite()).then_some(x)
 }

@@ -23,6 +23,7 @@ impl ExactExpression {
     }
 
     /// The expression in the syntax of a model file; `name` gives the names of symbols.
+    /// The text starts in the context of a sum, where no parentheses are needed.
     pub fn to_text(&self, name: &dyn Fn(ModelSymbol) -> String) -> String {
         let mut text = String::new();
         print_expression(self, OperandPrecedence::Sum, name, &mut text);
@@ -31,6 +32,7 @@ impl ExactExpression {
 
     /// The value in double precision; `value` gives the values of symbols. It is not finite where the expression is
     /// undefined.
+    /// Exact numbers are rounded only here.
     pub fn evaluate(&self, value: &dyn Fn(ModelSymbol) -> f64) -> f64 {
         match self {
             Self::Rational(number) => to_f64(number),
@@ -51,6 +53,7 @@ impl ExactExpression {
                     ExactFunction::Cos => x.cos(),
                     ExactFunction::Sqrt => x.sqrt(),
                     ExactFunction::Abs => x.abs(),
+                    // Unlike `signum`, the sign of zero is zero.
                     ExactFunction::Sign if x > 0.0 => 1.0,
                     ExactFunction::Sign if x < 0.0 => -1.0,
                     ExactFunction::Sign => 0.0,
@@ -62,6 +65,7 @@ impl ExactExpression {
     }
 
     /// Calls `visit` for every occurrence of a symbol in the expression.
+    /// Symbols are visited in the order in which they are printed, also repeatedly.
     pub fn for_each_symbol(&self, visit: &mut dyn FnMut(ModelSymbol)) {
         match self {
             Self::Rational(_) | Self::Pi => {}
@@ -104,6 +108,7 @@ impl ExactAngle {
     }
 
     /// The value in rad; `value` gives the values of symbols.
+    /// The fixed part, then the multiples of symbols.
     pub fn evaluate(&self, value: &dyn Fn(ModelSymbol) -> f64) -> f64 {
         to_f64(&self.pi) * std::f64::consts::PI
             + self
@@ -116,6 +121,7 @@ impl ExactAngle {
 
 impl ExactLength {
     /// The value in m; `value` gives the values of symbols.
+    /// The fixed part, then the multiples of coordinates.
     pub fn evaluate(&self, value: &dyn Fn(ModelSymbol) -> f64) -> f64 {
         self.offset.evaluate(value)
             + self
@@ -146,6 +152,7 @@ impl Mechanism {
 
     /// The nominal value of a symbol; zero for the quantities of a place, which have no nominal value.
     pub fn symbol_nominal(&self, symbol: ModelSymbol) -> f64 {
+        // Each symbol has one value in the mechanism.
         match symbol {
             ModelSymbol::Constant(idx) => self.constants[idx.0].value,
             ModelSymbol::Parameter(idx) => self.parameters[idx.0].nominal,
@@ -206,6 +213,7 @@ fn print_expression(
         ExactExpression::Rational(value) => text.push_str(&value.to_string()),
         ExactExpression::Pi => text.push_str("pi"),
         ExactExpression::Symbol(symbol) => text.push_str(&name(*symbol)),
+        // Terms of a sum are printed with their signs.
         ExactExpression::Sum(terms) => print_sum(terms, name, text),
         ExactExpression::Product(factors) => {
             for (i, factor) in factors.iter().enumerate() {
@@ -222,6 +230,7 @@ fn print_expression(
                 print_expression(factor, inner, name, text);
             }
         }
+        // A divisor always needs parentheses around products and fractions.
         ExactExpression::Quotient(above, below) => {
             // `(a/b)/c` needs parentheses, because chains of fractions are parsed into one.
             let inner = match **above {
@@ -232,10 +241,12 @@ fn print_expression(
             text.push('/');
             print_expression(below, OperandPrecedence::Factor, name, text);
         }
+        // A sign is printed before a product, but before a sum only with parentheses.
         ExactExpression::Negative(inner) => {
             text.push('-');
             print_expression(inner, OperandPrecedence::Product, name, text);
         }
+        // The base of a power is printed as an atom.
         ExactExpression::Power(base, exponent) => {
             print_expression(base, OperandPrecedence::Power, name, text);
             text.push('^');
@@ -256,11 +267,13 @@ fn print_expression(
 /// Appends a sum, in which negative terms become differences.
 fn print_sum(terms: &[ExactExpression], name: &dyn Fn(ModelSymbol) -> String, text: &mut String) {
     for (i, term) in terms.iter().enumerate() {
+        // A negative term after the first one is subtracted.
         match term {
             ExactExpression::Negative(inner) if i > 0 => {
                 text.push_str(" - ");
                 print_expression(inner, OperandPrecedence::Product, name, text);
             }
+            // A negative number after the first term is subtracted, too.
             ExactExpression::Rational(value) if i > 0 && value.is_negative() => {
                 text.push_str(" - ");
                 text.push_str(&(-value).to_string());

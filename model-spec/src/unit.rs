@@ -130,6 +130,7 @@ impl UnitDimension {
     }
 
     /// The dimension of the square root; `None` if an exponent would not be a multiple of one half.
+    /// An odd doubled exponent would need quarters of exponents.
     pub(crate) fn square_root(self) -> Option<Self> {
         self.0
             .iter()
@@ -138,6 +139,7 @@ impl UnitDimension {
     }
 
     /// Its common name with its unit: `a length (m)`.
+    /// Dimensions without a common name are printed as powers.
     pub(crate) fn describe(self) -> String {
         PRINTED
             .iter()
@@ -165,6 +167,7 @@ impl std::fmt::Display for UnitDimension {
             return f.write_str(unit);
         }
         let mut blank = "";
+        // One factor per base unit, exponents of one half as fractions.
         for (name, twice) in ["kg", "m", "s", "A"].iter().zip(self.0) {
             if twice == 0 {
                 continue;
@@ -200,6 +203,7 @@ impl ModelUnit {
         inner: Option<usize>,
         log: &mut DiagnosticLog,
     ) -> Option<Self> {
+        // The fault has the part of the text that is wrong.
         let fault = match parse_unit(text) {
             Ok(dimension) => {
                 return Some(Self {
@@ -219,6 +223,7 @@ impl ModelUnit {
         let mut diagnostic = Diagnostic::error(place, fault.message).label(
             "expected SI units such as `kg`, `m`, `rad`, `kg m^2`, `N s/m`, `m/s^2`, or `1`",
         );
+        // Prefixed units are refused, because no factor is ever applied.
         if let Some((_, si)) = FOREIGN.iter().find(|(foreign, _)| *foreign == found) {
             diagnostic = diagnostic.help(format!(
                 "write `{si}` and convert the value; modelmill uses SI units without prefixes"
@@ -266,6 +271,7 @@ impl schemars::JsonSchema for ModelUnit {
 /// Unit of a product of powers of quantities: `kg m` for a mass times a length.
 ///
 /// A single quantity keeps its unit as the file writes it. A text that is not a unit counts as a pure number.
+/// A single unit keeps its spelling, such as `N m s/rad`.
 pub fn unit_product(factors: &[(&str, i32)]) -> String {
     if let [(unit, 1)] = factors {
         return (*unit).to_owned();
@@ -300,6 +306,7 @@ fn parse_unit(text: &str) -> Result<UnitDimension, UnitFault> {
     if text.trim().is_empty() {
         return Err(whole("this unit is empty"));
     }
+    // At most one `/` is allowed.
     let (above, below) = match text.split_once('/') {
         Some((above, below)) => (above, Some(below)),
         None => (text, None),
@@ -307,6 +314,7 @@ fn parse_unit(text: &str) -> Result<UnitDimension, UnitFault> {
     let mut dimension = factors(above, 0)?.0;
     if let Some(below) = below {
         let offset = above.len() + 1;
+        // A bracket counts as one divisor.
         let trimmed = below.trim();
         let bracket = trimmed
             .strip_prefix('(')
@@ -333,6 +341,7 @@ fn parse_unit(text: &str) -> Result<UnitDimension, UnitFault> {
 /// The product of units separated by blanks, `*` or a middle dot, and their number.
 /// `offset` is the position of `text` in the complete unit, for the places of faults.
 fn factors(text: &str, offset: usize) -> Result<(UnitDimension, usize), UnitFault> {
+    // Units are separated by blanks or product signs.
     let mut dimension = UnitDimension::ONE;
     let mut n_factors = 0;
     let mut at = 0;
@@ -350,6 +359,7 @@ fn factors(text: &str, offset: usize) -> Result<(UnitDimension, usize), UnitFaul
             .find(|found: char| found.is_whitespace() || found == '*' || found == '\u{b7}')
             .unwrap_or(rest.len());
         let word = &rest[..end];
+        // A unit may have an integer exponent, up to nine.
         let (name, exponent) = match word.split_once('^') {
             Some((name, exponent)) => (name, exponent.parse::<i32>().ok()),
             None => (word, Some(1)),
@@ -372,6 +382,7 @@ fn factors(text: &str, offset: usize) -> Result<(UnitDimension, usize), UnitFaul
         n_factors += 1;
         at += end;
     }
+    // A missing unit is reported at its position.
     if n_factors == 0 {
         return Err(UnitFault {
             start: offset,

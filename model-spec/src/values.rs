@@ -50,6 +50,7 @@ impl SchemaValue for SpannedName {
     const EXPECTED: &'static str = "a name in quotes";
     const EXAMPLE: &'static str = "\"S1\"";
 
+    // Text that is not an identifier is reported and not read.
     fn read(node: &TomlNode, log: &mut DiagnosticLog) -> Option<Self> {
         let TomlValue::Text { text, .. } = &node.value else {
             return wrong_type::<Self>(node, log);
@@ -128,6 +129,7 @@ impl SchemaValue for SpannedText {
     const EXPECTED: &'static str = "a text in quotes";
     const EXAMPLE: &'static str = "\"...\"";
 
+    // Titles, notes and paths are such texts.
     fn read(node: &TomlNode, log: &mut DiagnosticLog) -> Option<Self> {
         let TomlValue::Text { text, .. } = &node.value else {
             return wrong_type::<Self>(node, log);
@@ -418,6 +420,7 @@ pub(crate) enum LumpedMassPlace {
     Vector(FormulaVector),
 }
 
+// Both forms know their place.
 impl LumpedMassPlace {
     /// Where it stands in the file.
     pub(crate) fn span(&self) -> SourceSpan {
@@ -515,18 +518,21 @@ impl JsonSchema for NameSuffix {
     }
 }
 
+// The direction of an axis of a joint; a minus sign reverses it.
 words! {
     /// An axis with its direction.
     pub(crate) AxisName: "an axis",
     "x" => X, "y" => Y, "z" => Z, "-x" => MinusX, "-y" => MinusY, "-z" => MinusZ
 }
 
+// The scalar part w comes last or first.
 words! {
     /// The order in which a quaternion is written.
     pub(crate) QuaternionOrder: "the order of a quaternion",
     "xyzw" => Xyzw, "wxyz" => Wxyz
 }
 
+// The axes of velocity and force, and of angular velocity and moment.
 words! {
     /// The axes of the twist of a free body.
     pub(crate) TwistName: "the axes of a twist",

@@ -37,6 +37,7 @@ pub(super) fn loops(
     places: &mut MechanismSpans,
     log: &mut DiagnosticLog,
 ) -> Vec<KinematicLoop> {
+    // Loops may have names; those must be unique.
     let entries = model
         .loops
         .as_ref()
@@ -52,6 +53,7 @@ pub(super) fn loops(
                 .label(format!("at most {MOST_LOOPS}")),
         );
     }
+    // Loops beyond the limit are not looked at.
     let mut loops = Vec::new();
     for entry in entries.iter().take(MOST_LOOPS) {
         let Some(joins) = &entry.joins else { continue };
@@ -79,6 +81,7 @@ pub(super) fn loops(
             continue;
         }
         places.loops.push(joins.span);
+        // Without a name a loop is called after its two points.
         loops.push(KinematicLoop {
             name: entry.name.as_ref().map_or_else(
                 || format!("{}_{}", first.text, second.text),
@@ -117,10 +120,12 @@ pub(super) fn drives(
         .as_ref()
         .map_or(&[][..], |list| list.entries.as_slice());
     let before = log.n_errors();
+    // Each entry is read with its kind; drives with faults keep their names.
     let mut drives: Vec<ModelDrive> = Vec::new();
     // Whether each drive acts where its entry states; faulty ones stay in the list only to keep their names known.
     let mut known = Vec::new();
     for entry in entries {
+        // Exactly one of `joint` and `linear` states how a drive acts.
         let kind = match (&entry.joint, &entry.linear) {
             (Some(joint), None) => coordinate(joint, symbols, log).map(DriveKind::Joint),
             (None, Some(linear)) => {
@@ -148,6 +153,7 @@ pub(super) fn drives(
                     .help("choose another name, such as `motor`"),
             );
         }
+        // A second drive with the same name is left out.
         if let Some(first) = drives.iter().position(|drive| drive.name == name.text) {
             log.push(duplicate_name("drive", name, places.drives[first]));
             continue;
@@ -170,6 +176,7 @@ pub(super) fn drives(
         }
         places.drives.push(name.span);
         known.push(kind.is_some());
+        // The replaced kind of a faulty drive is never used, because the fault stops the build.
         drives.push(ModelDrive {
             name: name.text.clone(),
             kind: kind.unwrap_or(DriveKind::Joint(CoordinateIdx(0))),
@@ -204,6 +211,7 @@ fn check_drive_count(
     places: &MechanismSpans,
     log: &mut DiagnosticLog,
 ) {
+    // Active coordinates with a rate are the degrees of freedom.
     let n_active = symbols
         .coordinates
         .iter()
@@ -236,6 +244,7 @@ fn check_drive_count(
             })
             .and_then(|(i, _)| places.coordinates.get(i).copied())
     };
+    // The counts in the message, with the right plural.
     let degrees = |n: usize| format!("{n} degree{} of freedom", if n == 1 { "" } else { "s" });
     let count = |n: usize| format!("{n} drive{}", if n == 1 { "" } else { "s" });
     log.push(
@@ -266,6 +275,7 @@ fn coordinate(
     symbols: &SymbolTable,
     log: &mut DiagnosticLog,
 ) -> Option<CoordinateIdx> {
+    // The scope reports unknown names and marks the coordinate as used.
     let meaning = symbols
         .scope
         .look_up(&name.text, name.span, &[SymbolSort::Coordinate], log)?;
@@ -279,6 +289,7 @@ fn coordinate(
 ///
 /// Names that end like a derivative of a coordinate (`_d`, `_dd`) are reported as well.
 pub(super) fn check_place_names(model: &ModelEntry, log: &mut DiagnosticLog) {
+    // The first use of each name, with the sort of thing and its place.
     let mut seen: BTreeMap<&str, (&str, SourceSpan)> = BTreeMap::new();
     let coordinates = model
         .coordinates
@@ -342,6 +353,7 @@ pub(super) fn torque(
     drives: &DriveRows,
     log: &mut DiagnosticLog,
 ) -> Vec<(String, f64)> {
+    // Drives that share rows have columns as well.
     let drives: Vec<&ModelDrive> = drives.rows.iter().chain(&drives.shared).collect();
     let recording = model.recording.as_ref();
     let torque = recording.and_then(|entry| entry.torque.as_ref());
@@ -356,6 +368,7 @@ pub(super) fn torque(
             );
             continue;
         }
+        // An entry without any factor has no effect.
         let given = [&entry.ratio, &entry.constant];
         if given.iter().all(|number| number.is_none()) && !entry.faulty {
             log.push(
@@ -363,6 +376,7 @@ pub(super) fn torque(
                     .label("expected `ratio`, `constant` (N m/A), or both"),
             );
         }
+        // The factor is the product of the given numbers.
         let mut factor = 1.0;
         for number in given.into_iter().flatten() {
             if number.value == 0.0 {
@@ -402,10 +416,12 @@ pub(super) fn recording(
         }
         known.extend([name.clone(), format!("{name}_d"), format!("{name}_dd")]);
     }
+    // Drives have a column for the force and one for its variance.
     for drive in drives.rows.iter().chain(&drives.shared) {
         known.extend([drive.name.clone(), format!("{}_var", drive.name)]);
     }
     let mut pairs: Vec<(String, String)> = Vec::new();
+    // Unknown names of the model are left out, so that nothing is mapped to them.
     for (key, theirs) in &columns.entries {
         if !known.contains(&key.name) {
             if !log.is_full() {

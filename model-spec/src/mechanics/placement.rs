@@ -94,6 +94,7 @@ impl MechanicsEntry for PlacementMechanics {
         // Groups by the list of masses at each place.
         let mut groups: Vec<(Vec<&ExactExpression>, Vec<usize>)> = Vec::new();
         for (i, place) in places.iter().enumerate() {
+            // The masses whose moments are misplaced at this point.
             let lumps = displaced_masses(*place, &mechanism.points, &mechanism.lumped_masses);
             let masses: Vec<&ExactExpression> = lumps.into_iter().map(|lump| &lump.mass).collect();
             match groups.iter_mut().find(|(known, _)| *known == masses) {

@@ -63,6 +63,7 @@ impl MechanicsEntry for RodMechanics {
 }
 
 /// Whether a place is a linear drive, which has two points.
+/// Only a linear drive has a line.
 fn is_line(drives: &[ModelDrive], place: EffectPlace) -> bool {
     let EffectPlace::Drive(drive) = place else {
         return false;

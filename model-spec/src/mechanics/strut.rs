@@ -52,6 +52,7 @@ impl MechanicsEntry for StrutMechanics {
             _ => None,
         };
         let frames: Vec<_> = places.iter().map(frame).collect();
+        // The second point is marked, because the first one is the reference.
         if let ([_, second], [a, b]) = (names, frames.as_slice())
             && a == b
         {

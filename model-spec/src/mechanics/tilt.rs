@@ -93,7 +93,7 @@ impl MechanicsEntry for TiltMechanics {
         Some(named)
     }
 
-    /// Applies the transposed rotations, the outermost first.
+    /// Applies the transposed rotations, the outermost first: with R = Rz(tz) Ry(ty) Rx(tx) this is R' g = Rx' Ry' Rz' g.
     fn gravity(
         &self,
         effect: &ModelEffect,
