@@ -174,7 +174,9 @@ fn files_of_one_run_are_joined() {
     assert!((rare_n - n / 4.0).abs() <= 1.0, "{rare_n} of {n}");
     assert!(rare_error < 1e-5, "{rare_error}");
     assert!(
-        found["data"].to_string().contains("taken at their times"),
+        found["data"]
+            .to_string()
+            .contains("interpolated linearly to them"),
         "{found}"
     );
     let says = refused(

@@ -240,7 +240,7 @@ impl<'a> SampleIntake<'a> {
                 None => String::new(),
             };
             notes.push(RecordingNote::info(format!(
-                "Only the {} from t = {from} s to {to} s of {file} are read; {} before{rest} {} skipped.",
+                "Of {file} only the {} from t = {from} s to {to} s are read; {} before{rest} {} skipped.",
                 count_of(self.lines.len(), "sample", "samples"),
                 count_of(self.before, "sample", "samples"),
                 if self.before == 1 { "is" } else { "are" },

@@ -70,7 +70,7 @@ impl RecordingFormat for Hdf5Format {
         });
         let remark = (!columns.others.is_empty()).then(|| {
             format!(
-                "left aside, of another length or no numbers: {}",
+                "skipped, of another length or without numbers: {}",
                 backquoted_list(&columns.others)
             )
         });
@@ -109,7 +109,7 @@ fn read(
     let mut intake = SampleIntake::new(columns.names(), options)?;
     if !columns.others.is_empty() {
         intake.note(RecordingNote::info(format!(
-            "{} of {file} {} not of as many samples as the others, or no numbers, and left aside.",
+            "{} of {file} {} skipped, because of another number of samples or without numbers.",
             backquoted_list(&columns.others),
             if columns.others.len() == 1 {
                 "is"
@@ -123,7 +123,7 @@ fn read(
     // Numbers are kept twice until all are taken in.
     if read.len().saturating_mul(columns.samples) > options.max_numbers / 2 {
         return Err(format_fault(
-            "it is too large to be read as a whole; save it as CSV or Parquet, of which parts can be read",
+            "it is too large to be read completely; save it as CSV or Parquet, of which parts can be read",
         ));
     }
     let mut values = vec![Vec::new(); columns.consistent.len()];
@@ -182,11 +182,11 @@ impl HdfColumns {
             .max()
             .unwrap_or(0);
         if samples == 0 {
-            return Err(format_fault("it holds no datasets of numbers"));
+            return Err(format_fault("it contains no datasets of numbers"));
         }
         let mut columns = Self {
             samples: usize::try_from(samples)
-                .map_err(|_| format_fault("it says to have more samples than any memory holds"))?,
+                .map_err(|_| format_fault("it declares more samples than fit into memory"))?,
             consistent: Vec::new(),
             others,
         };
@@ -355,7 +355,7 @@ impl HdfColumn {
         }
         if values.len() != samples {
             return Err(format_fault(format!(
-                "`{}` is shorter than it says",
+                "`{}` is shorter than its declared size",
                 self.name
             )));
         }
@@ -505,6 +505,6 @@ fn format_fault(says: impl Into<String>) -> RecordingFault {
 
 fn unreadable_fault(error: &Error) -> RecordingFault {
     format_fault(format!(
-        "it cannot be read: {error}; is it complete, and closed by whoever wrote it?"
+        "it cannot be read: {error}; is it complete, and was it closed by the program that wrote it?"
     ))
 }

@@ -70,7 +70,7 @@ impl RecordingFormat for Matlab5Format {
             }),
             remark: (!columns.others.is_empty()).then(|| {
                 format!(
-                    "left aside, of another length: {}",
+                    "skipped, of another length: {}",
                     backquoted_list(&columns.others)
                 )
             }),
@@ -88,7 +88,7 @@ fn read(
     let mut intake = SampleIntake::new(columns.names(), options)?;
     if !columns.others.is_empty() {
         intake.note(RecordingNote::info(format!(
-            "{} of {file} {} not of as many samples as the others, and left aside.",
+            "{} of {file} {} skipped, because of another number of samples.",
             backquoted_list(&columns.others),
             if columns.others.len() == 1 {
                 "is"
@@ -112,7 +112,7 @@ fn read(
         .sum();
     if numbers > options.max_numbers / 2 {
         return Err(format_fault(
-            "it is too large to be read as a whole; save it as CSV or Parquet, of which parts can be read",
+            "it is too large to be read completely; save it as CSV or Parquet, of which parts can be read",
         ));
     }
     let mut values = Vec::new();
@@ -184,7 +184,7 @@ impl MatlabColumns {
         let samples = sides.copied().max().unwrap_or(0);
         if samples == 0 {
             return Err(format_fault(
-                "it holds no numeric arrays at its top level; structures and tables cannot be read: save their fields as \
+                "it contains no numeric arrays at its top level; structures and tables cannot be read: save their fields as \
                  variables of their own, or as CSV or Parquet",
             ));
         }

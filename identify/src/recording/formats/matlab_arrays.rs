@@ -59,7 +59,7 @@ impl<R: Read + Seek> MatlabArrayFile<R> {
         let is_little = match version {
             [0, 1, b'I', b'M'] => true,
             [1, 0, b'M', b'I'] => false,
-            _ => return Err(io::Error::other("its header is that of no such file")),
+            _ => return Err(io::Error::other("its header is not that of a MATLAB file")),
         };
         let mut arrays = Vec::new();
         let mut at = HEADER;
@@ -265,7 +265,7 @@ impl<'a> MatlabElementReader<'a> {
     /// The numbers of an element, whatever type they are kept as.
     fn read_numbers(&mut self, tag: &MatlabTag) -> io::Result<Vec<f64>> {
         let width =
-            number_width(tag.kind).ok_or_else(|| io::Error::other("it holds no numbers"))?;
+            number_width(tag.kind).ok_or_else(|| io::Error::other("it contains no numbers"))?;
         let mut numbers = Vec::new();
         let mut left = tag.length as usize;
         let mut chunk = vec![0; CHUNK.min(left)];
@@ -316,5 +316,5 @@ fn push_numbers(kind: u32, bytes: &[u8], numbers: &mut Vec<f64>) {
 }
 
 fn truncated_error() -> io::Error {
-    io::Error::other("it breaks off within a variable")
+    io::Error::other("it ends within a variable")
 }

@@ -170,7 +170,7 @@ impl McapFileState {
                 let log = fields.u64()?;
                 fields.take(8)?;
                 let Some(topic) = self.channels.get(&channel) else {
-                    return Err(format_fault("a message in it is of no channel"));
+                    return Err(format_fault("a message in it has no channel"));
                 };
                 bag.take_message(*topic, log.cast_signed(), fields.0)?;
             }
@@ -189,7 +189,7 @@ impl McapFileState {
                     "lz4" => Some(CompressionMethod::Lz4),
                     other => {
                         return Err(format_fault(format!(
-                            "a chunk in it is packed by `{other}`, which is not read"
+                            "a chunk in it is compressed by `{other}`, which is not supported"
                         )));
                     }
                 };
@@ -224,9 +224,7 @@ impl McapFileState {
             let mut crc = flate2::Crc::new();
             crc.update(bytes);
             if crc.sum() != sum {
-                return Err(format_fault(
-                    "the sum over a chunk is not the one that it says",
-                ));
+                return Err(format_fault("the checksum of a chunk is wrong"));
             }
         }
         let mut records = McapFieldReader(bytes);
@@ -248,7 +246,7 @@ struct McapFieldReader<'a>(&'a [u8]);
 impl<'a> McapFieldReader<'a> {
     fn take(&mut self, n: usize) -> Result<&'a [u8], RecordingFault> {
         let Some((taken, rest)) = self.0.split_at_checked(n) else {
-            return Err(format_fault("a record in it is shorter than what it holds"));
+            return Err(format_fault("a record in it is shorter than its contents"));
         };
         self.0 = rest;
         Ok(taken)
@@ -288,7 +286,7 @@ fn format_fault(says: impl Into<String>) -> RecordingFault {
 fn unreadable_fault(error: &io::Error) -> RecordingFault {
     if error.kind() == io::ErrorKind::UnexpectedEof {
         return format_fault(
-            "it ends before its data do; copy it again, or mend it with `mcap recover`",
+            "it ends before the end of its data; copy it again, or repair it with `mcap recover`",
         );
     }
     format_fault(format!("it cannot be read: {error}"))

@@ -130,7 +130,7 @@ pub(crate) fn read_all(stream: impl Read) -> Result<Vec<u8>, RecordingFault> {
     read.map_err(|error| unreadable(error.to_string()))?;
     if bytes.len() as u64 > LONGEST_STREAM {
         return Err(unreadable(format!(
-            "it holds more than {LONGEST_STREAM} bytes"
+            "it has more than {LONGEST_STREAM} bytes"
         )));
     }
     Ok(bytes)

@@ -26,7 +26,7 @@ const MOST_GROWTH: u64 = 200;
 pub(super) fn check_growth(packed: u64, unpacked: u64) -> io::Result<()> {
     if unpacked > UNCHECKED_GROWTH.max(MOST_GROWTH.saturating_mul(packed)) {
         return Err(io::Error::other(
-            "it unpacks to more than two hundred times its size, as no recording does",
+            "it decompresses to more than two hundred times its size, as no recording does",
         ));
     }
     Ok(())
@@ -59,17 +59,19 @@ impl CompressionMethod {
             .take(most.saturating_add(1))
             .read_to_end(&mut bytes)?;
         if bytes.len() as u64 > most {
-            return Err(io::Error::other("it unpacks to more than the file says"));
+            return Err(io::Error::other(
+                "it decompresses to more than the file declares",
+            ));
         }
         Ok(bytes)
     }
 
     fn name(self) -> &'static str {
         match self {
-            Self::Gzip => "a file packed by gzip",
-            Self::Zstd => "a file packed by zstd",
-            Self::Brotli => "a file packed by brotli",
-            Self::Lz4 => "a file packed by lz4",
+            Self::Gzip => "a file compressed by gzip",
+            Self::Zstd => "a file compressed by zstd",
+            Self::Brotli => "a file compressed by brotli",
+            Self::Lz4 => "a file compressed by lz4",
         }
     }
 }
@@ -115,9 +117,7 @@ impl<R: Read> ZstdReader<R> {
     fn check_sum(&self) -> io::Result<()> {
         let said = self.decoder.get_checksum_from_data();
         if said.is_some() && said != self.decoder.get_calculated_checksum() {
-            return Err(io::Error::other(
-                "a sum over its bytes is not the one it says",
-            ));
+            return Err(io::Error::other("its checksum is wrong"));
         }
         Ok(())
     }
@@ -194,7 +194,7 @@ impl CompressedFormat {
     fn decompression_fault(&self, reason: &str) -> RecordingFault {
         RecordingFault::Format {
             format: self.0.name(),
-            message: format!("it cannot be unpacked: {reason}; is it complete?"),
+            message: format!("it cannot be decompressed: {reason}; is it complete?"),
         }
     }
 
@@ -221,7 +221,7 @@ impl CompressedFormat {
         if format.is_compressed() {
             return Err(RecordingFault::Format {
                 format: self.0.name(),
-                message: "what is in it is packed again; unpack it once".to_owned(),
+                message: "its content is compressed again; decompress it once".to_owned(),
             });
         }
         Ok((

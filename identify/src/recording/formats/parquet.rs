@@ -101,7 +101,7 @@ fn read(
     for (i, kind) in kinds.iter().enumerate() {
         if intake.is_place_needed(i) && matches!(kind, ParquetValueKind::Ticks { .. }) {
             intake.note(RecordingNote::info(format!(
-                "`{}` of {file} holds time stamps: it counts in seconds from the first one on.",
+                "`{}` of {file} has time stamps: it is read as seconds since the first one.",
                 schema.column(i).path().string()
             )));
         }

@@ -93,10 +93,12 @@ fn replay_messages(
     let columns = ["topic_id", "timestamp", "data"];
     let has_messages = database.visit_rows("messages", &columns, &mut |row| {
         let [topic, SqliteValue::Integer(time), SqliteValue::Bytes(bytes)] = &row[..] else {
-            return Err(io::Error::other("a message in it is none"));
+            return Err(io::Error::other(
+                "a row of `messages` in it is not a message",
+            ));
         };
         let Some(topic) = topic.as_integer().and_then(|id| topics.get(&id)) else {
-            return Err(io::Error::other("a message in it is of no topic"));
+            return Err(io::Error::other("a message in it has no topic"));
         };
         let unpacked;
         let bytes = if bytes.starts_with(&ZSTD) {
@@ -115,7 +117,7 @@ fn replay_messages(
     }
     if !has_messages.map_err(|error| unreadable_fault(&error))? || !has_topics {
         return Err(format_fault(
-            "it has no tables `topics` and `messages`, so it is no log of a robot",
+            "it has no tables `topics` and `messages`, so it is not a robot log",
         ));
     }
     Ok(())

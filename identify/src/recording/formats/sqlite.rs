@@ -76,7 +76,7 @@ impl<R: Read + Seek> SqliteDatabase<R> {
         };
         let reserved = usize::from(head[20]);
         if !head.starts_with(MAGIC) || !page_size.is_power_of_two() || page_size < reserved + 480 {
-            return Err(io::Error::other("its header makes no sense"));
+            return Err(io::Error::other("its header is not valid"));
         }
         if head[56..60] != [0, 0, 0, 1] && head[56..60] != [0; 4] {
             return Err(io::Error::other("its texts are not UTF-8"));
@@ -182,7 +182,7 @@ impl<R: Read + Seek> SqliteDatabase<R> {
         let pointers = match kind {
             LEAF => start + 8,
             BRANCH => start + 12,
-            _ => return Err(io::Error::other("a page of it is no table")),
+            _ => return Err(io::Error::other("a page of it is not part of a table")),
         };
         for i in 0..cells {
             let at = usize::from(read_u16(&page, pointers + 2 * i)?);

@@ -152,7 +152,7 @@ impl RosDefinitionParser<'_> {
             return Ok(done.clone());
         }
         if depth > DEEPEST {
-            return Err(format!("`{name}` holds itself"));
+            return Err(format!("`{name}` contains itself"));
         }
         let Some(lines) = self.texts.get(name).cloned() else {
             return match well_known_definition(name) {
@@ -223,7 +223,9 @@ impl RosDefinitionParser<'_> {
         match (bare, self.ros) {
             ("string", _) => return Ok(RosFieldType::Text),
             ("wstring", _) => {
-                return Err(format!("`{within}` holds a `wstring`, which is not read"));
+                return Err(format!(
+                    "`{within}` contains a `wstring`, which is not supported"
+                ));
             }
             ("time", RosVersion::One) => return Ok(RosFieldType::Time { is_signed: false }),
             ("duration", RosVersion::One) => return Ok(RosFieldType::Time { is_signed: true }),

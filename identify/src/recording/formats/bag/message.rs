@@ -271,7 +271,7 @@ impl<'a> RosByteReader<'a> {
             (RosVersion::Two, [0, form @ (6 | 7), _, _, bytes @ ..]) => (bytes, *form == 6, 4),
             (RosVersion::Two, [a, b, ..]) => {
                 return Err(format!(
-                    "it is encoded in the form {a:02x}{b:02x} of CDR, which is not read"
+                    "it is encoded in the form {a:02x}{b:02x} of CDR, which is not supported"
                 ));
             }
             (RosVersion::Two, _) => {
@@ -291,7 +291,7 @@ impl<'a> RosByteReader<'a> {
     fn take(&mut self, n: usize) -> Result<&'a [u8], String> {
         let end = self.at.checked_add(n).filter(|end| *end <= self.all.len());
         let Some(end) = end else {
-            return Err("it is shorter than its type says".to_owned());
+            return Err("it is shorter than its type requires".to_owned());
         };
         let taken = &self.all[self.at..end];
         self.at = end;

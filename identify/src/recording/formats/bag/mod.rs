@@ -127,11 +127,11 @@ impl<'a> BagCollector<'a> {
         let ros = match (encoding.messages, encoding.definition) {
             ("cdr", "ros2msg" | "") => Ok(RosVersion::Two),
             ("ros1", "ros1msg") => Ok(RosVersion::One),
-            ("cdr" | "ros1", other) => {
-                Err(format!("its definition is `{other}`, which is not read"))
-            }
+            ("cdr" | "ros1", other) => Err(format!(
+                "its definition is `{other}`, which is not supported"
+            )),
             (other, _) => Err(format!(
-                "its messages are encoded as `{other}`, which is not read"
+                "its messages are encoded as `{other}`, which is not supported"
             )),
         };
         let reader = ros.and_then(|ros| {
@@ -232,7 +232,7 @@ impl BagTopic {
         let reader = self.reader.as_ref().map_err(Clone::clone)?;
         let columns = reader.columns(bytes)?;
         if columns.len() != content.numbers.len() {
-            return Err("its columns cannot be told".to_owned());
+            return Err("its columns cannot be determined".to_owned());
         }
         let mut places = Vec::with_capacity(columns.len());
         for (name, kind) in columns {
@@ -368,7 +368,7 @@ pub(super) fn read(
         .collect();
     if !late.is_empty() {
         intake.note(RecordingNote::info(format!(
-            "Messages of {} in {file} bear no time of their own: the time is that of their arrival.",
+            "Messages of {} in {file} have no time of their own: their time is that of arrival.",
             backquoted_list(&late)
         )));
     }
@@ -424,7 +424,7 @@ pub(super) fn tables(show: BagReplay<'_>) -> Result<Vec<TableInfo>, RecordingFau
         };
         if let Err(says) = &topic.reader {
             found.push(TableInfo {
-                remark: Some(format!("left aside: {says}")),
+                remark: Some(format!("skipped: {says}")),
                 ..bare
             });
             continue;
@@ -437,7 +437,7 @@ pub(super) fn tables(show: BagReplay<'_>) -> Result<Vec<TableInfo>, RecordingFau
                 "no numbers"
             };
             found.push(TableInfo {
-                remark: Some(format!("it holds {holds}")),
+                remark: Some(format!("it contains {holds}")),
                 ..bare
             });
             continue;
