@@ -81,8 +81,8 @@ impl SignalRecording {
             format!("{noise:.2e} of `{}{derivative}`", column.name)
         });
         message!(
-            "Derivatives of {} in {} are those of a Fourier series of period {} s with {}, since it leaves nothing but \
-             white noise: {} (RMS); {} filters instead.",
+            "Derivatives of {} in {} are those of a Fourier series of period {} s with {}, because its residual is \
+             white noise: {} (RMS). Use {} to filter instead.",
             backquoted_list(&names),
             self.file(),
             seven_digits(found.period),
@@ -105,8 +105,8 @@ impl SignalRecording {
             let left: f64 = column.q.iter().zip(q).map(|(a, b)| (a - b).powi(2)).sum();
             if left > MAX_SERIES_RESIDUAL.powi(2) * size {
                 notes.push(RecordingNote::warning(format!(
-                    "The Fourier series leaves {:.1} % of the motion of `{}` in {} (RMS): it has another period, or none; \
-                     take another smoothing.",
+                    "The residual of the Fourier series is {:.1} % of the motion of `{}` in {} (RMS). The motion has another period, \
+                     or none: choose another smoothing.",
                     100.0 * (left / size).sqrt(),
                     column.name,
                     self.file()
@@ -151,8 +151,8 @@ impl SignalRecording {
         }
         if !found.is_empty() {
             run.notes.push(RecordingNote::warning(format!(
-                "Positions in {} come in steps of the encoder: {}; in brackets the noise that they leave of the accelerations. \
-                 It makes inertias too small and hides weak effects; a motion that repeats itself, or a finer encoder, helps.",
+                "Positions in {} are quantised in steps of the encoder: {}. The number in brackets is their noise as a share of the \
+                 accelerations. It makes inertias too small and hides weak effects; record a periodic motion, or use a finer encoder.",
                 self.file(),
                 found.join(", ")
             )));
@@ -169,7 +169,7 @@ impl SignalRecording {
                 });
             if q.len() > 1 && high <= low {
                 run.notes.push(RecordingNote::warning(format!(
-                    "`{name}` does not move in {}: what depends on its motion cannot be identified.",
+                    "`{name}` does not move in {}: parameters that depend on its motion cannot be identified.",
                     self.file()
                 )));
             }

@@ -153,7 +153,7 @@ impl SignalRecording {
         let places = breaks.filter_map(|stretch| stretch.line(stretch.samples() - 1));
         let mut says = format!(
             "{} has {} in time of more than {GAP} usual steps that {} too long for this motion to be bridged, the first after \
-             line {}: the {} stretches are filtered and differentiated each on its own.",
+             line {}: the {} segments are filtered and differentiated separately.",
             self.file(),
             count_of(stretches.len() - 1, "gap", "gaps"),
             if stretches.len() == 2 { "is" } else { "are" },
@@ -219,7 +219,7 @@ impl SignalRecording {
             Some(columns?)
         } else {
             notes.push(RecordingNote::info(format!(
-                "{} holds no measured force of {}.",
+                "{} has no column for the force of {}.",
                 self.file(),
                 backquoted_list(&missing_force)
             )));
@@ -334,8 +334,8 @@ impl SignalRecording {
             MISSING_SAMPLE_STEP * median
         };
         let gaps = many(&|step| step > longer);
-        let how = "Where anything is filtered, positions are put on even times by the spline through them at their true \
-                   times, and states are read off at these again.";
+        let how = "Before anything is filtered, positions are interpolated to even times by a spline, and states are \
+                   interpolated back to the recorded times.";
         notes.push(if gaps > 0 {
             let lost = steps.iter().filter(|step| **step > longer);
             let lost = lost.map(|step| (step / median).round() - 1.0);
@@ -367,7 +367,7 @@ impl SignalRecording {
                 have,
                 need: start.saturating_add(end).saturating_add(1),
                 purpose: if run.prepared.trim_asked_for {
-                    message!("dropping as many at both ends as {} asks for", trim)
+                    message!("dropping as many at both ends as {} requests", trim)
                 } else {
                     "dropping the filter's transients at both ends".into()
                 },
@@ -401,7 +401,7 @@ impl SignalRecording {
             "The first {start} and the last {end} of {have} samples of {} are dropped ({}).",
             self.file(),
             if run.prepared.trim_asked_for {
-                message!("as asked for by {}", trim)
+                message!("as requested by {}", trim)
             } else {
                 "transients of the filter".into()
             }

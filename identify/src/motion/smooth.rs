@@ -133,7 +133,7 @@ impl SmoothingFilter {
                 "Butterworth of order {order} at {cutoff:.4} Hz{chosen}, zero phase, then central differences"
             ),
             Self::Polynomials { half_width } => format!(
-                "polynomials of degree {} over {} samples each (Savitzky-Golay), which suits a cut-off of \
+                "polynomials of degree {} over {} samples each (Savitzky-Golay), which corresponds to a cut-off of \
                  {cutoff:.4} Hz{chosen}",
                 local_polynomials::DEGREE,
                 2 * half_width + 1

@@ -56,19 +56,19 @@ impl fmt::Display for FilterError {
         match self {
             Self::CutoffOutOfRange { cutoff_hz, rate_hz } => write!(
                 f,
-                "a cut-off of {cutoff_hz} Hz was asked for, but the recording has {rate_hz:.6} samples per second; \
+                "a cut-off of {cutoff_hz} Hz was requested, but the recording has {rate_hz:.6} samples per second; \
                  choose a cut-off above 0 and below {:.6} Hz",
                 rate_hz / 2.0
             ),
             Self::OrderOutOfRange { order } => {
                 write!(
                     f,
-                    "a filter of order {order} was asked for; choose an order from 1 to {MAX_FILTER_ORDER} (4 is usual)"
+                    "a filter of order {order} was requested; choose an order from 1 to {MAX_FILTER_ORDER} (4 is usual)"
                 )
             }
             Self::FactorOutOfRange { factor } => write!(
                 f,
-                "decimation by {factor} was asked for; choose 1 (none) or a factor well below the number of samples"
+                "decimation by {factor} was requested; choose 1 (none) or a factor well below the number of samples"
             ),
             Self::TooShort { have, need } => write!(
                 f,
