@@ -34,7 +34,7 @@ enum RecordingSource {
 }
 
 impl RecordingFile {
-    /// Opens a recording. Fails when it cannot be read, or when a pipe has more bytes than [`LONGEST_STREAM`].
+    /// Opens a recording. Fails when it cannot be read, or when a pipe has more bytes than `LONGEST_STREAM`.
     pub fn open(files: &dyn FileSource, path: &Path) -> Result<Self, RecordingError> {
         let name = path.display().to_string();
         let fail = |reason: String| RecordingError {
