@@ -239,7 +239,7 @@ fn what_never_ends_has_an_end() {
     let output = child.wait_with_output().expect("an end");
     assert_eq!(output.status.code(), Some(1));
     assert!(
-        says(&output).contains("holds more than"),
+        says(&output).contains("has more than"),
         "{}",
         says(&output)
     );
