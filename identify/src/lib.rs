@@ -4,18 +4,17 @@
 //! The crate works on numbers only and does not know how a regressor is derived. The pipeline:
 //!
 //! 1. [`SignalRecording::read`] - CSV, Parquet, MATLAB, HDF5, MCAP or rosbag2 into named columns; every fault has its
-//! line and its remedy.
+//!    line and its remedy.
 //! 2. [`SignalRecording::runs_with`] - coordinates with derivatives and forces, as a [`PreparedRun`] for each segment
-//! between gaps in time;
-//!    the caller evaluates its regressor along it, rows interleaved per sample (`row = sample * n_channels + channel`), and
-//!    applies [`decimate_table`] to regressor and force if the run requires it.
+//!    between gaps in time. The caller evaluates its regressor along it, rows interleaved per sample
+//!    (`row = sample * n_channels + channel`), and applies [`decimate_table`] to regressor and force if the run
+//!    requires it.
 //! 3. [`SignalRecording::suspicious_columns`], [`SignalRecording::position_faults`] and [`ForceAudit`] - what is
-//! likely wrong with them.
-//! 4. [`estimate`] - eq. (12) from a stream of rows ([`LeastSquares`]), weighted, robust, with instruments or nominal
-//! values,
-//!    and the uncertainty of the result.
+//!    likely wrong with them.
+//! 4. [`estimate`] - eq. (12) from a stream of rows ([`LeastSquares`]), weighted, robust, with
+//!    instruments or nominal values, and the uncertainty of the result.
 //! 5. [`ErrorAccumulator`] and [`locate_errors`] - size and place of the model error; [`FitFile`] - the result as a
-//! file.
+//!    file.
 //!
 //! In addition, [`diagnose`] finds the effects that the model lacks, [`excite`] plans the motion that determines the
 //! base parameters best within limits, and [`interpret`] computes physical parameters from identified base

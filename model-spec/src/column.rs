@@ -1,6 +1,7 @@
-//! Columns of recordings as a model file or a command line describes them. The text `"q_meas_m"`, `"qm5/45"`, `"(qm6
-//! - qm5)/32 - pi/2"` or `"pos1 [deg]"` and the column names of a recording go in. An affine sum of its columns in SI
-//! units comes out.
+//! Columns of recordings as a model file or a command line describes them.
+//!
+//! A text such as `"q_meas_m"`, `"qm5/45"`, `"(qm6 - qm5)/32 - pi/2"` or `"pos1 [deg]"` and the column names of a
+//! recording go in. An affine sum of its columns in SI units comes out.
 //!
 //! A text that equals the name of a column is that column, even if it could also be an expression.
 //!

@@ -39,8 +39,8 @@ words! {
     /// generalised force is `du'(Jr u'' + Sr (a'' - g)) + da'(Sr u'' + mr (a'' - g))` (d'Alembert).
     "rod" => Rod,
     /// A passive element along the line between two points. The terms are a constant pull (N), a pull proportional to
-    /// the distance `l` of the points (N/m), and one proportional to its rate (N s/m). The generalised force is `(F0
-    /// + k l + Fv l') dl/dq`.
+    /// the distance `l` of the points (N/m), and one proportional to its rate (N s/m).
+    /// The generalised force is `(F0 + k l + Fv l') dl/dq`.
     "strut" => Strut,
     /// Corrects lumped masses: their moments are taken at the point of their forces.
     "placement" => Placement,
