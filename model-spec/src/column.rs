@@ -536,7 +536,10 @@ mod tests {
         assert!(says("qm5/0").contains("zero") || says("qm5/0").contains("finite"));
         assert!(says("qm5 - qm5 + 1").contains("no column"));
         assert!(says("qm5 +").contains("neither the name of a column nor an expression"));
-        assert!(says("qm5 [mm]").contains("`mm` does not fit this quantity; expected one of `rad`, `deg`"));
+        assert!(
+            says("qm5 [mm]")
+                .contains("`mm` does not fit this quantity; expected one of `rad`, `deg`")
+        );
     }
 
     #[test]
