@@ -4,7 +4,7 @@
 //! end of a file without effects. An inline list of effects gets one more entry.
 //!
 //! Decision: an edit inserts text at one place, which is found from the spans of the parsed file. A parser that
-//! prints the whole document would change line ends and layout. The diagnosis and `add` use the same edit.
+//! prints the complete document would change line ends and layout. The diagnosis and `add` use the same edit.
 
 use std::collections::BTreeSet;
 use std::fmt;

@@ -93,9 +93,9 @@ words! {
     "point" => Point,
     /// A part.
     "part" => Part,
-    /// The base as a whole, named `base`.
+    /// The complete base, named `base`.
     "base" => Base,
-    /// The measured forces as a whole, named `force`.
+    /// All measured forces, named `force`.
     "force" => Force,
 }
 

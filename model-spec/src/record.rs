@@ -19,7 +19,7 @@ const MOST_ENTRIES: usize = 1000;
 /// A type of the schema.
 /// Reading never stops at the first fault: faults go to the log, so that one run reports all of them.
 pub(crate) trait SchemaValue: Sized {
-    /// What a place of this type holds, for messages: `a string`.
+    /// What a place of this type must contain, for messages: `a string`.
     const EXPECTED: &'static str;
     /// An example of it as TOML.
     const EXAMPLE: &'static str;
@@ -69,7 +69,7 @@ macro_rules! record {
             /// The keys of the table.
             pub(crate) const KEYS: &'static [&'static str] = &[$($key),*];
 
-            /// Reads a table; every fault is reported, and what is sound comes back.
+            /// Reads a table; every fault is reported, and the fields without faults are returned.
             pub(crate) fn from_table(
                 table: &$crate::document::TomlTable,
                 span: $crate::diagnostic::SourceSpan,

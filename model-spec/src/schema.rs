@@ -166,8 +166,8 @@ record! {
         /// Six coordinates of a free body: its position along x, y and z, then three angles as those of a spherical
         /// joint; or seven, its position and a unit quaternion, of a free body, which needs no drives.
         "free" free: optional EntryList<SourceFormula>,
-        /// Order of the quaternion of a free body with seven coordinates: `xyzw` or `wxyz`. It turns the body's axes into those
-        /// of the base.
+        /// Order of the quaternion of a free body with seven coordinates: `xyzw` or `wxyz`. It transforms components in
+        /// the axes of the body into components in the axes of the base.
         "quaternion" quaternion: optional QuaternionOrder,
         /// Axes of its velocity, angular velocity, force and moment: `body`, `world`, or `mixed` for velocity and force in
         /// those of the base, angular velocity and moment in those of the body.

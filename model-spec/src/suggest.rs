@@ -27,7 +27,7 @@ pub(crate) fn nearest<'a>(
         .map(|(_, candidate)| candidate)
 }
 
-/// `did you mean ...?` for the nearest candidate, or the whole list if it is short.
+/// `did you mean ...?` for the nearest candidate, or the complete list if it is short.
 /// `what` names the sort of candidates in the plural. At most 16 of them are listed.
 pub(crate) fn advice<'a>(
     name: &str,

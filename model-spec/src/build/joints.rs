@@ -399,7 +399,7 @@ impl Builder<'_> {
             self.log.push(
                 Diagnostic::error(span, "these are not the axes of this joint")
                     .label(format!(
-                        "expected {} of the letters x, y and z, no two neighbours alike",
+                        "expected {} of the letters x, y and z, no two neighbours equal",
                         angles.len()
                     ))
                     .help(format!("for example `axes = \"{usual}\"`")),

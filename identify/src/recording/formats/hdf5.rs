@@ -130,7 +130,7 @@ fn read(
     // The numbers exist twice until all samples are taken.
     if read.len().saturating_mul(columns.samples) > options.max_numbers / 2 {
         return Err(format_fault(
-            "it is too large to be read completely; save it as CSV or Parquet, of which parts can be read",
+            "it is too large to be read completely; save it as CSV or Parquet, which can be read in parts",
         ));
     }
     // The numbers of each needed column; the others stay empty.

@@ -118,7 +118,7 @@ fn read(
         .sum();
     if numbers > options.max_numbers / 2 {
         return Err(format_fault(
-            "it is too large to be read completely; save it as CSV or Parquet, of which parts can be read",
+            "it is too large to be read completely; save it as CSV or Parquet, which can be read in parts",
         ));
     }
     // The numbers of each needed array; the others stay empty.

@@ -58,7 +58,7 @@ pub(super) fn largest_page(stream: impl Read, length: u64, growth: PageGrowth) -
             let inside = page.unpacked.saturating_sub(page.levels);
             let mut all = MultiGzDecoder::new(&mut body).take(inside + 1);
             if io::copy(&mut all, &mut io::sink())? > inside {
-                return Err(io::Error::other("a page is larger than its header says"));
+                return Err(io::Error::other("a page is larger than its header states"));
             }
         }
         // Skip to the next header.

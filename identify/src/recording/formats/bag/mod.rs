@@ -201,7 +201,7 @@ impl<'a> BagCollector<'a> {
             .and_then(|()| topic.layout_of_message(bytes, &self.content, self.is_kept));
         let layout = match layout {
             Ok(layout) => layout,
-            // If the first message fails, the topic is skipped as a whole.
+            // If the first message fails, the complete topic is skipped.
             Err(says) if topic.count == 1 => {
                 topic.reader = Err(format!("its first message cannot be read: {says}"));
                 return Ok(());
