@@ -25,10 +25,13 @@ impl<const P: u64> RowEchelonForm<P> {
 
     /// Takes a row; tells whether it says anything new.
     pub fn insert(&mut self, mut row: Vec<FieldElement<P>>) -> bool {
-        for (pivot, known) in self.pivots.iter().zip(&self.rows) {
-            let factor = -row[*pivot];
-            add_multiple(&mut row, factor, known);
-        }
+        // No known row has anything in the pivot column of another one, so that all factors are known at once.
+        let known = self.pivots.iter().zip(&self.rows);
+        let multiples: Vec<(FieldElement<P>, &[FieldElement<P>])> = known
+            .map(|(pivot, known)| (-row[*pivot], known.as_slice()))
+            .filter(|(factor, _)| *factor != FieldElement::ZERO)
+            .collect();
+        FieldElement::add_multiples(&mut row, &multiples);
         let Some(pivot) = self
             .order
             .iter()
@@ -74,7 +77,7 @@ fn add_multiple<const P: u64>(
     }
     for (x, y) in row.iter_mut().zip(other) {
         if *y != FieldElement::ZERO {
-            *x = *x + factor * *y;
+            *x = x.plus_product(factor, *y);
         }
     }
 }

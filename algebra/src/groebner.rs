@@ -180,7 +180,7 @@ pub fn has_no_solution(basis: &[Polynomial]) -> bool {
 }
 
 /// The terms that no leading term divides, by ascending order; `None` where they never end, because solutions form
-/// curves or surfaces. At most `most` of them, else [`TooHard`].
+/// curves or surfaces. At most `most` of them, else [`GroebnerLimitExceeded`].
 pub fn standard_terms(
     basis: &[Polynomial],
     n: usize,

@@ -76,6 +76,7 @@ fn run(host: &Host, command: &ProgramCommand) -> CommandOutcome {
         ProgramCommand::Runs(args) => commands::runs::run(host, args),
         ProgramCommand::Interpret(args) => commands::interpret::run(host, args),
         ProgramCommand::Excite(args) => commands::excite::run(host, args),
+        #[cfg(feature = "experiment")]
         ProgramCommand::Experiment(args) => commands::experiment::run(host, args),
         ProgramCommand::Completions(args) => commands::completions::run(args),
         ProgramCommand::Work(args) => commands::work::run(host, args),

@@ -1,37 +1,34 @@
-//! From a mechanism to its base parameters and fast code: the mill itself.
-//!
-//! Decision: this crate reads the validated `Mechanism` of `modelmill-spec` and no TOML. A second tree of types
-//! with the same content would only be copied.
+//! Derivation: from a mechanism to its base parameters, equations and straight-line programs. `modelmill-emit` writes code of them.
 
 mod derive;
-mod emit;
 mod error;
 mod evaluate;
 pub mod expr;
 mod loops;
 mod lower;
+pub mod names;
 mod newton_euler;
 mod on_request;
 mod programs;
 mod reduce;
 mod regressor;
+#[cfg(any(test, feature = "review"))]
 pub mod review;
 mod tree;
 
 pub use derive::base::BaseParameterEntry;
-pub use derive::{Derivation, derive_columns};
-pub use emit::{
-    EmissionRequest, EmittedFile, EmittedModule, LANGUAGES, OutputForm, OutputLanguage, emit,
-    emit_with_dynamics, module_name, vectors_c,
-};
+pub use derive::{BaseFormulas, Derivation, derive_columns};
 pub use error::DeriveError;
 pub use evaluate::{ModelEvaluator, MotionStates, PoseFault, PoseReason};
-pub use lower::{OperationCount, PoseGuard, ProgramOp, ProgramStage, StraightLineProgram, ValueId};
+pub use lower::{
+    OperationCount, PoseGuard, ProgramOp, ProgramStage, SINGULAR, StraightLineProgram, ValueId,
+};
 pub use modelmill_algebra::field;
 pub use on_request::dynamics::DynamicsPrograms;
 pub use on_request::passes::PassCount;
 pub use on_request::reactions::{JointReaction, LoopReaction, ReactionPrograms};
 pub use programs::{LoopPrograms, ModelPrograms, PassivePosition};
+pub use reduce::base::BaseDenominator;
 pub use reduce::{
     BaseReduction, ColumnDependency, FactorVariable, PowerProduct, RationalFunction,
     ReductionMethod, TrigonometricPolynomial,

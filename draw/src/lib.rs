@@ -1,7 +1,7 @@
 //! Pictures of mechanisms.
 //!
-//! A [`Mechanism`](modelmill_spec::Mechanism) and the values of its coordinates become a [`Scene`]: what stands where, in
-//! metres. A [`View`] looks at it, flat where all motion is in one plane, else from a direction that can be chosen, and
+//! A [`Mechanism`](modelmill_spec::Mechanism) and the values of its coordinates become a [`MechanismScene`]: what stands where, in
+//! metres. A [`ViewDirection`] looks at it, flat where all motion is in one plane, else from a direction that can be chosen, and
 //! [`svg`] draws it. [`page`] is what all pages with pictures have in common. Nothing here knows of dynamics.
 //!
 //! ```

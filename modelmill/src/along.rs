@@ -32,7 +32,7 @@ pub fn measured_forces(data: &RecordingSegment) -> Outcome<Vec<Vec<f64>>> {
     filter_and_decimate(data.run.measured_forces()?.to_vec(), data)
 }
 
-/// The measured forces without those that do not count, `[drive][sample]`, decimated; [`crate::stretch::Stretch`] leaves the same
+/// The measured forces without those that do not count, `[drive][sample]`, decimated; [`crate::stretch::RecordingSegment`] leaves the same
 /// rows of a regressor empty, so that both sides of each equation stay alike whatever filter they pass.
 pub fn included_forces(data: &RecordingSegment) -> Outcome<Vec<Vec<f64>>> {
     let mut forces = data.run.measured_forces()?.to_vec();

@@ -2,16 +2,16 @@
 
 use std::fmt;
 
-use modelmill_codegen::{EmissionRequest, LANGUAGES, OutputForm};
+use modelmill_emit::{EmissionRequest, LANGUAGES, OutputForm};
 
 use crate::error::{Error, Outcome};
 use crate::model::Model;
 
-pub use modelmill_codegen::{EmittedFile, OutputForm as LanguageForm};
+pub use modelmill_emit::{EmittedFile, OutputForm as LanguageForm};
 
 /// A language that models are emitted for: an entry of [`Self::all`], the first of which is the default.
 #[derive(Clone, Copy)]
-pub struct CodeLanguage(&'static dyn modelmill_codegen::OutputLanguage);
+pub struct CodeLanguage(&'static dyn modelmill_emit::OutputLanguage);
 
 impl CodeLanguage {
     /// All languages.

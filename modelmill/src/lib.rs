@@ -34,10 +34,10 @@
 //! | verb | what it does |
 //! |---|---|
 //! | [`Model::check`] | what the model consists of, and its numeric rank beside the exact one |
-//! | [`model::Changes::between`] | what a variant changes |
-//! | [`variants::Variants::along`] | what it costs along recordings: forces, power, work, limits, error |
+//! | [`model::ModelChanges::between`] | what a variant changes |
+//! | [`variants::VariantComparison::along`] | what it costs along recordings: forces, power, work, limits, error |
 //! | [`Host::kinds`] | the kinds of effects that a model may have |
-//! | [`Model::with`] | the model with effects added to its file |
+//! | [`Model::with_added_effects`] | the model with effects added to its file |
 //! | [`Model::picture`] | the mechanism at a pose, as SVG |
 //! | [`Model::equations`] | p_g, dependences, p_min and programs as a page |
 //! | [`Model::generate`] | code |
@@ -151,8 +151,8 @@
 //!
 //! # Progress, cancellation, remarks
 //!
-//! A [`progress::Progress`] of the host hears which job goes on and how far it is, may stop it ([`Error::Cancelled`]), and hears
-//! remarks as they come up. Results hold these remarks too, as [`Note`]s.
+//! A [`progress::ProgressListener`] of the host hears which job goes on and how far it is, may stop it ([`Error::Cancelled`]), and hears
+//! remarks as they come up. Results hold these remarks too, as [`RecordingNote`]s.
 //!
 //! # Layout
 //!

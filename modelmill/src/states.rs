@@ -6,8 +6,8 @@ use std::sync::OnceLock;
 
 use modelmill_codegen::{
     DynamicsPrograms, ModelEvaluator, MotionStates, PoseFault, PoseReason, ReactionPrograms,
-    vectors_c,
 };
+use modelmill_emit::vectors_c;
 use rayon::prelude::*;
 
 use crate::error::{Error, Outcome};
@@ -76,7 +76,7 @@ pub enum ModelFunction {
     /// Accelerations of the active coordinates under given forces of the drives.
     ForwardDynamics,
     /// What joints and the cuts of loops transmit, for the parameters of the model file: the components that
-    /// [`Functions::reactions`] names.
+    /// [`ModelFunctions::reactions`] names.
     Reactions,
 }
 
@@ -118,7 +118,7 @@ struct FunctionPrograms<'a> {
 }
 
 impl ModelFunctions {
-    /// Names of the components that [`Function::Reactions`] gives, such as `elbow.Fx`, and of those that equations of motion do
+    /// Names of the components that [`ModelFunction::Reactions`] gives, such as `elbow.Fx`, and of those that equations of motion do
     /// not determine.
     ///
     /// Fails when reactions cannot be derived.

@@ -12,9 +12,9 @@ use crate::results::{PythonResult, RemarkList};
 use crate::work::run_interruptible;
 
 /// What the sensors of a rig read.
-#[pyclass(frozen)]
+#[pyclass(frozen, name = "Simulation")]
 pub(crate) struct PythonSimulation {
-    made: modelmill::simulate::Simulated,
+    made: modelmill::simulate::RigSimulation,
 }
 
 #[pymethods]

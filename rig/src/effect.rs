@@ -283,7 +283,7 @@ impl RigLaw {
         })
     }
 
-    /// The law of a kind with the values of [`Law::values`] in their order; `None` for an unknown kind or another
+    /// The law of a kind with the values of [`RigLaw::values`] in their order; `None` for an unknown kind or another
     /// number of values.
     pub(crate) fn new(kind: &str, values: &[f64]) -> Option<Self> {
         Some(match (kind, values) {

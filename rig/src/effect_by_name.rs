@@ -1,4 +1,4 @@
-//! Effects from names: kind, places and values as rig files and programs write them go in, a checked [`Effect`]
+//! Effects from names: kind, places and values as rig files and programs write them go in, a checked [`RigEffect`]
 //! or every fault comes out, each with what was expected and what to do.
 
 use crate::effect::{RigEffect, RigLaw, RigPlace, ValueSign};
@@ -97,7 +97,7 @@ impl AllowedPlaces {
 }
 
 impl Rig {
-    /// An effect of this rig by names: a kind ([`Law::KINDS`]), its places, its values by symbol.
+    /// An effect of this rig by names: a kind ([`RigLaw::KINDS`]), its places, its values by symbol.
     ///
     /// Places are drives, coordinates, joints, points, `base` or `force`, as the kind has it. The effect acts once
     /// it is pushed to [`Rig::effects`]. Fails with every fault of the description.

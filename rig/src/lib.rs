@@ -6,11 +6,11 @@
 //!
 //! 1. [`load_file`] - a rig file, checked;
 //! 2. [`Trajectory`] - coordinates over time;
-//! 3. [`Tracker`] - poses, rates and accelerations of all bodies, redundant loops included;
+//! 3. [`RigTracker`] - poses, rates and accelerations of all bodies, redundant loops included;
 //! 4. [`forces`] - what the drives must supply, with all effects;
 //! 5. [`simulate`] - the readings of the sensors.
 //!
-//! A [`Plant`] is the way back: forces of the drives go in, motion comes out, for controllers.
+//! A [`RigPlant`] is the way back: forces of the drives go in, motion comes out, for controllers.
 #![allow(
     non_snake_case,
     reason = "physical quantities carry their frames, as in p_WB_W"

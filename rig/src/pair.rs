@@ -46,7 +46,7 @@ pub struct PairFunction {
     pub(crate) shape: PairQuantity,
 }
 
-/// Value and derivatives of a [`Pair`]: `second derivative = gradient . accelerations + bias`.
+/// Value and derivatives of a [`PairFunction`]: `second derivative = gradient . accelerations + bias`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct PairDerivatives {
     pub(crate) value: f64,

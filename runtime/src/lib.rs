@@ -16,6 +16,7 @@ mod model;
 mod numbers;
 #[cfg(feature = "rayon")]
 mod parallel;
+mod random;
 mod reactions;
 mod real;
 mod self_test;
@@ -37,6 +38,7 @@ pub use model::{
     State, accelerations, check_base, check_block_input, run_checked, run_unchecked,
 };
 pub use numbers::{AngleBatch, Numbers, OutputSink, ScalarNumbers, ZeroedOutputs};
+pub use random::{RandomBits, scramble_bits};
 pub use reactions::{ClosedLoop, Joint, Wrench};
 pub use real::Real;
 pub use self_test::{Random, SelfTestError, ShowRows, self_test};

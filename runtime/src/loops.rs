@@ -72,7 +72,7 @@ pub fn solve_passive<L: Loops>(
 /// Passive coordinates that close the loops, from those of a pose near by.
 ///
 /// # Errors
-/// As [`settle`]; also [`PoseError::OutOfReach`] if the guess is so far away that another assembly might be found.
+/// As [`solve_passive`]; also [`PoseError::OutOfReach`] if the guess is so far away that another assembly might be found.
 pub fn correct<L: Loops>(
     loops: &L,
     active: &L::Active,
@@ -84,7 +84,7 @@ pub fn correct<L: Loops>(
 /// Passive coordinates that close the loops at `to`, followed in a straight line from those at `from`.
 ///
 /// # Errors
-/// As [`settle`], if the loops cannot close at some pose on the way.
+/// As [`solve_passive`], if the loops cannot close at some pose on the way.
 pub fn follow<L: Loops>(
     loops: &L,
     from: &L::Active,

@@ -1,6 +1,6 @@
 //! What an emitted program computes with: one number, or as many as a vector of the machine holds.
 //!
-//! A program is written once, for [`Numbers`]. With [`One`] it is the function of one state; with the vectors of
+//! A program is written once, for [`Numbers`]. With [`ScalarNumbers`] it is the function of one state; with the vectors of
 //! [`crate::blocks`] it runs over many states at once.
 //!
 //! Decision: an emitted program is generic over what computes, so that vectors cost no second copy to parse and

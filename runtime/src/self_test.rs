@@ -9,31 +9,25 @@
 
 use core::fmt;
 
-use crate::{PoseError, Real};
+use crate::{PoseError, RandomBits, Real};
 
 /// A singular value below this share of the largest counts as zero, columns of length 1; forces differ by rounding if by
 /// less than this share of their terms.
 const ZERO_SHARE: f64 = 1e-9;
 
-/// Random numbers that are the same on every machine (`SplitMix64`; Steele, Lea and Flood 2014).
+/// Random numbers around those of a model, the same on every machine.
 #[derive(Clone, Copy, Debug)]
-pub struct Random(u64);
+pub struct Random(RandomBits);
 
 impl Random {
     /// A stream that starts from a seed.
     pub fn new(seed: u64) -> Self {
-        Self(seed)
+        Self(RandomBits::new(seed))
     }
 
     /// Uniform between two numbers.
     pub fn uniform(&mut self, low: f64, high: f64) -> f64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^= z >> 31;
-        let unit = (z >> 11) as f64 / (1_u64 << 53) as f64;
-        low + unit * (high - low)
+        low + self.0.below_one() * (high - low)
     }
 
     /// A number of the same sign and some other size; any where there was none.

@@ -1,7 +1,7 @@
 //! This crate's own source, for crates that are handed on in a folder of their own.
 
 /// Place in the crate's folder and text of every file.
-pub const FILES: [(&str, &str); 24] = [
+pub const FILES: [(&str, &str); 25] = [
     ("Cargo.toml", MANIFEST),
     ("src/arithmetic.rs", include_str!("arithmetic.rs")),
     ("src/blocks.rs", include_str!("blocks.rs")),
@@ -20,6 +20,7 @@ pub const FILES: [(&str, &str); 24] = [
     ("src/model.rs", include_str!("model.rs")),
     ("src/numbers.rs", include_str!("numbers.rs")),
     ("src/parallel.rs", include_str!("parallel.rs")),
+    ("src/random.rs", include_str!("random.rs")),
     ("src/reactions.rs", include_str!("reactions.rs")),
     ("src/real.rs", include_str!("real.rs")),
     ("src/self_test.rs", include_str!("self_test.rs")),

@@ -38,6 +38,7 @@ impl<const P: u64> ExtensionElement<P> {
 
 impl<const P: u64> Add for ExtensionElement<P> {
     type Output = Self;
+    #[inline]
     fn add(self, other: Self) -> Self {
         Self {
             re: self.re + other.re,
@@ -48,6 +49,7 @@ impl<const P: u64> Add for ExtensionElement<P> {
 
 impl<const P: u64> Sub for ExtensionElement<P> {
     type Output = Self;
+    #[inline]
     fn sub(self, other: Self) -> Self {
         self + -other
     }
@@ -55,6 +57,7 @@ impl<const P: u64> Sub for ExtensionElement<P> {
 
 impl<const P: u64> Neg for ExtensionElement<P> {
     type Output = Self;
+    #[inline]
     fn neg(self) -> Self {
         Self {
             re: -self.re,
@@ -65,25 +68,11 @@ impl<const P: u64> Neg for ExtensionElement<P> {
 
 impl<const P: u64> Mul for ExtensionElement<P> {
     type Output = Self;
+    #[inline]
     fn mul(self, other: Self) -> Self {
-        // Most values stay in the prime field.
-        match (
-            self.im == FieldElement::ZERO,
-            other.im == FieldElement::ZERO,
-        ) {
-            (true, true) => (self.re * other.re).into(),
-            (true, false) => Self {
-                re: self.re * other.re,
-                im: self.re * other.im,
-            },
-            (false, true) => Self {
-                re: self.re * other.re,
-                im: self.im * other.re,
-            },
-            (false, false) => Self {
-                re: self.re * other.re - self.im * other.im,
-                im: self.re * other.im + self.im * other.re,
-            },
+        Self {
+            re: FieldElement::sum_of_products([self.re, other.re], [-self.im, other.im]),
+            im: FieldElement::sum_of_products([self.re, other.im], [self.im, other.re]),
         }
     }
 }

@@ -9,6 +9,7 @@ mod number;
 
 use std::ops::{Add, Mul, Neg, Sub};
 
+use modelmill_runtime::{RandomBits, scramble_bits};
 use num_bigint::BigInt;
 use num_traits::{Signed, ToPrimitive};
 
@@ -117,21 +118,59 @@ impl<const P: u64> FieldElement<P> {
     }
 }
 
+/// The element congruent to a number below 2^124.
+#[inline]
 fn reduce<const P: u64>(x: u128) -> FieldElement<P> {
-    const MASK: u128 = (1 << 61) - 1;
-    let excess = u128::from((1 << 61) - P);
-    let x = (x & MASK) + (x >> 61) * excess;
-    let x = (x & MASK) + (x >> 61) * excess;
+    const MASK: u64 = (1 << 61) - 1;
+    let excess = (1 << 61) - P;
     #[expect(
         clippy::cast_possible_truncation,
-        reason = "below 2^62 after two folds"
+        reason = "the low bits are meant, and the high ones are below 2^63"
     )]
-    let x = x as u64;
+    let halves = |x: u128| (x as u64 & MASK, (x >> 61) as u64);
+    let (low, high) = halves(x);
+    // Below 2^78, so that the second fold takes words alone.
+    let (low, high) = halves(u128::from(low) + u128::from(high) * u128::from(excess));
+    let x = low + high * excess;
     FieldElement(if x >= P { x - P } else { x })
+}
+
+impl<const P: u64> FieldElement<P> {
+    /// `self + a * b`, with one reduction.
+    #[inline]
+    #[must_use]
+    pub fn plus_product(self, a: Self, b: Self) -> Self {
+        reduce(u128::from(self.0) + u128::from(a.0) * u128::from(b.0))
+    }
+
+    /// Adds multiples `factor * row` to a row of numbers.
+    pub(crate) fn add_multiples(to: &mut [Self], multiples: &[(Self, &[Self])]) {
+        /// So many products and one number fit into 128 bits.
+        const MOST: usize = 60;
+        for group in multiples.chunks(MOST) {
+            let mut sums: Vec<u128> = to.iter().map(|x| u128::from(x.0)).collect();
+            for (factor, row) in group {
+                for (sum, x) in sums.iter_mut().zip(*row) {
+                    *sum += u128::from(factor.0) * u128::from(x.0);
+                }
+            }
+            let excess = u128::from((1 << 61) - P);
+            for (x, sum) in to.iter_mut().zip(sums) {
+                *x = reduce((sum & ((1 << 61) - 1)) + (sum >> 61) * excess);
+            }
+        }
+    }
+
+    /// `a * b + c * d`, with one reduction.
+    #[inline]
+    fn sum_of_products([a, b]: [Self; 2], [c, d]: [Self; 2]) -> Self {
+        reduce(u128::from(a.0) * u128::from(b.0) + u128::from(c.0) * u128::from(d.0))
+    }
 }
 
 impl<const P: u64> Add for FieldElement<P> {
     type Output = Self;
+    #[inline]
     fn add(self, other: Self) -> Self {
         let sum = self.0 + other.0;
         Self(if sum >= P { sum - P } else { sum })
@@ -140,6 +179,7 @@ impl<const P: u64> Add for FieldElement<P> {
 
 impl<const P: u64> Sub for FieldElement<P> {
     type Output = Self;
+    #[inline]
     fn sub(self, other: Self) -> Self {
         self + -other
     }
@@ -147,6 +187,7 @@ impl<const P: u64> Sub for FieldElement<P> {
 
 impl<const P: u64> Neg for FieldElement<P> {
     type Output = Self;
+    #[inline]
     fn neg(self) -> Self {
         Self(if self.0 == 0 { 0 } else { P - self.0 })
     }
@@ -154,25 +195,25 @@ impl<const P: u64> Neg for FieldElement<P> {
 
 impl<const P: u64> Mul for FieldElement<P> {
     type Output = Self;
+    #[inline]
     fn mul(self, other: Self) -> Self {
         reduce(u128::from(self.0) * u128::from(other.0))
     }
 }
 
-/// A reproducible stream of elements (SplitMix64, Steele 2014): the same seed gives the same model text on any machine.
+/// A reproducible stream of elements: the same seed gives the same model text on any machine.
 #[derive(Clone, Debug)]
-pub struct RandomStream(u64);
+pub struct RandomStream(RandomBits);
 
 impl RandomStream {
     /// A stream that starts from a seed.
     pub fn new(seed: u64) -> Self {
-        Self(seed)
+        Self(RandomBits::new(seed))
     }
 
     /// The next 64 bits.
     pub fn next_bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        mix_bits(self.0)
+        self.0.bits()
     }
 
     /// The next element, uniformly distributed to within 2^-52.
@@ -193,14 +234,8 @@ impl RandomStream {
 
 /// A value that depends on `key` and `seed` alone and otherwise looks random.
 pub fn hash_element<const P: u64>(seed: u64, key: FieldElement<P>) -> FieldElement<P> {
-    let mut stream = RandomStream::new(mix_bits(seed ^ mix_bits(key.0)));
+    let mut stream = RandomStream::new(scramble_bits(seed ^ scramble_bits(key.0)));
     stream.next_element()
-}
-
-fn mix_bits(mut z: u64) -> u64 {
-    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-    z ^ (z >> 31)
 }
 
 #[cfg(test)]
@@ -221,6 +256,7 @@ mod tests {
             assert_eq!((a * a).square_root().map(|r| r * r), Some(a * a));
             let wide = u128::from(a.0) * u128::from(b.0) % u128::from(P);
             assert_eq!(u128::from((a * b).0), wide);
+            assert_eq!(c.plus_product(a, b), c + a * b);
             let (cos, sin) = stream.next_circle_point::<P>();
             assert_eq!(cos * cos + sin * sin, FieldElement::ONE);
         }
@@ -230,6 +266,13 @@ mod tests {
         assert!(FieldElement::<P>::from_i64(-1).square_root().is_none());
         let largest = FieldElement::<P>(P - 1);
         assert_eq!(largest * largest, FieldElement::ONE);
+        let mut row = [largest; 3];
+        let largest_row = [largest; 3];
+        let others = [(largest, largest_row.as_slice()); 150];
+        FieldElement::add_multiples(&mut row, &others);
+        assert_eq!(row, [FieldElement::from_i64(149); 3]);
+        let two = FieldElement::sum_of_products([largest, largest], [largest, largest]);
+        assert_eq!(two, FieldElement::from_i64(2));
     }
 
     #[test]

@@ -5,6 +5,8 @@ pub(crate) mod data;
 pub(crate) mod drawing;
 pub(crate) mod effects;
 pub(crate) mod estimation;
+#[cfg(feature = "experiment")]
+mod experiment;
 mod motion;
 pub(crate) mod preparation;
 mod rig;
@@ -27,7 +29,9 @@ pub(crate) use data::{
     AdoptArgs, CompareArgs, DiagnoseArgs, DiagnosisArgs, EvaluateArgs, IdentifyArgs, InterpretArgs,
     ParameterSource, RecordingsArgs, ReportArgs,
 };
-pub(crate) use motion::{CriterionArg, ExciteArgs, ExperimentArgs, SimulateArgs};
+#[cfg(feature = "experiment")]
+pub(crate) use experiment::ExperimentArgs;
+pub(crate) use motion::{CriterionArg, ExciteArgs, SimulateArgs};
 pub(crate) use rig::{ExportArgs, ImportArgs, ReduceArgs};
 
 /// From a model file to base parameters, equations, fast Rust, and parameters from measurements.
@@ -237,6 +241,7 @@ pub(crate) enum ProgramCommand {
         command that separates what its recordings cannot tell apart.")]
     Excite(ExciteArgs),
     /// Reproduce the experiment of the paper on the bundled rig, and explain its errors, as one page
+    #[cfg(feature = "experiment")]
     #[command(
         after_help = "Writes experiment.html: excitation, runs of the whole robot, Tables 1 and 2 beside the paper's, \
         and where the errors come from. Needs no files; the same options give the same bytes.\n\n\

@@ -12,6 +12,7 @@ pub(crate) mod effects;
 pub(crate) mod equations;
 pub(crate) mod evaluate;
 pub(crate) mod excite;
+#[cfg(feature = "experiment")]
 pub(crate) mod experiment;
 pub(crate) mod export;
 pub(crate) mod generate;

@@ -97,7 +97,7 @@ impl ProgressListener for TerminalProgress {
     }
 }
 
-/// As [`Terminal`], for whoever tells remarks at another time.
+/// As [`TerminalProgress`], for whoever tells remarks at another time.
 pub(crate) struct ProgressWithoutRemarks(TerminalProgress);
 
 impl ProgressWithoutRemarks {

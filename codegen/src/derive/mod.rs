@@ -3,11 +3,12 @@
 pub(crate) mod base;
 mod checks;
 mod derivation;
-pub(crate) mod self_test;
+mod for_code;
 
 use modelmill_spec::Mechanism;
 
 pub use derivation::Derivation;
+pub use for_code::BaseFormulas;
 
 use crate::DeriveError;
 use crate::expr::Graph;

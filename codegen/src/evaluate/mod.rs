@@ -267,7 +267,7 @@ impl<'a> ModelEvaluator<'a> {
     }
 
     /// All determined components of the reactions for the parameters of the model file, one vector each, in the order in
-    /// which the places of [`Reactions`] count them.
+    /// which the places of [`ReactionPrograms`] count them.
     pub fn reactions(
         &self,
         reactions: &ReactionPrograms,

@@ -202,7 +202,7 @@ impl LoopSize {
         }
     }
 
-    /// What a determinant is held against: the sum of the magnitudes of its terms, as [`Size::of_terms`] has it. Where the
+    /// What a determinant is held against: the sum of the magnitudes of its terms, as [`LoopSize::term_magnitude`] has it. Where the
     /// nominal pose itself would all but count as singular by that, since the terms cancel in every factor and at every pose,
     /// it is what rounding says that counts, which grows with the loops. What is below `singular` of its size counts as zero.
     pub(crate) fn determinant_magnitude(

@@ -28,8 +28,8 @@ pub(crate) enum SolvableCoordinates {
 /// Looks for a plan. Every loop takes the root that it has at the nominal pose: loops that are alike but for their
 /// assembly mode must differ in the field, too.
 ///
-/// Given coordinates only become more from loop to loop, so for [`Unknowns::Passive`] any loop that can be solved may be
-/// solved next. With [`Unknowns::Any`] a loop's unknowns must not be needed by the loops before it, so the plan is made
+/// Given coordinates only become more from loop to loop, so for [`SolvableCoordinates::Passive`] any loop that can be solved may be
+/// solved next. With [`SolvableCoordinates::Any`] a loop's unknowns must not be needed by the loops before it, so the plan is made
 /// from its end: any loop with two unknowns of its own among those left may be the last of them.
 pub(crate) fn plan(
     graph: &mut Graph,

@@ -28,6 +28,16 @@ pub(crate) fn use_counts(graph: &Graph, roots: &[ExprId]) -> Vec<usize> {
 pub(crate) fn rewrite(
     graph: &mut Graph,
     roots: &[ExprId],
+    rule: impl FnMut(&mut Graph, ExprId, Node) -> ExprId,
+) -> Vec<ExprId> {
+    rewrite_affected(graph, roots, |_| true, rule)
+}
+
+/// Rewrites bottom-up the nodes that are affected and those above them; all others stay as they are.
+pub(crate) fn rewrite_affected(
+    graph: &mut Graph,
+    roots: &[ExprId],
+    is_affected: impl Fn(&Node) -> bool,
     mut rule: impl FnMut(&mut Graph, ExprId, Node) -> ExprId,
 ) -> Vec<ExprId> {
     let mut new: Vec<Option<ExprId>> = vec![None; graph.len()];
@@ -38,6 +48,14 @@ pub(crate) fn rewrite(
             continue;
         }
         let id = ExprId(u32::try_from(i).expect("graph below 4G nodes"));
+        let mut is_same = !is_affected(graph.node(id));
+        if is_same {
+            graph.for_each_child(id, |child| is_same &= new[child.index()] == Some(child));
+        }
+        if is_same {
+            new[i] = Some(id);
+            continue;
+        }
         let node = match graph.node(id).clone() {
             Node::Sum(terms) => Node::Sum(
                 terms

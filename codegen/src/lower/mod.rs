@@ -11,9 +11,8 @@ mod share;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use program::SINGULAR;
 pub use program::{
-    OperationCount, PoseGuard, ProgramOp, ProgramStage, StraightLineProgram, ValueId,
+    OperationCount, PoseGuard, ProgramOp, ProgramStage, SINGULAR, StraightLineProgram, ValueId,
 };
 pub(crate) use schedule::{AtomDefinition, AtomRule};
 

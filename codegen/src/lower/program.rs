@@ -9,9 +9,14 @@ use crate::expr::{Atom, Rational, Unary};
 
 /// Index of a value: the operation that makes it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct ValueId(pub(crate) u32);
+pub struct ValueId(u32);
 
 impl ValueId {
+    /// The value of the operation at a position.
+    pub fn from_index(index: usize) -> Self {
+        Self(u32::try_from(index).expect("programs below 4G operations"))
+    }
+
     /// Position of its operation in [`Program::ops`].
     pub fn index(self) -> usize {
         self.0 as usize
@@ -47,7 +52,8 @@ pub enum ProgramOp {
 
 impl ProgramOp {
     /// The same operation on other operands.
-    pub(crate) fn map_operands(self, new: impl Fn(ValueId) -> ValueId) -> Self {
+    #[must_use]
+    pub fn map_operands(self, new: impl Fn(ValueId) -> ValueId) -> Self {
         match self {
             Self::Number(_) | Self::Input(_) => self,
             Self::Add(a, b) => Self::Add(new(a), new(b)),
@@ -89,7 +95,7 @@ pub enum ProgramStage {
 }
 
 /// A determinant this much smaller than the magnitude of its terms counts as zero.
-pub(crate) const SINGULAR: f64 = 1e-9;
+pub const SINGULAR: f64 = 1e-9;
 
 /// What must hold at a pose for the model to have an answer.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -214,7 +220,8 @@ impl fmt::Display for OperationCount {
 
 impl StraightLineProgram {
     /// The same program without the operations that no output and no guard needs.
-    pub(crate) fn without_dead_code(self) -> Self {
+    #[must_use]
+    pub fn without_dead_code(self) -> Self {
         let mut needed = vec![false; self.ops.len()];
         for value in self
             .outputs
@@ -243,7 +250,8 @@ impl StraightLineProgram {
     }
 
     /// The same program with the operations that `order` names, in that order; operands stand before what needs them.
-    pub(crate) fn reorder(&self, order: &[usize]) -> Self {
+    #[must_use]
+    pub fn reorder(&self, order: &[usize]) -> Self {
         let mut places: Vec<Option<ValueId>> = vec![None; self.ops.len()];
         let mut ordered = Self::default();
         for i in order {
@@ -251,9 +259,7 @@ impl StraightLineProgram {
                 places[operand.index()].expect("operands stand before what needs them")
             });
             let place = ordered.ops.len();
-            places[*i] = Some(ValueId(
-                u32::try_from(place).expect("program below 4G operations"),
-            ));
+            places[*i] = Some(ValueId::from_index(place));
             ordered.ops.push(op);
             ordered.stages.push(self.stages[*i]);
         }

@@ -110,16 +110,21 @@ pub(crate) fn fixed_nodes(graph: &Graph, roots: &[ExprId]) -> Vec<bool> {
             continue;
         }
         let id = ExprId(u32::try_from(i).expect("graph below 4G nodes"));
-        fixed[i] = match graph.node(id) {
-            Node::Rational(_) => true,
-            Node::Atom(atom) => atom.is_fixed(),
-            Node::Sin(angle) | Node::Cos(angle) => angle.atoms().all(Atom::is_fixed),
-            Node::Sum(terms) => terms.iter().all(|(c, _)| fixed[c.index()]),
-            Node::Product(factors) => factors.iter().all(|(c, _)| fixed[c.index()]),
-            Node::Unary(_, c) => fixed[c.index()],
-        };
+        fixed[i] = is_fixed(graph.node(id), &fixed);
     }
     fixed
+}
+
+/// Whether a node is known once geometry and parameters are; `fixed` tells it of its operands.
+pub(crate) fn is_fixed(node: &Node, fixed: &[bool]) -> bool {
+    match node {
+        Node::Rational(_) => true,
+        Node::Atom(atom) => atom.is_fixed(),
+        Node::Sin(angle) | Node::Cos(angle) => angle.atoms().all(Atom::is_fixed),
+        Node::Sum(terms) => terms.iter().all(|(c, _)| fixed[c.index()]),
+        Node::Product(factors) => factors.iter().all(|(c, _)| fixed[c.index()]),
+        Node::Unary(_, c) => fixed[c.index()],
+    }
 }
 
 /// How often each node stands in a denominator.
@@ -157,8 +162,7 @@ impl ProgramScheduler<'_> {
             _ => ProgramStage::Fixed,
         };
         op.for_each_operand(|operand| stage = stage.max(self.program.stages[operand.index()]));
-        let value =
-            ValueId(u32::try_from(self.program.ops.len()).expect("program below 4G operations"));
+        let value = ValueId::from_index(self.program.ops.len());
         self.program.ops.push(op.clone());
         self.program.stages.push(stage);
         self.known.insert(op, value);

@@ -1,19 +1,22 @@
 //! Shares pairs of terms or factors that several sums or products have in common (Breuer 1969, greedy).
 
 use std::collections::BTreeSet;
+use std::collections::hash_map::Entry;
 
 use rustc_hash::FxHashMap;
 
-use super::flatten::{rebuild, rewrite};
-use super::schedule::fixed_nodes;
+use super::flatten::{rebuild, rewrite_affected};
+use super::schedule::is_fixed;
 use crate::expr::{ExprId, Graph, Node, Rational};
 
 /// Gives a node of its own to every pair that occurs at least twice, most frequent first.
 pub(crate) fn share_pairs(graph: &Graph, roots: &[ExprId]) -> (Graph, Vec<ExprId>) {
     let (mut graph, mut roots) = graph.compacted(roots);
     let mut live = graph.len();
+    let mut counts = PairCounts::default();
     for _ in 0..200 {
-        let pairs = common_pairs(&graph, &roots);
+        counts.update(&graph, &roots);
+        let pairs = counts.most_common();
         if pairs.is_empty() {
             break;
         }
@@ -21,6 +24,7 @@ pub(crate) fn share_pairs(graph: &Graph, roots: &[ExprId]) -> (Graph, Vec<ExprId
         if graph.len() > 2 * live {
             (graph, roots) = graph.compacted(&roots);
             live = graph.len();
+            counts = PairCounts::default();
         }
     }
     (graph, roots)
@@ -82,38 +86,62 @@ fn pairs_of(node: &Node, fixed: &[bool], mut visit: impl FnMut(OperandPair)) {
     }
 }
 
-/// Pairs that occur more than once, best first, no operand twice, so that they can be replaced together.
-fn common_pairs(graph: &Graph, roots: &[ExprId]) -> BTreeSet<OperandPair> {
-    let fixed = fixed_nodes(graph, roots);
-    let mut counts: FxHashMap<OperandPair, usize> = FxHashMap::default();
-    for (i, needed) in graph.reachable(roots).into_iter().enumerate() {
-        if needed && !fixed[i] {
-            let id = ExprId(u32::try_from(i).expect("graph below 4G nodes"));
-            pairs_of(graph.node(id), &fixed, |pair| {
-                *counts.entry(pair).or_insert(0) += 1;
-            });
+/// How often each pair occurs among the nodes in use. Few nodes change from round to round, so that only those are counted
+/// anew.
+#[derive(Default)]
+struct PairCounts {
+    counts: FxHashMap<OperandPair, usize>,
+    /// For each node, whether its pairs are counted.
+    is_counted: Vec<bool>,
+    /// For each node, whether it is known once geometry and parameters are.
+    fixed: Vec<bool>,
+}
+
+impl PairCounts {
+    /// Counts the nodes that `roots` need and no others.
+    fn update(&mut self, graph: &Graph, roots: &[ExprId]) {
+        let node = |i: usize| graph.node(ExprId(u32::try_from(i).expect("graph below 4G nodes")));
+        for i in self.fixed.len()..graph.len() {
+            self.fixed.push(is_fixed(node(i), &self.fixed));
+        }
+        self.is_counted.resize(graph.len(), false);
+        for (i, needed) in graph.reachable(roots).into_iter().enumerate() {
+            let counts = &mut self.counts;
+            match (self.is_counted[i], needed && !self.fixed[i]) {
+                (false, true) => pairs_of(node(i), &self.fixed, |pair| {
+                    *counts.entry(pair).or_insert(0) += 1;
+                }),
+                (true, false) => pairs_of(node(i), &self.fixed, |pair| {
+                    if let Entry::Occupied(mut count) = counts.entry(pair) {
+                        *count.get_mut() -= 1;
+                        if *count.get() == 0 {
+                            count.remove();
+                        }
+                    }
+                }),
+                _ => continue,
+            }
+            self.is_counted[i] = !self.is_counted[i];
         }
     }
-    let mut found: Vec<(usize, OperandPair)> = counts
-        .into_iter()
-        .filter(|(_, n)| *n > 1)
-        .map(|(p, n)| (n, p))
-        .collect();
-    found.sort_by(|a, b| b.0.cmp(&a.0).then_with(|| a.1.cmp(&b.1)));
-    let Some(most) = found.first().map(|f| f.0) else {
-        return BTreeSet::new();
-    };
-    let mut taken: BTreeSet<ExprId> = BTreeSet::new();
-    found
-        .into_iter()
-        .take_while(|(n, _)| *n == most)
-        .filter(|(_, pair)| {
+
+    /// The pairs that occur most often, if that is more than once; no operand twice, so that they can be replaced together.
+    fn most_common(&self) -> BTreeSet<OperandPair> {
+        let most = self.counts.values().copied().max().unwrap_or(0);
+        if most < 2 {
+            return BTreeSet::new();
+        }
+        let found = self.counts.iter().filter(|(_, n)| **n == most);
+        let mut found: Vec<&OperandPair> = found.map(|(pair, _)| pair).collect();
+        found.sort_unstable();
+        let mut taken: BTreeSet<ExprId> = BTreeSet::new();
+        let fresh = found.into_iter().filter(|pair| {
             let fresh = pair.operands().iter().all(|o| !taken.contains(o));
             taken.extend(pair.operands());
             fresh
-        })
-        .map(|(_, pair)| pair)
-        .collect()
+        });
+        fresh.cloned().collect()
+    }
 }
 
 fn replace_pairs(
@@ -129,7 +157,17 @@ fn replace_pairs(
             OperandPair::Factors(a, b) => _ = factors_with.insert(*a, *b),
         }
     }
-    rewrite(graph, roots, |graph, id, node| match &node {
+    // Nodes without a pair are made of the same operands as before, unless those changed.
+    let is_affected = |node: &Node| match node {
+        Node::Sum(terms) => {
+            terms.len() > 2 && terms.iter().any(|(t, _)| terms_with.contains_key(t))
+        }
+        Node::Product(factors) => {
+            factors.len() > 2 && factors.iter().any(|(f, _)| factors_with.contains_key(f))
+        }
+        _ => false,
+    };
+    rewrite_affected(graph, roots, is_affected, |graph, id, node| match &node {
         Node::Sum(terms) if terms.len() > 2 => {
             let mut firsts: Vec<ExprId> = terms.iter().map(|(t, _)| *t).collect();
             firsts.sort_unstable();

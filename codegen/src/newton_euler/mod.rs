@@ -49,7 +49,7 @@ impl InertiaElement {
     }
 }
 
-/// Inertia of one link: a factor for every [`Element`].
+/// Inertia of one link: a factor for every [`InertiaElement`].
 pub(crate) type InertiaFactors = [ExprId; ELEMENTS];
 
 /// A force and a moment about the origin of a link, in one of the link's two frames.

@@ -89,12 +89,14 @@ pub(crate) fn lumped_formulas(
 }
 
 /// What base parameters divide by: a function of the constants that may vanish.
-pub(crate) struct BaseDenominator {
-    pub(crate) value: PrintedFormula,
+#[derive(Clone, Debug)]
+pub struct BaseDenominator {
+    /// The function.
+    pub value: PrintedFormula,
     /// The sum of the magnitudes of its terms, sines and cosines taken as 1.
-    pub(crate) size: PrintedFormula,
+    pub size: PrintedFormula,
     /// As people read it.
-    pub(crate) text: String,
+    pub text: String,
 }
 
 /// Every denominator of eq. (16), powers of a constant by the constant itself.

@@ -6,7 +6,7 @@ use modelmill_algebra::field::{FieldElement, RandomStream};
 use super::dependences::DependenceStructure;
 use super::oracle::{ConstantOccurrence, OperationBudget, PrimeFieldOracle};
 use super::reconstruct::{self, DependenceSurvey};
-use super::relations::{self, ColumnRelation, DependentColumn, SolvedRelations};
+use super::relations::{self, ColumnRelation, DependentColumn, RelationRows, SolvedRelations};
 use super::sample::SampledRegressor;
 use crate::DeriveError;
 use crate::expr::FieldPoint;
@@ -172,11 +172,18 @@ impl PrimeFieldOracle for MotionFactorOracle<'_> {
         let one_by_one: usize = self.relations.iter().map(|r| (r.len() + 1).pow(3)).sum();
         self.charge(at_once.min(one_by_one))?;
         if one_by_one < at_once {
-            let mut rows = Vec::new();
+            // Few points are enough for relations between few columns.
+            let mut open: Vec<RelationRows<P>> =
+                self.relations.iter().map(RelationRows::new).collect();
             for _ in 0..self.dependences.n_points {
-                rows.extend(self.regressor.draw_rows(constants, &mut self.sampling)?);
+                if open.iter().all(RelationRows::is_confirmed) {
+                    break;
+                }
+                let rows = self.regressor.draw_rows(constants, &mut self.sampling)?;
+                open.iter_mut().for_each(|relation| relation.take(&rows));
             }
-            return relations::values_from_rows(self.relations, &rows);
+            let values = open.iter().map(RelationRows::values);
+            return Ok(values.collect::<Result<Vec<_>, _>>()?.concat());
         }
         let (echelon, _) = self.regressor.reduced_rows(
             constants,

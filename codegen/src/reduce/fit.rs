@@ -10,7 +10,7 @@ use super::oracle::{ConstantOccurrence, PrimeFieldOracle};
 use super::rational_function::{
     FactorVariable, PowerProduct, RationalFunction, TrigonometricPolynomial, monomial_value,
 };
-use super::support::{PartialSamples, support};
+use super::support::{PartialSamples, nonzero_monomials};
 use crate::DeriveError;
 use crate::expr::{FieldPoint, Rational};
 
@@ -163,7 +163,6 @@ impl FunctionShape {
     pub(super) fn fit_function<O: PrimeFieldOracle>(
         &self,
         fields: &mut PrimeFields<O>,
-        partial: &mut PartialSamples,
         oracle: &mut O,
         function: usize,
         roots: &[i64],

@@ -11,7 +11,6 @@ use modelmill_algebra::univariate;
 use super::fit::{FunctionShape, PrimeFields};
 use super::oracle::{ConstantOccurrence, PrimeFieldOracle};
 use super::rational_function::RationalFunction;
-use super::support::PartialSamples;
 use crate::DeriveError;
 use crate::expr::{Atom, FieldPoint};
 
@@ -42,7 +41,6 @@ pub(super) struct DependenceSurvey<O> {
     moved: Vec<VariedConstant>,
     shapes: Vec<FunctionShape>,
     fields: PrimeFields<O>,
-    partial: PartialSamples,
 }
 
 impl<O: PrimeFieldOracle> DependenceSurvey<O> {
@@ -65,7 +63,7 @@ impl<O: PrimeFieldOracle> DependenceSurvey<O> {
         } else {
             vary_constants(oracle, &origin, &at_origin, constants, &mut shapes, stream)?
         };
-        let fields = Fields::new(&origin, constants);
+        let fields = PrimeFields::new(&origin, constants);
         Ok(Self {
             roots: roots.to_vec(),
             constants: constants.to_vec(),
@@ -101,14 +99,8 @@ impl<O: PrimeFieldOracle> DependenceSurvey<O> {
         total_degrees(oracle, origin, &self.constants, &indices, shapes, stream)?;
         let mut found = Vec::with_capacity(wanted.len());
         for (k, is_needed) in wanted {
-            let function = shapes[*k].fit_function(
-                &mut self.fields,
-                &mut self.partial,
-                oracle,
-                *k,
-                &self.roots,
-                stream,
-            )?;
+            let function =
+                shapes[*k].fit_function(&mut self.fields, oracle, *k, &self.roots, stream)?;
             let resists = function.is_none();
             found.push(function);
             if resists && *is_needed {

@@ -70,17 +70,17 @@ impl ReductionMethod {
 /// One line of eq. (6): `h_j = sum of a_k h_k`.
 #[derive(Clone, Debug)]
 pub struct ColumnDependency {
-    /// Position of the eliminated product in [`Reduction::products`].
+    /// Position of the eliminated product in [`BaseReduction::products`].
     pub product: usize,
-    /// Positions in [`Reduction::retained`] with the factors.
+    /// Positions in [`BaseReduction::retained`] with the factors.
     pub equals: Vec<(usize, RationalFunction)>,
-    /// Positions in [`Reduction::products`] of other dependent products with the factors: their columns stand for what they
+    /// Positions in [`BaseReduction::products`] of other dependent products with the factors: their columns stand for what they
     /// equal in turn. None where it is no longer to write that out.
     pub via: Vec<(usize, RationalFunction)>,
 }
 
 impl BaseReduction {
-    /// The factors of every dependent product on retained ones alone, by position in [`Reduction::retained`]; `None` where
+    /// The factors of every dependent product on retained ones alone, by position in [`BaseReduction::retained`]; `None` where
     /// `value` has none for a factor.
     pub fn factors_by<T>(
         &self,

@@ -38,39 +38,6 @@ impl ColumnRelation {
         self.retained.len() + self.dependent.len()
     }
 
-    /// Its factors from rows of values of all columns, of which there must be enough to determine them.
-    fn values_from_rows<const P: u64>(
-        &self,
-        rows: &[Vec<FieldElement<P>>],
-    ) -> Result<Vec<FieldElement<P>>, DeriveError> {
-        /// Rows beyond those that determine the factors: they show that the relation holds.
-        const MORE: usize = 2;
-        let n = self.len();
-        let order: Vec<usize> = (0..=n).collect();
-        let mut echelon = RowEchelonForm::new(&order);
-        let mut more = 0;
-        for row in rows {
-            let columns = self.columns().chain([self.column]);
-            let row: Vec<FieldElement<P>> = columns.map(|k| row[k]).collect();
-            if row.iter().all(|x| *x == FieldElement::ZERO) {
-                continue;
-            }
-            if echelon.pivots.len() == n {
-                more += 1;
-            }
-            echelon.insert(row);
-            if more == MORE {
-                break;
-            }
-        }
-        // A pivot in the last column is a row that the others contradict.
-        if echelon.pivots.len() != n || echelon.pivots.contains(&n) {
-            return Err(DeriveError::RankChanged);
-        }
-        let factors = (0..n).map(|k| echelon.entry(k, n).ok_or(DeriveError::RankChanged));
-        factors.collect()
-    }
-
     /// Whether it needs retained columns alone.
     pub(super) fn has_retained_only(&self) -> bool {
         self.dependent.is_empty()
@@ -234,16 +201,58 @@ pub(super) fn values<const P: u64>(
     Ok(values)
 }
 
-/// The same from rows of values of all columns.
-pub(super) fn values_from_rows<const P: u64>(
-    relations: &[ColumnRelation],
-    rows: &[Vec<FieldElement<P>>],
-) -> Result<Vec<FieldElement<P>>, DeriveError> {
-    let mut values = Vec::new();
-    for relation in relations {
-        values.extend(relation.values_from_rows(rows)?);
+/// The factors of a relation, from rows of values of all columns as they come.
+pub(super) struct RelationRows<'a, const P: u64> {
+    relation: &'a ColumnRelation,
+    echelon: RowEchelonForm<P>,
+    /// How many rows came when the factors were determined.
+    n_more: usize,
+}
+
+impl<'a, const P: u64> RelationRows<'a, P> {
+    pub(super) fn new(relation: &'a ColumnRelation) -> Self {
+        let order: Vec<usize> = (0..=relation.len()).collect();
+        Self {
+            relation,
+            echelon: RowEchelonForm::new(&order),
+            n_more: 0,
+        }
     }
-    Ok(values)
+
+    /// Takes further rows, as far as it needs them.
+    pub(super) fn take(&mut self, rows: &[Vec<FieldElement<P>>]) {
+        for row in rows {
+            if self.is_confirmed() {
+                break;
+            }
+            let columns = self.relation.columns().chain([self.relation.column]);
+            let row: Vec<FieldElement<P>> = columns.map(|k| row[k]).collect();
+            if row.iter().all(|x| *x == FieldElement::ZERO) {
+                continue;
+            }
+            if self.echelon.pivots.len() == self.relation.len() {
+                self.n_more += 1;
+            }
+            self.echelon.insert(row);
+        }
+    }
+
+    /// Whether rows beyond those that determine the factors have shown that the relation holds.
+    pub(super) fn is_confirmed(&self) -> bool {
+        const MORE: usize = 2;
+        self.n_more == MORE
+    }
+
+    /// The factors; an error if they are not determined, or rows contradict each other.
+    pub(super) fn values(&self) -> Result<Vec<FieldElement<P>>, DeriveError> {
+        let n = self.relation.len();
+        // A pivot in the last column is a row that the others contradict.
+        if self.echelon.pivots.len() != n || self.echelon.pivots.contains(&n) {
+            return Err(DeriveError::RankChanged);
+        }
+        let entry = |k| self.echelon.entry(k, n).ok_or(DeriveError::RankChanged);
+        (0..n).map(entry).collect()
+    }
 }
 
 /// A dependent column by others, with factors; `None` for those that resist.

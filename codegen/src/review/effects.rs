@@ -17,7 +17,7 @@ pub(super) fn effects(page: &mut PageDocument, mechanism: &Mechanism) {
         return;
     }
     // A coordinate or constant of the model may have that name.
-    let taken = crate::emit::tree::names::reserved_names(mechanism);
+    let taken = crate::names::reserved_names(mechanism);
     let free = |names: [&str; 4], last: &str| {
         let found = names.into_iter().find(|name| !taken.contains(*name));
         found.unwrap_or(last).to_owned()

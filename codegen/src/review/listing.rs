@@ -5,10 +5,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use modelmill_spec::Mechanism;
 
 use super::document::PageEquation;
-use crate::emit::tree::names::QuantityName;
 use crate::expr::Rational;
 use crate::expr::print::{FormulaFunction, FormulaSymbol, PrintedFormula, atom};
 use crate::lower::{ProgramOp, ProgramStage, StraightLineProgram};
+use crate::names::QuantityName;
 
 /// Equations of a program.
 pub(super) struct ProgramListing {

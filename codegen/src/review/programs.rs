@@ -8,9 +8,9 @@ use super::document::{
     PageBlock, PageDocument, PageEquation, PageTable, TextLine, cell, name, text,
 };
 use super::listing::{self, ProgramListing};
-use crate::emit::tree::names::{NamedQuantities, QuantityName, reserved_names};
 use crate::expr::print::{FormulaSymbol, PrintedFormula};
 use crate::lower::{OperationCount, ProgramStage, StraightLineProgram};
+use crate::names::{NamedQuantities, QuantityName, reserved_names};
 use crate::reduce::base::base_parameter_name as base_name;
 use crate::{Derivation, PassivePosition};
 

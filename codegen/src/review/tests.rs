@@ -10,11 +10,11 @@ use super::{
     NumericRank, PageFormat, ReducedEquations, base_expression, factored_base_expression, page,
     programs,
 };
-use crate::emit::tree::names::{NamedQuantities, operation_values};
 use crate::expr::Atom;
 use crate::expr::print::parse::parse;
 use crate::expr::print::tests::{latex_is_balanced, markup_is_balanced};
 use crate::expr::print::{PrintedFormula, atom};
+use crate::names::NamedQuantities;
 use crate::{Derivation, derive};
 
 const MODELS: [&str; 8] = [
@@ -153,7 +153,7 @@ fn listed_programs_compute_what_the_programs_compute() {
                 let before = known.insert(left.text(), value);
                 assert_eq!(before, None, "{name}, {title}: {} twice", left.text());
             }
-            let expected = operation_values(program, &meanings.atoms);
+            let expected = meanings.values(program);
             for (symbol, value) in outputs.iter().zip(&program.outputs) {
                 let found = known[&symbol.text()];
                 assert_close(found, expected[value.index()], &symbol.text());
@@ -180,7 +180,7 @@ fn named_values_are_what_they_are_called() {
     ] {
         assert!(lines.contains(wanted), "{wanted} in {lines:?}");
     }
-    let values = operation_values(program, &meanings.atoms);
+    let values = meanings.values(program);
     let rate = |i: usize| meanings.atoms[&Atom::Rate(i)];
     let names = meanings.name_values(program);
     let (at, meaning) = names

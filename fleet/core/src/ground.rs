@@ -51,7 +51,7 @@ impl FleetModel {
         &self.plan
     }
 
-    /// [`Plan::mark`] of the plan.
+    /// [`FleetPlan::mark`] of the plan.
     pub fn mark(&self) -> u64 {
         self.mark
     }
@@ -97,7 +97,7 @@ impl FleetModel {
         self.summary_or_bad(name, read.map_err(FleetFault::from))
     }
 
-    /// As [`Ground::summarise_file`], of a file that is in memory, such as an object of a store; the ending of its name says what it
+    /// As [`FleetModel::summarise_file`], of a file that is in memory, such as an object of a store; the ending of its name says what it
     /// is.
     pub fn summarise_bytes(&self, name: &str, bytes: Vec<u8>) -> FleetSummary {
         let model = self.common.model();

@@ -1,12 +1,12 @@
 //! Recordings of many machines of one kind, each as a small summary; summaries add, and what a robot, a day or a part says is
 //! solved from their sum.
 //!
-//! 1. [`Plan`] - how every recording is prepared and what its columns mean, made once from a few reference recordings. It is
+//! 1. [`FleetPlan`] - how every recording is prepared and what its columns mean, made once from a few reference recordings. It is
 //!    one JSON document: whoever has it, on whichever computer, makes the same summaries.
-//! 2. [`Ground::summarise`] - one recording, its rows in any order, to a [`Summary`]: triangle of the base columns, products of
+//! 2. [`FleetModel::summarise`] - one recording, its rows in any order, to a [`FleetSummary`]: triangle of the base columns, products of
 //!    all columns, counts, and what was wrong. A recording that gives no answer is a summary that says so.
-//! 3. [`Summary::merge`] - the summary of both; associative and commutative up to rounding.
-//! 4. [`Ground::solve`] - base parameters with deviations.
+//! 3. [`FleetSummary::merge`] - the summary of both; associative and commutative up to rounding.
+//! 4. [`FleetModel::solve`] - base parameters with deviations.
 //! 5. [`robot`] - the days of one robot: when something changed and stayed changed, and which sensors died;
 //!    [`outliers`] - which robots differ from the others, and in what. Neither looks at a recording again.
 //!

@@ -30,7 +30,7 @@ pub struct FleetPlan {
     pub model: String,
     /// The text of the model file and, behind it, of those that it extends, each with its name.
     pub files: Vec<(String, String)>,
-    /// Our columns with what the recordings call them, as in [`Reading::columns`].
+    /// Our columns with what the recordings call them, as in [`RecordingOptions::columns`].
     #[serde(default)]
     pub columns: Vec<(String, String)>,
     /// How states are prepared; everything is settled, so that all recordings are prepared alike.
@@ -111,7 +111,7 @@ impl ReferenceSums {
 impl FleetPlan {
     /// The plan that reference recordings make, which should be of sound machines: how the first is best prepared is how all
     /// are, and columns are built on the parameters that all of them say. What `reading` leaves open is settled here. Those that
-    /// cannot be read are left out; [`Reference::recordings`] names the others.
+    /// cannot be read are left out; [`FleetReference::recordings`] names the others.
     ///
     /// Fails where the model has no meaning, or none of the recordings can be read and evaluated.
     pub fn from_recordings(

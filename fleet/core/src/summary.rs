@@ -20,10 +20,10 @@ pub struct BadRecording {
     pub says: String,
 }
 
-/// Sums over the rows of recordings. [`Summary::merge`] adds them.
+/// Sums over the rows of recordings. [`FleetSummary::merge`] adds them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FleetSummary {
-    /// [`Plan::mark`](crate::Plan::mark) of the plan by which it was made.
+    /// [`FleetPlan::mark`](crate::Plan::mark) of the plan by which it was made.
     pub mark: u64,
     /// Recordings that gave an answer.
     pub recordings: u64,
@@ -107,7 +107,7 @@ impl FleetSummary {
         (squares / (self.samples as f64).max(1.0)).sqrt()
     }
 
-    /// The summary as bytes; what [`Summary::of_bytes`] reads of them has the same bytes again.
+    /// The summary as bytes; what [`FleetSummary::from_bytes`] reads of them has the same bytes again.
     pub fn bytes(&self) -> Vec<u8> {
         let mut to = SummaryWriter::default();
         to.bytes(BEGIN);
@@ -150,7 +150,7 @@ impl FleetSummary {
         to.finish()
     }
 
-    /// Reads what [`Summary::bytes`] wrote.
+    /// Reads what [`FleetSummary::bytes`] wrote.
     ///
     /// Fails where bytes are missing or were changed, and where another version wrote them.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, FleetFault> {

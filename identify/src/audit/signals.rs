@@ -185,7 +185,7 @@ impl SignalRecording {
         let low = force.iter().copied().fold(f64::INFINITY, f64::min);
         let high = force.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         if low >= high {
-            // Forces of 0 are said beside the drives' other ones, by `suspicious_forces`.
+            // Forces of 0 are said beside the drives' other ones, by `zero_force_notes`.
             return (force.len() > 1 && low != 0.0).then(|| {
                 RecordingNote::warning(format!(
                     "The force of `{name}` in {} is {low} throughout: it is no measurement of a drive that works.",

@@ -44,7 +44,7 @@ pub struct JointValues {
 pub struct JointFit {
     /// Shared values, in the order in which they were asked for, and behind them the scales of channels, if these are unknown.
     pub shared: JointValues,
-    /// Own values of each run, in the order of [`Part::own`].
+    /// Own values of each run, in the order of [`JointRun::own`].
     pub own: Vec<JointValues>,
 }
 

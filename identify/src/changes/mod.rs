@@ -10,8 +10,8 @@
 //! Columns of `X` that are combinations of those of `H`, as a payload's are of a body's own, leave `s` at 0 and are a change in
 //! `c` all the same.
 //!
-//! Rows are made white first, drive by drive ([`Coloured`]), so that sums of squares count independent numbers, and each run
-//! is kept as sums over its rows ([`Moments`]), block by block. [`search`] then finds the fewest changes that explain what
+//! Rows are made white first, drive by drive ([`AutoregressiveNoise`]), so that sums of squares count independent numbers, and each run
+//! is kept as sums over its rows ([`NormalEquations`]), block by block. [`search`] then finds the fewest changes that explain what
 //! the runs do not share. Over many runs, [`segments`] finds when values changed and stayed changed, and [`joint`] fits all runs
 //! at once with some values shared and others each run's own.
 

@@ -18,7 +18,7 @@ const NEGLIGIBLE_SHARE: f64 = 1e-6;
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct EffectAlias {
     pub(crate) effect: LocatedEffect,
-    /// How much worse it is, in the units of [`APART`]; negative if better.
+    /// How much worse it is, in the units of [`MIN_DISTINCTION`]; negative if better.
     pub(crate) criterion_loss: f64,
     /// Whether it is part of another way to write the same down, and no other cause.
     pub(crate) is_equivalent_form: bool,

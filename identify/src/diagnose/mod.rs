@@ -1,14 +1,14 @@
 //! Which effect is missing: columns of what a model could lack go in; the smallest set that explains what it cannot say
 //! comes out, with what cannot be told apart, and an honest answer where nothing explains it.
 //!
-//! 1. [`Problem`] - measured forces, columns of the model, candidates with the constants that are searched for.
+//! 1. [`DiagnosisProblem`] - measured forces, columns of the model, candidates with the constants that are searched for.
 //! 2. `pool`, `factored`, `beside`, `bench` - inner products of all columns, so that a set of effects is fitted in microseconds;
 //!    `tuning` finds constants, `following` makes columns that depend on the fit, `readings` those of forces that are read
 //!    wrongly, `tilt` turns gravity, `body` places a further mass, `constant` moves a number of the model.
 //! 3. `search` - forward over sets, with exchanges; `evidence` decides on time that was not fitted; `settle` makes the last
 //!    set as small and simple as it can be.
 //! 4. `aliases` - what this recording cannot tell apart; `reproducible` - what no candidate explains and no noise is.
-//! 5. [`Diagnosis`] - the answer.
+//! 5. [`ModelDiagnosis`] - the answer.
 //!
 //! What recordings have and the model does not lack is told by name too: `cleaning` takes outliers and `hum` off beforehand,
 //! `drifts` and `readings` are candidates among the others, and `disturbance` says what is left, and of which sort.
@@ -119,7 +119,7 @@ pub struct SelectionStep {
 pub struct IdentifiedEffect {
     /// What and where.
     pub effect: LocatedEffect,
-    /// Position in [`Problem::candidates`].
+    /// Position in [`DiagnosisProblem::candidates`].
     pub candidate: usize,
     /// Constants that were searched for.
     pub constants: Vec<(String, f64)>,

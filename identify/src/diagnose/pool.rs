@@ -224,7 +224,7 @@ impl<'a> ColumnPool<'a> {
         }
     }
 
-    /// The same as [`Pool::products_of`] of some pairs of a tile, in their order.
+    /// The same as [`ColumnPool::products_of`] of some pairs of a tile, in their order.
     fn compute_tile(
         &self,
         rows: &[usize],

@@ -128,7 +128,7 @@ pub enum ColumnSource {
     Body(AttachedBody),
     /// A number of the model is off; the parameter is by how much.
     Constant(ConstantCorrection),
-    /// They depend on what the drives carry, which the fit says: see [`Supply::carried`].
+    /// They depend on what the drives carry, which the fit says: see [`ColumnProvider::load_dependent_columns`].
     LoadDependent,
 }
 

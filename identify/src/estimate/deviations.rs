@@ -17,7 +17,7 @@
 //! 4. Recolouring by `1/(1 - a)` and the factor `T/(T - n_parameters)`.
 //!
 //! All this is a limit of many samples: residuals of a fit are orthogonal to its columns, so with few of them their
-//! influences cancel and the estimate goes to nothing. [`Deviations::few_samples`] says when; then a deviation is never
+//! influences cancel and the estimate goes to nothing. [`ParameterUncertainty::few_samples`] says when; then a deviation is never
 //! below the classical one, which takes the degrees of freedom off exactly.
 //!
 //! Bartlett's sum over lags is computed as the sum over all windows of `L` samples of

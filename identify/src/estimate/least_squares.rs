@@ -254,7 +254,7 @@ impl LeastSquares {
 
     /// The least-squares solution. Where the rows do not determine all parameters, the
     /// undetermined directions keep the value 0 (in columns of equal norm: the shortest
-    /// solution), and [`Solution::undetermined`] names them.
+    /// solution), and [`RegressionSolution::undetermined`] names them.
     /// Fails when there are no rows or no parameters.
     pub fn solve(&self) -> Result<RegressionSolution, LeastSquaresError> {
         self.solve_near(&vec![0.0; self.n_parameters])

@@ -3,12 +3,12 @@
 //! Every estimator shows the rows again and again rather than keep them, or works on the triangle that they leave.
 //!
 //! 1. [`LeastSquares`]: rows to a triangle, channel by channel, so that columns that are zero for a joint cost nothing;
-//!    [`Triangle`] is that triangle as a value, [`Solution`] what it says.
+//!    [`RFactor`] is that triangle as a value, [`RegressionSolution`] what it says.
 //! 2. [`estimate`]: weights of channels and Huber's function by reweighted rows.
-//! 3. [`autocorrelated_deviations`]: covariance from the influence of each sample, whichever estimator made it.
-//! 4. On the triangle alone: [`with_prior`] (nominal values as soft constraints), [`essential`] (what the recording
+//! 3. [`uncertainty_with_autocorrelation`]: covariance from the influence of each sample, whichever estimator made it.
+//! 4. On the triangle alone: [`solve_with_prior`] (nominal values as soft constraints), [`essential`] (what the recording
 //!    supports), [`physical_parameters`] (what bodies can have).
-//! 5. [`instrumental`]: the triangle of instruments and regressor side by side, for states that are noisy themselves.
+//! 5. [`estimate_with_instruments`]: the triangle of instruments and regressor side by side, for states that are noisy themselves.
 //!
 //! [`numeric_rank`] is eq. (9) on given values, and [`reduce_numerically`] the numeric fallback reduction.
 

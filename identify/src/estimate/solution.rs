@@ -28,7 +28,7 @@ pub struct RegressionSolution {
     pub values: Vec<f64>,
     /// Standard deviations under the classical assumption of independent residuals of equal
     /// variance, which recordings hardly ever meet; infinite for what is not determined, NaN when
-    /// there are no more rows than parameters. See [`Deviations`](crate::Deviations) for honest ones.
+    /// there are no more rows than parameters. See [`ParameterUncertainty`](crate::Deviations) for honest ones.
     pub classical_std: Vec<f64>,
     /// Ratio of the largest to the smallest singular value of the regressor (2-norm); infinite
     /// when the rank is deficient.

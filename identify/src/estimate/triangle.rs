@@ -25,7 +25,7 @@ impl RFactor {
         }
     }
 
-    /// The triangle of `n` parameters whose entries, from [`Triangle::entries`], were kept elsewhere, and from how many rows they
+    /// The triangle of `n` parameters whose entries, from [`RFactor::entries`], were kept elsewhere, and from how many rows they
     /// came, those of zeros left out.
     /// Fails when there are not `(n + 1)(n + 2) / 2` entries or one is not finite.
     pub fn from_entries(n: usize, rows: usize, entries: &[f64]) -> Result<Self, LeastSquaresError> {

@@ -5,10 +5,10 @@
 //! 2. `search` - sequential quadratic programming from each start.
 //! 3. `feasible` - what was found, shrunk until no limit is exceeded, between samples either.
 //!
-//! What is made small is a [`Criterion`]: uncertainty of the base parameters, or, with [`separate`], what two effects have in
+//! What is made small is a [`ExcitationCriterion`]: uncertainty of the base parameters, or, with [`separate`], what two effects have in
 //! common.
 //!
-//! How a mechanism moves is the business of the caller, who gives a [`Plant`].
+//! How a mechanism moves is the business of the caller, who gives a [`ExcitationPlant`].
 
 mod feasible;
 mod fourier;
@@ -19,6 +19,7 @@ pub mod separate;
 
 use std::fmt;
 
+use modelmill_runtime::RandomBits;
 use nalgebra::DMatrix;
 
 pub use fourier::FourierSeries;
@@ -62,14 +63,14 @@ pub trait ExcitationPlant {
     /// mechanism cannot follow.
     fn regressor(&self, motion: &ExcitationMotion) -> Option<DMatrix<f64>>;
 
-    /// Names of limits beyond those of coordinates, in the order of [`Plant::excess`].
+    /// Names of limits beyond those of coordinates, in the order of [`ExcitationPlant::excess`].
     fn limits(&self) -> Vec<String>;
 
-    /// For each of [`Plant::limits`] and each sample, by how much it is exceeded, as a share of half its range:
+    /// For each of [`ExcitationPlant::limits`] and each sample, by how much it is exceeded, as a share of half its range:
     /// negative inside, -1 in the middle; `None` where the mechanism cannot follow.
     fn excess(&self, motion: &ExcitationMotion) -> Option<Vec<Vec<f64>>>;
 
-    /// For [`Criterion::Separation`], by how much effects can be told apart along a motion, such as a force in root mean
+    /// For [`ExcitationCriterion::Separation`], by how much effects can be told apart along a motion, such as a force in root mean
     /// squares; `None` where the mechanism cannot follow, and for plants that are not asked to tell any apart.
     fn separation(&self, _motion: &ExcitationMotion) -> Option<f64> {
         None
@@ -97,7 +98,7 @@ pub enum ExcitationCriterion {
     Condition,
     /// `-log det(W'W / N)`, which does not depend on units.
     LogDet,
-    /// What effects have in common: made small is `-log` of [`Plant::apart`].
+    /// What effects have in common: made small is `-log` of [`ExcitationPlant::apart`].
     Separation,
 }
 
@@ -285,7 +286,7 @@ pub fn random_motions(
     }
     let measure = measure::TrajectoryEvaluator::new(plant, limits, options);
     let mut motions = Vec::new();
-    let mut draws = random::TrajectoryRandom(options.seed);
+    let mut draws = RandomBits::new(options.seed);
     random::draw_feasible(&measure, &mut draws, wanted, |series| {
         motions.push(measure.sample_motion(&series));
         SearchFlow::Continue(())

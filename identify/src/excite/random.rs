@@ -1,5 +1,7 @@
 //! Random trajectories that keep the limits, as large as the limits let them be.
 
+use modelmill_runtime::RandomBits;
+
 use super::feasible::{max_scale_factor, worst_plant_limit};
 use super::measure::{TrajectoryEvaluator, half_width};
 use super::{ExcitationCriterion, ExciteError, FourierSeries, SearchFlow};
@@ -23,7 +25,7 @@ pub(super) fn draw_starts(
     progress: &dyn Fn(usize) -> SearchFlow,
 ) -> Result<FeasibleStarts, ExciteError> {
     let wanted = measure.options.random.max(1);
-    let mut draws = TrajectoryRandom(measure.options.seed);
+    let mut draws = RandomBits::new(measure.options.seed);
     let mut drawn: Vec<(f64, Vec<FourierSeries>)> = Vec::new();
     let mut feasible = 0;
     let mut stopped = false;
@@ -70,7 +72,7 @@ fn no_start_error(measure: &TrajectoryEvaluator<'_>) -> ExciteError {
 /// Draws trajectories until as many as are wanted have kept the limits, patience ends, or `take` says that it is enough; an error if none has.
 pub(super) fn draw_feasible(
     measure: &TrajectoryEvaluator<'_>,
-    draws: &mut TrajectoryRandom,
+    draws: &mut RandomBits,
     wanted: usize,
     mut take: impl FnMut(Vec<FourierSeries>) -> SearchFlow,
 ) -> Result<(), ExciteError> {
@@ -110,15 +112,15 @@ pub(super) fn draw_feasible(
 fn draw_series(
     measure: &TrajectoryEvaluator<'_>,
     i: usize,
-    draws: &mut TrajectoryRandom,
+    draws: &mut RandomBits,
 ) -> FourierSeries {
     let n = measure.options.harmonics;
     let omega = measure.omega();
     let [low, high] = measure.limits[i].position;
     let shape = FourierSeries {
         offset: 0.0,
-        mu: (0..n).map(|_| draws.normal()).collect(),
-        nu: (0..n).map(|_| draws.normal()).collect(),
+        mu: (0..n).map(|_| draws.nearly_normal()).collect(),
+        nu: (0..n).map(|_| draws.nearly_normal()).collect(),
         omega,
     };
     let [least, greatest] = shape.extremes(0);
@@ -126,26 +128,6 @@ fn draw_series(
     let factor = max_scale_factor(&measure.limits[i], &shape).min(by_position);
     let mut series = shape.scale_amplitude(factor);
     let room = (2.0 * half_width([low, high]) - factor * (greatest - least)).max(0.0);
-    series.offset = low - factor * least + room * draws.uniform();
+    series.offset = low - factor * least + room * draws.below_one();
     series
-}
-
-/// Random numbers that are the same on every machine (Steele et al., `SplitMix`, 2014).
-pub(super) struct TrajectoryRandom(pub(super) u64);
-
-impl TrajectoryRandom {
-    /// Between 0 and 1.
-    fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^= z >> 31;
-        (z >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    /// Nearly normal: the sum of twelve uniform numbers, in which no function of a mathematical library has a part.
-    fn normal(&mut self) -> f64 {
-        (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
-    }
 }

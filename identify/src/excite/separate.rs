@@ -48,7 +48,7 @@ pub struct SeparationMeasure {
     /// Of what is left the other way round: that rival, with the values in which it is most like the effect and made as
     /// large as `beyond`, where base and effect are fitted to it.
     pub reverse_residual: f64,
-    /// The rival that mimics the effect best, by its position in [`Question::rivals`].
+    /// The rival that mimics the effect best, by its position in [`SeparationProblem::rivals`].
     pub rival: usize,
 }
 

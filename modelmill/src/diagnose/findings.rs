@@ -52,7 +52,7 @@ fn check_prediction(answer: &DiagnosisSolution, judged: ValidationMethod) -> Out
     )))
 }
 
-/// Options of a diagnosis. [`Question::default`] estimates all parameters that are not known in the model file.
+/// Options of a diagnosis. [`DiagnosisOptions::default`] estimates all parameters that are not known in the model file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DiagnosisOptions {
     /// Which parameters keep their nominal values.

@@ -1,4 +1,4 @@
-//! `diagnose`: which physical effect a model lacks. Input are a model and recordings, output are [`Findings`]. Candidates come from
+//! `diagnose`: which physical effect a model lacks. Input are a model and recordings, output are [`DiagnosisFindings`]. Candidates come from
 //! the effect library, their columns from the derivation of the model, and a search over sets of them decides.
 //!
 //! `places` -> `candidates` (the effects that `add` could add) -> `columns` (their forces along the recordings) -> `problem`

@@ -1,4 +1,4 @@
-//! States the search for missing effects in numbers and solves it. Input are a model and recordings, output is an [`Answer`] with
+//! States the search for missing effects in numbers and solves it. Input are a model and recordings, output is an [`DiagnosisSolution`] with
 //! the problem, the diagnosis and the candidates.
 
 use modelmill_codegen::ModelEvaluator;

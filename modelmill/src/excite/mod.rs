@@ -28,7 +28,7 @@ pub use modelmill_identify::excite::{ExcitationCriterion, Options};
 use plant::ModelPlant;
 pub use separated::SeparationResult;
 
-/// What is asked of an excitation; [`Request::default`] is the paper's, with samples at 500 Hz.
+/// What is asked of an excitation; [`ExcitationRequest::default`] is the paper's, with samples at 500 Hz.
 #[derive(Clone, Debug)]
 pub struct ExcitationRequest {
     /// The search: harmonics, period, criterion, how many trajectories are tried, seed.

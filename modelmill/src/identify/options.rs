@@ -2,7 +2,7 @@
 
 use crate::identify::refine::EstimateRefinement;
 
-/// How parameters are estimated; [`Estimation::default`] is least squares, where need be with each drive by
+/// How parameters are estimated; [`EstimatorOptions::default`] is least squares, where need be with each drive by
 /// its own residuals.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct EstimatorOptions {

@@ -10,6 +10,7 @@ use std::cmp::Ordering;
 use modelmill_codegen::review::NumericRank;
 use modelmill_codegen::{ModelEvaluator, MotionStates, PoseFault, PoseReason, ReductionMethod};
 use modelmill_identify::estimate::{condition_number, numeric_rank};
+use modelmill_runtime::RandomBits;
 use nalgebra::DMatrix;
 
 use crate::error::Outcome;
@@ -243,7 +244,7 @@ struct StateSampling {
     /// Nominal values and motions of the active coordinates.
     active: Vec<(f64, bool)>,
     n_drives: usize,
-    draws: UniformDraws,
+    random: RandomBits,
     /// Positions, rates, accelerations and loads, each as columns of samples.
     columns: [Vec<Vec<f64>>; 4],
     reach: f64,
@@ -264,7 +265,7 @@ impl StateSampling {
         Self {
             active,
             n_drives,
-            draws: UniformDraws(0x6d69_6c6c),
+            random: RandomBits::new(0x6d69_6c6c),
             columns: [n, n, n, n_drives].map(|n| vec![Vec::new(); n]),
             reach: REACH,
             refused: 0,
@@ -287,7 +288,7 @@ impl StateSampling {
                     } else {
                         0.5 * self.reach
                     };
-                    nominal + reach * self.draws.next_uniform()
+                    nominal + reach * draw(&mut self.random)
                 })
                 .collect();
             let still = MotionStates {
@@ -312,7 +313,7 @@ impl StateSampling {
             }
             for (set, range) in self.columns[1..].iter_mut().zip([RATE, ACCELERATION, LOAD]) {
                 for column in set {
-                    column.push(range * self.draws.next_uniform());
+                    column.push(range * draw(&mut self.random));
                 }
             }
         }
@@ -354,16 +355,7 @@ impl StateSampling {
     }
 }
 
-/// Uniform numbers in (-1, 1), the same on every machine (Steele et al., `SplitMix`, 2014).
-struct UniformDraws(u64);
-
-impl UniformDraws {
-    fn next_uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^= z >> 31;
-        (z >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
-    }
+/// A uniform number in [-1, 1).
+fn draw(random: &mut RandomBits) -> f64 {
+    2.0 * random.below_one() - 1.0
 }

@@ -2,7 +2,8 @@
 
 use modelmill_boundary::text::plain;
 use modelmill_codegen::review::NumericMethod;
-use modelmill_codegen::{BaseReduction, Derivation, ReductionMethod, module_name};
+use modelmill_codegen::{BaseReduction, Derivation, ReductionMethod};
+use modelmill_emit::module_name;
 use modelmill_spec::{
     CoordinateMotion, Diagnostic, DiagnosticSeverity, DriveKind, LoadFailure, LoadedModel,
     Mechanism, SourceFiles,

@@ -2,7 +2,7 @@
 
 use modelmill_identify::StatePreparation;
 
-/// How a recording is read and its states are prepared; [`Reading::default`] suits a file with our names.
+/// How a recording is read and its states are prepared; [`RecordingOptions::default`] suits a file with our names.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RecordingOptions {
     /// Our columns with what the recording calls them, `("theta1", "pos_left")`, or with a sum of its columns, in other

@@ -1,7 +1,7 @@
 //! Runs of many machines of one kind as sums over the same columns, so that they add: those of a day, of a machine, of a fleet.
 //!
 //! What a column means must not depend on the run: those of scales, clocks and encoders' zeros are built on parameters that
-//! are the same for all, from reference runs ([`CommonGround`]). Rows are made white by each run's own noise, and count
+//! are the same for all, from reference runs ([`ReferenceFit`]). Rows are made white by each run's own noise, and count
 //! independent numbers of variance 1 whichever run they came from.
 
 use std::sync::Arc;
@@ -71,7 +71,7 @@ impl ReferenceFit {
         })
     }
 
-    /// The same ground from what was kept of it: [`CommonGround::values`] and [`CommonGround::sizes`].
+    /// The same ground from what was kept of it: [`ReferenceFit::values`] and [`ReferenceFit::sizes`].
     ///
     /// Fails where they are of another model.
     pub fn from_parts(model: &Model, values: &[f64], sizes: Vec<NormalEquations>) -> Outcome<Self> {

@@ -73,7 +73,7 @@ pub struct ForceDifference {
 }
 
 impl VariantComparison {
-    /// Fails where two models cannot be held beside each other, as [`Variants::along`] would, before any recording is read.
+    /// Fails where two models cannot be held beside each other, as [`VariantComparison::along`] would, before any recording is read.
     pub fn check(models: [&Model; 2]) -> Outcome {
         ModelCounterparts::match_models(models).map(|_| ())
     }

@@ -12,7 +12,7 @@ use crate::Real;
 
 /// A change that another one explains this many times less likely (as twice the logarithm) is no rival: 1 to 10000.
 const RIVAL_LOG_RATIO: f64 = 18.42;
-/// How much of a window's usual information the reference has in [`Watch::estimate`].
+/// How much of a window's usual information the reference has in [`ParameterWatch::estimate`].
 const REFERENCE_WEIGHT: f64 = 0.01;
 /// The same of the reference on its own column, while it learns the noise.
 const RIDGE: f64 = 1e-6;
@@ -24,8 +24,8 @@ pub enum WatchVerdict<T, const NB: usize> {
     Learning,
     /// Nothing has changed by more than windows differ anyway.
     Quiet,
-    /// Something has changed; stays until [`Watch::accept`], and is refined while the window shows the change. At first
-    /// the window holds samples from before too, and another parameter may seem to have changed: see [`Change::is_told`].
+    /// Something has changed; stays until [`ParameterWatch::accept`], and is refined while the window shows the change. At first
+    /// the window holds samples from before too, and another parameter may seem to have changed: see [`WatchChange::is_identified`].
     Changed(WatchChange<T, NB>),
 }
 
@@ -55,6 +55,13 @@ impl<T, const NB: usize> WatchChange<T, NB> {
     #[must_use]
     pub fn is_identified(&self) -> bool {
         self.steady && !self.rivals.contains(&true)
+    }
+
+    /// The name of [`WatchChange::is_identified`] in earlier versions.
+    #[deprecated(note = "renamed to `is_identified`")]
+    #[must_use]
+    pub fn is_told(&self) -> bool {
+        self.is_identified()
     }
 }
 

@@ -1,6 +1,6 @@
 //! What is made of reduced rows once least squares has its solution: one list, with a file for each entry.
 //!
-//! To add one, write its file, put it into [`Refinement`], [`Refined`] and [`refine`], say what it tells in
+//! To add one, write its file, put it into [`EstimateRefinement`], [`RefinementResult`] and [`refine`], say what it tells in
 //! `print/estimation`, and give the program its option in `args/estimation`.
 
 mod essential;
