@@ -42,7 +42,7 @@ pub struct LoadedModel {
 pub(crate) struct FileEntries {
     /// The merged model file.
     pub(crate) model: ModelEntry,
-    /// Kinds of effects of all libraries, in the order in which they were read.
+    /// Kinds of effects of all libraries of the user, in the order in which they were read.
     pub(crate) libraries: Vec<EffectKindEntry>,
 }
 

@@ -140,7 +140,7 @@ impl FormulaParser<'_> {
         self.skip_blanks();
         let start = self.at;
         let mut minus = false;
-        // Two signs in a row, as in `a - -b`, are accepted; three are not.
+        // Up to two signs before a factor are accepted, in addition to the sign of a term.
         let mut signs = 0;
         while let Some(sign @ ('+' | '-')) = self.peek() {
             signs += 1;

@@ -152,7 +152,7 @@ fn kind_of(found: &Metadata, path: &Path) -> PathKind {
     if std::os::unix::fs::FileTypeExt::is_fifo(&found.file_type()) {
         return PathKind::Stream;
     }
-    // A descriptor of the shell may be a socket on some systems.
+    // Anything else that the shell has opened is read as a stream, too.
     if is_handed_over(path) {
         PathKind::Stream
     } else {

@@ -46,8 +46,8 @@ impl RecordedCoordinate<'_> {
     }
 
     /// Prepares missing derivatives from the highest one that is recorded. Positions and rates then pass the same
-    /// filter, so that all states belong to one motion. A recorded acceleration is kept if the positions are
-    /// smoothed. `None` if there are too few samples.
+    /// filter, so that all states belong to one motion. A recorded acceleration is kept. `None` if there are
+    /// too few samples.
     ///
     /// Fails when the filter does not fit the sampling rate.
     pub(crate) fn prepare(

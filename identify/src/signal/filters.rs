@@ -203,7 +203,7 @@ impl LowPass {
                 }
             })
             .collect();
-        // The gain at zero is applied once, in the first section.
+        // The gain at zero is applied once, in one of the sections.
         for b in &mut sections[0].b {
             *b *= dc_gain;
         }
