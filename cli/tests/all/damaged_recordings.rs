@@ -147,7 +147,7 @@ fn faults_of_sensors_are_named_and_treated() {
     spike[2500][4] = -1e6;
     let (off, says) = identified(&write("spike.csv", &spike), &[]);
     assert!(
-        off < 1.0 && says.contains("1 spike that no drive makes"),
+        off < 1.0 && says.contains("1 spike that no drive can cause"),
         "{says}"
     );
     // Spikes of a million newtons would have moved parameters by many of their deviations.

@@ -342,7 +342,10 @@ fn columns_of_one_letter_are_not_proposed_for_one_another() {
     for columns in ["t,y,motor", "s,x,motor", "t,s,motor"] {
         let data = recording("letters", columns, 50, |[t, x, ..]| vec![t, x, 0.0]);
         let says = refused(1, &["compare", &model, "--data", &data]);
-        assert!(!says.contains("meant?") && says.contains("--map"), "{says}");
+        assert!(
+            !says.contains("did you mean") && says.contains("--map"),
+            "{says}"
+        );
     }
     // A column that the model itself wants is not proposed for another one.
     let data = recording("theta", "t,theta1,motor", 50, |[t, x, ..]| vec![t, x, 0.0]);
@@ -356,7 +359,8 @@ fn columns_of_one_letter_are_not_proposed_for_one_another() {
         ],
     );
     assert!(
-        says.contains("there is no column `theta2`. The columns are") && !says.contains("meant?"),
+        says.contains("there is no column `theta2`. The columns are")
+            && !says.contains("did you mean"),
         "{says}"
     );
 }

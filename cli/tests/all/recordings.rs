@@ -118,7 +118,7 @@ fn options_that_do_nothing_are_named() {
     assert!(!says.contains("nothing to"), "{says}");
     assert!(!with(&[]).err.contains("nothing to"));
     let says = with(&["--trim", "10"]).err;
-    assert!(says.contains("as asked for by `--trim`"), "{says}");
+    assert!(says.contains("as requested by `--trim`"), "{says}");
 }
 
 #[test]

@@ -75,7 +75,7 @@ fn two_periods_or_one_are_projected_on_their_series() {
             let run = prepared(seed, samples, SmoothingMethod::default());
             let note = run.notes[0].says.in_library_words();
             assert!(
-                note.contains("with 7 harmonics, since it leaves nothing but white noise"),
+                note.contains("with 7 harmonics, because its residual is white noise"),
                 "seed {seed}, {samples} samples: {note}"
             );
             assert_eq!(run.samples(), samples as usize);
