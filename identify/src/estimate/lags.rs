@@ -63,7 +63,7 @@ impl LagProducts {
         Self {
             width,
             lags,
-            /// The samples of the present window, oldest first.
+            // The samples of the present window, oldest first.
             recent: VecDeque::with_capacity(lags + 1),
             products: vec![0.0; (lags + 1) * width],
         }

@@ -131,12 +131,11 @@ impl LawBaseline {
         }
     }
 
-    /// Adds a law to what is projected out and fitted.
+    /// Adds a law to the columns that are projected out and fitted; `site` is the index of its place.
     fn add_law(
         &mut self,
         few: &LawSamples<'_>,
         many: &LawSamples<'_>,
-        /// Index of its place.
         site: usize,
         terms: &[LawProduct],
     ) {
