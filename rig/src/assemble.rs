@@ -121,9 +121,7 @@ fn check_columns(merged: &MergedRig, log: &mut RigLog) {
         let (file, range) = last.unwrap_or((0, 0..0));
         log.error(
             source_span(file, &range),
-            format!(
-                "coordinates ({n_coordinates}) and drives ({n_drives}) of this rig do not match"
-            ),
+            format!("this rig has {n_coordinates} coordinate(s) and {n_drives} drive(s)"),
             "",
             "give one `[[coordinate]]` and one `[[drive]]` per degree of freedom",
         );
@@ -145,7 +143,7 @@ fn check_columns(merged: &MergedRig, log: &mut RigLog) {
             if columns.contains(&column) {
                 log.error(
                     source_span(file, &name.span()),
-                    format!("two columns of a recording would be called `{column}`"),
+                    format!("two columns of the recording would have the name `{column}`"),
                     "",
                     "choose another name",
                 );
@@ -173,7 +171,7 @@ fn body(item: &FileItem<BodyEntry>, log: &mut RigLog) -> RigBody {
                 log.error(
                     source_span(file, &spanned.span()),
                     format!(
-                        "no body has this inertia: its principal moments are {:.4}, {:.4}, {:.4}",
+                        "this inertia is not physically possible: its principal moments are {:.4}, {:.4}, {:.4}",
                         moments[0], moments[1], moments[2]
                     ),
                     "expected principal moments that are not below zero",
@@ -246,7 +244,10 @@ fn find_joint(rig: &Rig, file: usize, name: &RigName, log: &mut RigLog) -> Optio
         Some(at) if rig.joints[at].motion.is_none() => {
             log.error(
                 source_span(file, &name.span()),
-                format!("the joint `{}` has no single coordinate", name.get_ref()),
+                format!(
+                    "the joint `{}` does not have exactly one coordinate",
+                    name.get_ref()
+                ),
                 "expected a revolute or a prismatic joint",
                 "",
             );
@@ -281,7 +282,7 @@ fn lumped_mass(
                 entry.at.get_ref()
             ),
             "expected a point of the same body",
-            "both balances are those of one body",
+            "the mass belongs to one body, in the balance of forces and in the balance of moments",
         );
     }
     Some(RigLumpedMass {
@@ -333,7 +334,7 @@ fn joint(rig: &Rig, item: &FileItem<RigJointEntry>, log: &mut RigLog) -> RigJoin
         let range = entry.between.span();
         log.error(
             source_span(file, &range),
-            "this joint joins a body to itself".to_owned(),
+            "this joint connects a body to itself".to_owned(),
             "expected two bodies",
             "",
         );
@@ -404,7 +405,7 @@ fn joint_anchors(
                 _ => {
                     log.error(
                         source_span(file, &points.span()),
-                        "these points do not fit the joint's bodies".to_owned(),
+                        "these points are not on the bodies of this joint".to_owned(),
                         "expected one point of either body, or one of each in the order of `between`",
                         "",
                     );
@@ -415,8 +416,8 @@ fn joint_anchors(
         _ => {
             log.error(
                 whole,
-                "it is not clear where this joint is".to_owned(),
-                "expected one of `at` and `points`",
+                "the place of this joint is missing, or stated twice".to_owned(),
+                "expected either `at` or `points`",
                 "`at = [x, y, z]` is in the base frame, nominal configuration; `points` names points of its bodies",
             );
             None
@@ -454,8 +455,8 @@ fn coordinate(rig: &mut Rig, item: &FileItem<RigCoordinateEntry>, log: &mut RigL
     {
         log.error(
             source_span(file, &wrong.span()),
-            "this nominal value means nothing".to_owned(),
-            "expected a finite value of a joint's coordinate; a length follows from its points",
+            "this nominal value is not valid".to_owned(),
+            "expected a finite value, for the coordinate of a joint; a length is determined by its points",
             "",
         );
     }
@@ -502,8 +503,11 @@ fn drive(rig: &mut Rig, item: &FileItem<RigDriveEntry>, log: &mut RigLog) {
 fn report_unclear_kind(file: usize, name: &RigName, keys: &str, log: &mut RigLog) {
     log.error(
         source_span(file, &name.span()),
-        format!("it is not clear what `{}` is", name.get_ref()),
-        &format!("expected one of {keys}"),
+        format!(
+            "the definition of `{}` is missing, or stated twice",
+            name.get_ref()
+        ),
+        &format!("expected exactly one of {keys}"),
         "",
     );
 }

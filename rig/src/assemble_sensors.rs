@@ -44,9 +44,9 @@ fn channel(item: &FileItem<SensorEntry>, what: &str, log: &mut RigLog) -> Sensor
         if what != "coordinate" || !(1..=52).contains(bits.get_ref()) {
             log.error(
                 source_span(file, &bits.span()),
-                "this number of bits means nothing here".to_owned(),
-                "expected 1 to 52, of an encoder",
-                "an encoder of `bits = 20` tells 2^20 angles of a turn apart",
+                "`bits` is not valid here".to_owned(),
+                "expected 1 to 52 bits, for an encoder",
+                "an encoder with `bits = 20` resolves 2^20 angles per revolution",
             );
         } else {
             resolution = 2.0 * std::f64::consts::PI / (1_u64 << bits.get_ref()) as f64;
@@ -56,7 +56,7 @@ fn channel(item: &FileItem<SensorEntry>, what: &str, log: &mut RigLog) -> Sensor
         if what == "coordinate" {
             log.error(
                 source_span(file, &entry.of.span()),
-                "an encoder reads no current".to_owned(),
+                "an encoder does not measure a current".to_owned(),
                 "",
                 "`current` belongs to a `[[force_sensor]]`",
             );
@@ -65,7 +65,12 @@ fn channel(item: &FileItem<SensorEntry>, what: &str, log: &mut RigLog) -> Sensor
             * above_zero(file, &current.resolution, "a resolution", log);
     }
     SensorChannel {
-        noise: not_negative(file, entry.noise.as_ref(), "a noise's deviation", log),
+        noise: not_negative(
+            file,
+            entry.noise.as_ref(),
+            "a standard deviation of noise",
+            log,
+        ),
         resolution,
         delay: not_negative(file, entry.delay.as_ref(), "a delay", log),
     }

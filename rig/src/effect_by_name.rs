@@ -75,12 +75,12 @@ impl AllowedPlaces {
     fn description(self) -> &'static str {
         match self {
             Self::DrivesAndJoints => "a drive, a coordinate or a joint with one coordinate",
-            Self::Drives => "a drive, whose load is known",
+            Self::Drives => "a drive (its load is known)",
             Self::TwoDrivesOrJoints => "two drives or joints",
             Self::LinearDrives => "a linear drive",
             Self::Points => "a point of a body",
             Self::TwoPointsOfABody => {
-                "two points of one body: where the mass is, and where moments see it"
+                "two points of one body: where the mass is, and where the balance of moments assumes it"
             }
             Self::Base => "`base`",
             Self::Force => "`force`",
@@ -212,7 +212,7 @@ impl Rig {
         if wrong {
             faults.push(EffectFault {
                 part: EffectPart::Places,
-                message: format!("`{kind}` does not act at these places together"),
+                message: format!("`{kind}` cannot act at this combination of places"),
                 expected: format!("expected {}", acts.description()),
                 help: String::new(),
             });

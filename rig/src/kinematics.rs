@@ -76,13 +76,13 @@ impl fmt::Display for RigPoseError {
         match self {
             Self::OutOfReach { at, gap } => write!(
                 f,
-                "the joints do not close: `{at}` gapes by {gap:.2e}; keep the trajectory inside the workspace, and \
-                 check the points of this joint"
+                "the joints do not close: the gap at `{at}` is {gap:.2e}; keep the trajectory inside the workspace, \
+                 and check the points of this joint"
             ),
             Self::Undetermined { body } => write!(
                 f,
-                "joints and coordinates do not determine the motion: `{body}` is free to move; keep clear of \
-                 singular poses, or hold it by a joint"
+                "joints and coordinates do not determine the motion: `{body}` is free to move; avoid singular poses, \
+                 or fix it with a joint"
             ),
             Self::TooManyCoordinates {
                 freedoms,
@@ -94,7 +94,7 @@ impl fmt::Display for RigPoseError {
             ),
             Self::DrivesDeadlocked => write!(
                 f,
-                "the drives have no leverage here: no forces of theirs balance the load; keep clear of this pose"
+                "the drives cannot balance a load at this pose; avoid this pose"
             ),
         }
     }

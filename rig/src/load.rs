@@ -124,7 +124,7 @@ pub fn parse<T: serde::de::DeserializeOwned>(
     if text.len() > LARGEST_FILE {
         return Err(Box::new(plain_error(
             None,
-            "this file is too large to be meant",
+            "this file is too large to be read",
         )));
     }
     toml::from_str(text).map_err(|error| {

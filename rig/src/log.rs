@@ -52,7 +52,7 @@ pub(crate) fn vector(file: usize, entry: Option<&SpannedTriple>, log: &mut RigLo
     if !vector.iter().all(|x| x.is_finite()) {
         log.error(
             source_span(file, &entry.span()),
-            "this is not finite".to_owned(),
+            "this vector is not finite".to_owned(),
             "expected finite numbers",
             "",
         );

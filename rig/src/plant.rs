@@ -51,12 +51,13 @@ impl fmt::Display for PlantError {
         match self {
             Self::Count { found, expected } => write!(
                 f,
-                "there are {found} numbers where one is expected for each of {expected} coordinates or drives"
+                "found {found} numbers, but expected one for each of {expected} coordinates or drives"
             ),
             Self::Pose(reason) => reason.fmt(f),
             Self::NoAcceleration => write!(
                 f,
-                "no accelerations go with these forces; give every freedom a mass, and keep friction by load below what jams"
+                "these forces determine no accelerations; give every degree of freedom a mass, and keep \
+                 load-dependent friction below self-locking"
             ),
         }
     }

@@ -85,17 +85,17 @@ impl fmt::Display for SimulationError {
                 column,
                 largest,
             } => {
-                write!(f, "at t = {time} s `{column}` is no finite number; ")?;
+                write!(f, "at t = {time} s `{column}` is not finite; ")?;
                 match largest {
-                    Some(largest) => write!(f, "look at {largest}, which is too large to reckon with"),
-                    None => f.write_str(
-                        "look for numbers in the rig and in the trajectory that are too large to be multiplied",
-                    ),
+                    Some(largest) => write!(f, "{largest} is too large to compute with"),
+                    None => {
+                        f.write_str("look for very large numbers in the rig and in the trajectory")
+                    }
                 }
             }
             Self::NothingLeft { delay } => write!(
                 f,
-                "a sensor lags by {delay} s, longer than the whole trajectory; shorten the delay"
+                "the delay of a sensor, {delay} s, is longer than the trajectory; shorten the delay"
             ),
             Self::TooManySamples { rate } => write!(
                 f,
@@ -322,7 +322,8 @@ fn sample_times(
     let mut notes = Vec::new();
     if times.len() < n_all {
         notes.push(format!(
-            "the first {} samples are left out: a sensor lags by {longest} s, and there is no motion before t = {start} s",
+            "the first {} samples are left out: a sensor has a delay of {longest} s, and the trajectory starts at t = \
+             {start} s",
             n_all - times.len()
         ));
     }

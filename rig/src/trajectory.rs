@@ -60,13 +60,13 @@ impl fmt::Display for TrajectoryError {
             ),
             Self::Faulty { coordinate } => write!(
                 f,
-                "the columns of coordinate {} are not finite numbers, one per time",
+                "the columns of coordinate {} do not have one finite number per time",
                 coordinate + 1
             ),
             Self::TooShort => write!(
                 f,
-                "derivatives are missing, and finding them takes at least {STENCIL} samples; give the columns with \
-                 `_d` and `_dd`"
+                "derivatives are missing, and computing them takes at least {STENCIL} samples; add samples, or the \
+                 columns with `_d` and `_dd`"
             ),
         }
     }

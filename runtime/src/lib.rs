@@ -70,9 +70,9 @@ impl fmt::Display for PoseError {
         match self {
             Self::OutOfReach => f.write_str("the loops cannot close: the pose is out of reach"),
             Self::Singular => f.write_str("the pose is singular"),
-            Self::Undefined => f.write_str("a term of the model has no finite value there"),
+            Self::Undefined => f.write_str("a term of the model has no finite value at this state"),
             Self::NotFinite(input) => {
-                write!(f, "`{input}` is no number, or too large to compute with")
+                write!(f, "`{input}` is NaN, infinite or too large to compute with")
             }
         }
     }

@@ -93,8 +93,8 @@ impl fmt::Display for SelfTestError {
                 last,
             } => write!(
                 f,
-                "only {found} of {needed} random states around the nominal pose have an answer; the last one had none \
-                 because {last}"
+                "the model can be evaluated at only {found} of {needed} random states around the nominal pose; the \
+                 last failure was: {last}"
             ),
             Self::Rank {
                 of,
@@ -110,7 +110,7 @@ impl fmt::Display for SelfTestError {
                 found,
             } => write!(
                 f,
-                "{of} is {found} where all parameters together give {expected}"
+                "{of} gives a force of {found}, but all parameters together give {expected}"
             ),
         }
     }

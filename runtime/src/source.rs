@@ -24,7 +24,10 @@ pub const FILES: [(&str, &str); 24] = [
     ("src/real.rs", include_str!("real.rs")),
     ("src/self_test.rs", include_str!("self_test.rs")),
     ("src/solve.rs", include_str!("solve.rs")),
-    ("src/source.rs", "//! Stays with the project.\n"),
+    (
+        "src/source.rs",
+        "//! Empty in this copy: the project keeps the texts of the sources here.\n",
+    ),
     ("src/wide.rs", include_str!("wide.rs")),
 ];
 

@@ -57,11 +57,12 @@ impl ReductionMethod {
             }
             | Self::Unreduced => None,
             Self::Exact { .. } => Some(
-                "the constants stand as the numbers of this file: base and equations hold for these values alone".to_owned(),
+                "the constants are replaced by the values of this file: base and equations are valid for these values \
+                 only".to_owned(),
             ),
             Self::Numeric { because, residual, .. } => Some(format!(
-                "the base parameters were found numerically, on the values of this file: {because}; factors are rounded (they \
-                 leave {residual:.1e} of a column), and base and factors hold for these values alone"
+                "the base parameters were computed numerically from the values of this file: {because}; factors are \
+                 rounded (residual {residual:.1e} of a column), and base and factors are valid for these values only"
             )),
         }
     }

@@ -15,7 +15,7 @@ pub(crate) fn check_values(mechanism: &Mechanism) -> Result<(), DeriveError> {
         .map_or(Ok(()), |(name, value)| {
             Err(DeriveError::NotFinite {
                 what: format!("the value of `{name}`, {value},"),
-                todo: "give it another one",
+                todo: "set it to a finite number",
             })
         })
 }

@@ -130,7 +130,7 @@ impl WatchSession {
         let mut lines = Vec::new();
         if let Some(t) = self.learned {
             lines.push(format!(
-                "{t:7.2} s  the watch has learned how this machine moves"
+                "{t:7.2} s  the watch has learned the usual motion of this machine"
             ));
         }
         let mut told = self.identified.iter();
@@ -141,7 +141,7 @@ impl WatchSession {
             };
             let parameter = &model::BASE_PARAMETERS[change.parameter];
             lines.push(format!(
-                "{t:7.2} s  it is {}, by {:+.1} +- {:.1} {}; this alone explains {:.0} % of what changed",
+                "{t:7.2} s  {} changed by {:+.1} +- {:.1} {}; this parameter alone explains {:.0} % of the change",
                 parameter.expression,
                 change.amount,
                 change.deviation,
@@ -159,8 +159,8 @@ impl WatchSession {
         let mean = 1e6 * sorted.iter().sum::<f64>() / sorted.len() as f64;
         let most = 1e6 * sorted[sorted.len() * 999 / 1000];
         format!(
-            "a step of 1000 us takes {mean:.2} us in the mean, regressor included, and 999 of 1000 take less than \
-             {most:.2} us"
+            "a step of the watch with its regressor takes {mean:.2} us on average, and 999 of 1000 steps take less \
+             than {most:.2} us; the cycle is 1000 us"
         )
     }
 }

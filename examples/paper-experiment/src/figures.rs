@@ -116,12 +116,12 @@ pub(crate) fn decomposition(title: &str, along: &TreatmentRun, drives: &[String]
             .map(|(e, p)| e - p)
             .collect();
         for (what, values) in [
-            ("error of the paper's treatment, rig less model", &error[d]),
+            ("error of the paper's treatment, rig minus model", &error[d]),
             (
                 "force of the misplaced m4, from the models alone",
                 &placement[d],
             ),
-            ("what is left of the error without it", &rest),
+            ("error minus this force", &rest),
         ] {
             figure.panel_with(
                 &format!("{drive}: {what}, N"),
@@ -142,7 +142,7 @@ pub(crate) fn printed_change(title: &str, along: &TreatmentRun, drives: &[String
         figure.panel_with(
             &format!("{drive}, N"),
             &[
-                ("changed by the paper's identification", &change[d]),
+                ("change by the paper's identification", &change[d]),
                 ("force of the misplaced m4", &placement[d]),
             ],
             &scale(limit),
@@ -175,7 +175,7 @@ pub(crate) fn peaks(title: &str, along: &TreatmentRun, drive: usize, name: &str)
     );
     look.limit = Some(100.0 * RELATIVE);
     figure.panel_with(
-        "the same by the force, per cent, cut off at 100: a peak at every dashed line",
+        "the same divided by the force, per cent, cut off at 100: a peak at every dashed line",
         &[("error / force", &relative)],
         &look,
     );
@@ -241,7 +241,7 @@ pub(crate) fn base_parameter_positions(experiment: &PaperExperiment) -> String {
         );
     }
     frame(
-        "How far each base parameter goes from the calculated to the consistent value",
+        "Position of each base parameter between the calculated (0) and the consistent value (1)",
         bottom + 44.0,
         &body,
     )
@@ -314,7 +314,7 @@ pub(crate) fn lengths(lengths: &[DistanceErrors], paper: [f64; 2]) -> String {
         top + height + 34.0
     );
     frame(
-        "Error of the paper's treatment, calculated, by the distance of the base joints",
+        "Error of the paper's treatment, calculated, over the distance of the base joints",
         top + height + 46.0,
         &body,
     )

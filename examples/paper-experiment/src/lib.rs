@@ -152,7 +152,7 @@ impl PaperExperiment {
             ("fe10", ColumnAlignment::Right),
             ("estimated fe1", ColumnAlignment::Right),
             ("fe10", ColumnAlignment::Right),
-            ("left without m4's shift", ColumnAlignment::Right),
+            ("residual without m4's shift", ColumnAlignment::Right),
         ];
         lines.extend(table(2, &columns, &rows));
         lines.join("\n")

@@ -16,22 +16,23 @@ impl ExperimentPage {
         let [calculated, consistent, estimated] = &experiment.base;
         self.0.push_str("<div class=\"short\">\n");
         self.paragraph(&format!(
-            "In short. The paper's reduced model misses the forces of its multibody model by 8 to 10 % before identification, \
-             and the paper blames the places of the lumped masses in general. Here the whole robot, 11 groups with true parallel \
-             cranks, is simulated by a program that shares no mechanics with the model. A reduced model that lets the platform's \
-             mass m4 act at one place agrees with it to {} without any identification: nothing is lost by the reduction. The \
-             paper's treatment, with the same masses, misses it by {} to {} (nrms), and {} of that error is the force of the one \
-             mass that the balance of moments sees elsewhere than the balance of forces. The size is not the paper's, for it depends on \
-             lengths and motions that the paper does not print (section 7); the cause is.",
+            "Summary. Before identification, the forces of the paper's reduced model differ from those of its \
+             multibody model by 8 to 10 %. The paper names the places of the lumped masses in general as the cause. \
+             Here the complete robot, 11 groups with true parallel cranks, is simulated by a program that shares no \
+             mechanics with the model. A reduced model in which the platform's mass m4 acts at one place agrees with \
+             it to {} without any identification: the reduction loses nothing. The paper's treatment, with the same \
+             masses, has an error of {} to {} (nrms). {} of that error is the force of one mass, m4, which the \
+             balance of moments places elsewhere than the balance of forces. The cause is that of the paper's error. \
+             The size differs, because it depends on lengths and motions that the paper does not print (section 7).",
             rounding(largest(plain, |along, d| along.errors(d, &along.calculated[1]).nrms)),
             percent(least(plain, |along, d| along.errors(d, &along.calculated[0]).nrms)),
             percent(largest(plain, |along, d| along.errors(d, &along.calculated[0]).nrms)),
             explained_text(plain),
         ));
         self.paragraph(&format!(
-            "The paper's own Table 1 says the same: p4,min = m4 (1 - dc3/d3), which is zero for a mass in one place, falls from \
-             {} kg to {} kg by identification (with d3 = 1.03 m; whatever d3 is, by more than {}), and p3,min and p5,min arrive \
-             within {} and {} of the consistent values.",
+            "The paper's own Table 1 agrees: p4,min = m4 (1 - dc3/d3), which is zero for a mass in one place, falls \
+             from {} kg to {} kg by identification (with d3 = 1.03 m; for any d3, by more than {}). p3,min and p5,min \
+             come within {} and {} of the consistent values.",
             significant(calculated[3], 3),
             significant(estimated[3], 3),
             percent(1.0 - printed::ESTIMATED[1].1 / nominal(experiment, "m4")),
@@ -39,8 +40,8 @@ impl ExperimentPage {
             percent((estimated[4] / consistent[4] - 1.0).abs()),
         ));
         self.paragraph(&format!(
-            "With spindles that have mass (rods of 8 kg), {} of the error of the paper's treatment (2-norm, verification run) is \
-             not m4, and that is the rods.",
+            "With spindles that have mass (rods of 8 kg), {} of the error of the paper's treatment (2-norm, \
+             verification run) is not caused by m4. This part comes from the rods.",
             percent(rods[1].explained_error().remains)
         ));
         self.0.push_str("</div>\n");
@@ -48,12 +49,13 @@ impl ExperimentPage {
 
     pub(crate) fn method(&mut self, experiment: &PaperExperiment) {
         let [excitation, test] = &experiment.trajectories;
-        self.heading("1  What was done");
+        self.heading("1  Method");
         self.paragraph(&format!(
-            "Excitation, eq. (14), (15) and (17): {} harmonics and a period of {} s, as in the paper, within the limits of \
-             spidermill.toml. The best of {} random trajectories has condition number {}, the one found {} (paper: {}). The test \
-             run is another, random series of {} harmonics and {} s. Coefficients are rounded to four decimals and printed at the \
-             end, so that the runs can be repeated without the search.",
+            "Excitation, eq. (14), (15) and (17): {} harmonics and a period of {} s, as in the paper, within the \
+             limits of spidermill.toml. The best of {} random trajectories has condition number {}, the optimised one \
+             {} (paper: {}). The test run is another random series, with {} harmonics and a period of {} s. \
+             Coefficients are rounded to four decimals and printed at the end, so that the runs can be repeated \
+             without the search.",
             excitation.series.first().map_or(0, |s| s.mu.len()),
             excitation.period,
             excitation.random,
@@ -64,16 +66,18 @@ impl ExperimentPage {
             test.period,
         ));
         self.paragraph(&format!(
-            "Both are run at {} Hz on two rigs: spidermill-full.toml, whose 11 groups sum up to Table 1, and \
-             spidermill-with-rods.toml, the same with a rod of 8 kg and 0.9 m in each spindle. The sensors are perfect, so \
-             whatever separates rig and model is the model's doing. Two reduced models are held against them: \
-             spidermill-paper.toml, which is eq. (5) and eq. (16) to the letter, and spidermill.toml, the consistent one.",
+            "Both are simulated at {} Hz on two rigs: spidermill-full.toml, whose 11 groups sum up to Table 1, and \
+             spidermill-with-rods.toml, the same with a rod of 8 kg and 0.9 m in each spindle. The sensors are \
+             perfect, so every difference between rig and model is a model error. Two reduced models are compared \
+             with them: spidermill-paper.toml, which is exactly eq. (5) and eq. (16), and spidermill.toml, the \
+             consistent one.",
             experiment.rate
         ));
         self.paragraph(
-            "What the paper does: half of m4 goes to each coupler. The coupler's balance of forces sees it at the joint R3m. The \
-             balance of moments about the elbow sees it at the coupler's centre of mass, as if it sat there. That is where the \
-             products m4 dc3 and m4 dc3^2 of eq. (5) come from; a mass at one place gives four base parameters instead of five.",
+            "The paper assigns half of m4 to each coupler. In the coupler's balance of forces it acts at the joint \
+             R3m. In the balance of moments about the elbow it acts at the coupler's centre of mass. This is the \
+             origin of the products m4 dc3 and m4 dc3^2 of eq. (5). A mass at one place gives four base parameters \
+             instead of five.",
         );
         let drives = experiment.paper.drives();
         let runs = &experiment.benches[0].runs;
@@ -90,11 +94,11 @@ impl ExperimentPage {
     }
 
     pub(crate) fn table_2(&mut self, experiment: &PaperExperiment) {
-        self.heading("2  Table 2, beside the paper's");
+        self.heading("2  Table 2, compared with the paper's");
         self.paragraph(
-            "The paper's measure is the mean of |error| / |force|. It is dominated by the moments at which a force passes through \
-             zero (section 4), so the median of the same quotient and the nrms (2-norm of the error by that of the force) stand \
-             beside it.",
+            "The paper's measure is the mean of |error| / |force|. It is dominated by the times at which a force \
+             passes through zero (section 4). The tables therefore also show the median of the same quotient and the \
+             nrms (2-norm of the error divided by that of the force).",
         );
         let names = ["fe1, left", "fe10, right"];
         for (t, title) in ["The paper's treatment", "The consistent treatment"]
@@ -145,8 +149,8 @@ impl ExperimentPage {
                 &experiment.benches[0].runs[1],
                 &drives,
             ),
-            "All errors have one scale. Calculated: parameters of Table 1, left column; estimated: by least squares from the \
-             identification run. The consistent treatment has no error that could be seen.",
+            "All errors have one scale. Calculated: parameters of Table 1, left column; estimated: by least squares \
+             from the identification run. The consistent treatment has no visible error.",
         );
         self.figure(
             &figures::errors(
@@ -154,17 +158,18 @@ impl ExperimentPage {
                 &experiment.benches[1].runs[1],
                 &drives,
             ),
-            "What the spindles add: an error that the consistent treatment has too, and that identification lowers but cannot \
-             remove, for no base parameter is a rod.",
+            "The spindles add an error that the consistent treatment has as well. Identification lowers it but cannot \
+             remove it, because no base parameter represents a rod.",
         );
     }
 
     pub(crate) fn placement(&mut self, experiment: &PaperExperiment) {
         self.heading("3  The error of the paper's treatment is the force of the misplaced m4");
         self.paragraph(
-            "Take the forces of both reduced models with the parameters of Table 1 and subtract: what remains is what m4 makes at \
-             R3m and does not make where the paper's balance of moments has it. This needs no rig. The error of the paper's \
-             treatment needs the rig, which knows nothing of either model. Both are the same curve:",
+            "Subtract the forces of the two reduced models with the parameters of Table 1: the difference is the \
+             force of m4 at R3m minus its force where the paper's balance of moments places it. This needs no rig. \
+             The error of the paper's treatment needs the rig, which is independent of both models. Both are the same \
+             curve:",
         );
         let mut rows = Vec::new();
         for (bench, name) in experiment.benches.iter().zip(["rig", "rig with rods"]) {
@@ -182,7 +187,7 @@ impl ExperimentPage {
             &[
                 "run",
                 "correlation",
-                "left of the error (2-norm)",
+                "residual error (2-norm)",
                 "explained (squares)",
             ],
             &rows,
@@ -207,10 +212,10 @@ impl ExperimentPage {
         let [samples, part] = along.near_zero(0, modelled, NEAR_ZERO);
         let errors = along.errors(0, modelled);
         self.paragraph(&format!(
-            "The paper remarks that peaks of the relative error arise where the force is close to zero. So it is: the force of the \
-             left spindle passes through zero {} times in this run, the error does not, and their quotient has no bound there. The \
-             {} of the samples with a force below {} of its root mean square make {} of the mean relative error. Without peaks, \
-             the typical error is the median, {}, against a mean of {}.",
+            "The paper remarks that peaks of the relative error arise where the force is close to zero. This is \
+             confirmed: the force of the left spindle passes through zero {} times in this run. The error does not, \
+             so their quotient is unbounded there. The {} of the samples with a force below {} of its root mean \
+             square cause {} of the mean relative error. The median, {}, is not affected by peaks; the mean is {}.",
             along.zeros(0).len(),
             percent(samples),
             percent(NEAR_ZERO),

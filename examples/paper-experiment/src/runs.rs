@@ -55,7 +55,7 @@ pub(crate) fn search(
         .find(|series| is_within_limits(&plant, &coordinates, series))
         .ok_or_else(|| {
             Error::input(format!(
-                "{}: the trajectory leaves its limits when its coefficients are rounded; widen the limits",
+                "{}: with rounded coefficients the trajectory exceeds its limits; widen the limits",
                 model.path
             ))
         })?;
@@ -123,7 +123,7 @@ pub(crate) fn run(
         .collect::<Option<Vec<usize>>>();
     let (Some(coordinates), Some(drives)) = (coordinates, drives) else {
         return Err(Error::input(format!(
-            "{}: the rig names its coordinates and drives otherwise than {}",
+            "{}: the coordinates or drives of the rig have other names than those of {}",
             rig.name, model.path
         )));
     };
