@@ -30,6 +30,7 @@ pub trait EvaluationDomain {
 /// The nodes that some roots need, in the order of evaluation.
 #[derive(Clone, Debug)]
 pub struct EvaluationTape {
+    /// Nodes, operands before the nodes that use them.
     steps: Vec<Node>,
     /// Per step the index of its operands' steps, flattened.
     operands: Vec<Vec<usize>>,
@@ -40,6 +41,7 @@ pub struct EvaluationTape {
 impl EvaluationTape {
     /// Collects what `roots` need.
     pub fn new(graph: &Graph, roots: &[ExprId]) -> Self {
+        // Position on the tape of every node of the graph.
         const NOWHERE: usize = usize::MAX;
         let mut positions = vec![NOWHERE; graph.len()];
         let mut steps = Vec::new();
@@ -83,6 +85,7 @@ impl EvaluationTape {
                 Node::Sum(terms) => {
                     let mut total: Option<D::Value> = None;
                     for ((_, factor), operand) in terms.iter().zip(operands) {
+                        // Products with 1 are skipped: they are the most frequent ones.
                         let value = &values[*operand];
                         let term = if factor.is_one() {
                             value.clone()
@@ -121,6 +124,7 @@ impl EvaluationTape {
     }
 }
 
+/// Double-precision evaluation; the values of atoms come from a function.
 /// Floating-point evaluation; atoms come from a function.
 pub struct FloatDomain<F: Fn(Atom) -> f64>(
     /// Value of an atom.
@@ -138,6 +142,7 @@ impl<F: Fn(Atom) -> f64> EvaluationDomain for FloatDomain<F> {
     fn mul(&self, a: &f64, b: &f64) -> f64 {
         a * b
     }
+    // Zero to a power of zero or below has no value.
     fn power(&self, a: &f64, n: i32) -> Option<f64> {
         (*a != 0.0 || n > 0).then(|| a.powi(n))
     }
@@ -195,7 +200,9 @@ impl<N: FieldNumber> FieldPoint<N> {
         }
     }
 
+    /// An opaque sign of a field number: 1 or -1 drawn from the number itself, odd in it, and zero for zero.
     fn sign(&self, a: N) -> N {
+        // The value is drawn for the smaller of a and -a, so that sign(-a) = -sign(a).
         let (key, odd) = canonical_sign(a);
         let value = if key.hash_bits(self.seed) & 1 == 0 {
             N::ONE
@@ -220,13 +227,14 @@ impl<N: FieldNumber> FieldPoint<N> {
     }
 }
 
-/// The smaller of `a` and `-a`, and whether it was `-a`.
+/// The smaller of `a` and `-a` in the order of the field, and whether that is `-a`.
 fn canonical_sign<N: FieldNumber>(a: N) -> (N, bool) {
     if (-a) < a { (-a, true) } else { (a, false) }
 }
 
 impl<N: FieldNumber> EvaluationDomain for FieldPoint<N> {
     type Value = N;
+    // The number 1 is the most frequent factor, so it skips the general conversion.
     fn rational(&self, value: &Rational) -> Option<N> {
         if value.is_one() {
             return Some(N::ONE);
@@ -244,6 +252,7 @@ impl<N: FieldNumber> EvaluationDomain for FieldPoint<N> {
     }
     fn unary(&self, function: Unary, a: &N) -> Option<N> {
         match function {
+            // A prime field has no positive root: a drawn bit decides between the two.
             // One fixed choice per radicand: equal radicands must have equal roots.
             Unary::Sqrt => a.square_root().map(|root| {
                 let flip = a.hash_bits(self.root_seed) & 1 == 1;
@@ -255,6 +264,7 @@ impl<N: FieldNumber> EvaluationDomain for FieldPoint<N> {
             }),
             Unary::Sign => Some(self.sign(*a)),
             Unary::Abs => Some(*a * self.sign(*a)),
+            // tanh is an opaque odd function.
             Unary::Tanh => {
                 let (key, odd) = canonical_sign(*a);
                 let value = key.hash_with_seed(self.seed ^ 0x7461_6E68);
@@ -269,6 +279,7 @@ impl<N: FieldNumber> EvaluationDomain for FieldPoint<N> {
         self.values.get(&atom).copied()
     }
     fn cos_sin(&self, angle: &AtomAngleSum) -> Option<(N, N)> {
+        // Angles are added one unit at a time by the addition theorems.
         let mut total = (N::ONE, N::ZERO);
         for (atom, n) in angle.terms() {
             let (c, s) = *self.angles.get(atom)?;
@@ -313,6 +324,7 @@ impl EvaluationDomain for RationalPoint {
                 Rational::ONE
             }),
             Unary::Abs => Some(a.abs()),
+            // Rational only where numerator and denominator of the reduced fraction are squares.
             Unary::Sqrt => {
                 let big = a.to_big();
                 let (n, d) = (big.numer().sqrt(), big.denom().sqrt());
@@ -326,6 +338,7 @@ impl EvaluationDomain for RationalPoint {
         self.values.get(&atom).cloned()
     }
     fn cos_sin(&self, angle: &AtomAngleSum) -> Option<(Rational, Rational)> {
+        // Addition theorems, as in the prime field.
         let mut total = (Rational::ONE, Rational::ZERO);
         for (atom, n) in angle.terms() {
             let (c, s) = self.angles.get(atom)?;

@@ -21,7 +21,7 @@ impl ExperimentPage {
              Here the complete robot, 11 groups with true parallel cranks, is simulated by a program that shares no \
              mechanics with the model. A reduced model in which the platform's mass m4 acts at one place agrees with \
              it to {} without any identification: the reduction loses nothing. The paper's treatment, with the same \
-             masses, has an error of {} to {} (nrms). {} of that error is the force of one mass, m4, which the \
+             masses, has an error of {} to {} (nrms). Of that error, {} is the force of one mass, m4, which the \
              balance of moments places elsewhere than the balance of forces. The cause is that of the paper's error. \
              The size differs, because it depends on lengths and motions that the paper does not print (section 7).",
             rounding(largest(plain, |along, d| along.errors(d, &along.calculated[1]).nrms)),

@@ -21,6 +21,7 @@ pub fn exact_formula_at(
     expression: &ExactExpression,
     places: [&str; 2],
 ) -> PrintedFormula {
+    // Formula of an operand.
     let of = |inner: &ExactExpression| exact_formula_at(mechanism, inner, places);
     match expression {
         ExactExpression::Rational(value) => PrintedFormula::Number(Rational::from(value.clone())),
@@ -76,6 +77,7 @@ pub fn length_formula(mechanism: &Mechanism, length: &ExactLength) -> PrintedFor
     )
 }
 
+/// The printed name of a symbol of the model file; `x` and `other` name the quantities of an effect's two places.
 fn symbol_name(
     mechanism: &Mechanism,
     symbol: modelmill_spec::ModelSymbol,

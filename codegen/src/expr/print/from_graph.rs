@@ -21,7 +21,7 @@ pub fn atom(mechanism: &Mechanism, atom: Atom) -> FormulaSymbol {
     }
 }
 
-/// The formula of an expression, written out as a tree: ask [`tree_size`] first where it may be large.
+/// The formula of an expression, written out as a tree. Check [`tree_size`] first where the tree may be large.
 pub fn formula(graph: &Graph, mechanism: &Mechanism, id: ExprId) -> PrintedFormula {
     let of = |id: ExprId| formula(graph, mechanism, id);
     match graph.node(id) {
@@ -39,6 +39,7 @@ pub fn formula(graph: &Graph, mechanism: &Mechanism, id: ExprId) -> PrintedFormu
                 .map(|(term, k)| PrintedFormula::product(k.clone(), [of(*term)])),
         ),
         Node::Product(factors) => {
+            // Factors are printed in the order that a person would write, not in the order of their ids.
             let mut factors = factors.clone();
             factors.sort_by_key(|(id, _)| factor_rank(graph, *id));
             let product = PrintedFormula::product(
@@ -51,7 +52,7 @@ pub fn formula(graph: &Graph, mechanism: &Mechanism, id: ExprId) -> PrintedFormu
     }
 }
 
-/// How many nodes the expression has when it is written out, counted no further than `limit`.
+/// Number of nodes of the expression when it is written out as a tree, counted up to `limit`.
 pub fn tree_size(graph: &Graph, id: ExprId, limit: usize) -> usize {
     let mut size = 0;
     let mut left = vec![id];
@@ -65,7 +66,7 @@ pub fn tree_size(graph: &Graph, id: ExprId, limit: usize) -> usize {
     size
 }
 
-/// A sum of angles.
+/// The formula of a sum of angles, without its constant part.
 pub(crate) fn angle_sum_formula(mechanism: &Mechanism, angle: &AtomAngleSum) -> PrintedFormula {
     PrintedFormula::sum(angle.terms().iter().map(|(a, n)| {
         PrintedFormula::product(
@@ -75,7 +76,7 @@ pub(crate) fn angle_sum_formula(mechanism: &Mechanism, angle: &AtomAngleSum) -> 
     }))
 }
 
-/// Place of a factor in a product: known quantities first, then what moves, then functions and parentheses.
+/// Rank of a factor in a product: constants and parameters first, then variables, then functions and parentheses.
 fn factor_rank(graph: &Graph, id: ExprId) -> usize {
     match graph.node(id) {
         Node::Rational(_) => 0,
@@ -90,6 +91,7 @@ fn factor_rank(graph: &Graph, id: ExprId) -> usize {
 
 /// Orders the factors that came out of nested products: names, functions, parentheses.
 fn order_factors(product: PrintedFormula) -> PrintedFormula {
+    // Names come before functions, functions before parentheses.
     fn printed_rank(factor: &PrintedFormula) -> usize {
         match factor {
             PrintedFormula::Apply(..) => 1,

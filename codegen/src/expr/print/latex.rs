@@ -20,6 +20,7 @@ impl FormulaSymbol {
     pub fn latex(&self) -> String {
         let set = typeset(&self.name);
         let mut base = glyphs(&set.base);
+        // A word stands upright, with the dots above it.
         if matches!(set.base, GlyphRun::Word(_)) {
             base = format!("\\mathrm{{{}}}", inner(&set.base));
         }
@@ -28,6 +29,7 @@ impl FormulaSymbol {
             1 => base = format!("\\dot{{{base}}}"),
             _ => base = format!("\\ddot{{{base}}}"),
         }
+        // Parts of the index are separated by commas.
         let parts: Vec<String> = set
             .index
             .iter()
@@ -41,6 +43,7 @@ impl FormulaSymbol {
     }
 }
 
+/// The text of a glyph run in math mode, without a font command.
 fn inner(glyphs: &GlyphRun) -> String {
     match glyphs {
         GlyphRun::Greek(command, _) => format!("\\{command}"),
@@ -48,6 +51,7 @@ fn inner(glyphs: &GlyphRun) -> String {
     }
 }
 
+/// A glyph run in its font: words upright, all else in math italics.
 fn glyphs(one: &GlyphRun) -> String {
     match one {
         GlyphRun::Word(text) => format!("\\mathrm{{{text}}}"),
@@ -55,7 +59,7 @@ fn glyphs(one: &GlyphRun) -> String {
     }
 }
 
-/// Writes a formula; `tight` asks for parentheses around what is not a single factor.
+/// Writes a formula. With `tight`, sums and negative numbers or terms are put into parentheses.
 fn write(out: &mut String, formula: &PrintedFormula, tight: bool) {
     let enclosed = tight
         && match formula {
@@ -79,6 +83,7 @@ fn write(out: &mut String, formula: &PrintedFormula, tight: bool) {
             _ = write!(out, "{}_{{{}}}", symbol.latex(), index.latex());
         }
         PrintedFormula::Sum(terms) => {
+            // Each term's sign is written here, so only its magnitude follows.
             for (i, term) in terms.iter().enumerate() {
                 match (i, term.is_negative()) {
                     (0, true) => out.push('-'),
@@ -103,6 +108,7 @@ fn write(out: &mut String, formula: &PrintedFormula, tight: bool) {
     }
 }
 
+/// Writes a power: the exponent stands behind the name of sine, cosine and tanh, and behind the base otherwise.
 fn power(out: &mut String, base: &PrintedFormula, n: u32) {
     match base {
         PrintedFormula::Apply(
@@ -115,6 +121,7 @@ fn power(out: &mut String, base: &PrintedFormula, n: u32) {
             write(out, base, true);
             _ = write!(out, "^{{{n}}}");
         }
+        // Braces keep the exponent outside the root or the bars.
         PrintedFormula::Apply(FormulaFunction::Sqrt | FormulaFunction::Abs, _) => {
             out.push('{');
             write(out, base, true);
@@ -126,6 +133,7 @@ fn power(out: &mut String, base: &PrintedFormula, n: u32) {
     }
 }
 
+/// Writes a function with its operands; an exponent stands behind the function's name.
 fn apply(
     out: &mut String,
     function: FormulaFunction,
@@ -154,6 +162,7 @@ fn apply(
     if let Some(n) = exponent {
         _ = write!(out, "^{{{n}}}");
     }
+    // A sine or cosine of one name needs no parentheses.
     match operands {
         [PrintedFormula::Symbol(_)]
             if matches!(function, FormulaFunction::Sin | FormulaFunction::Cos) =>
@@ -164,6 +173,7 @@ fn apply(
     }
 }
 
+/// Writes a number or a term without its sign.
 fn magnitude(out: &mut String, formula: &PrintedFormula) {
     match formula {
         PrintedFormula::Number(n) => match digits(n) {
@@ -176,6 +186,7 @@ fn magnitude(out: &mut String, formula: &PrintedFormula) {
             below,
         } => {
             let (n, d) = digits(factor);
+            // Without a denominator no fraction is needed.
             if d.is_none() && below.is_empty() {
                 out.push_str(&product_line(&n, above, true));
             } else {
@@ -193,7 +204,7 @@ fn magnitude(out: &mut String, formula: &PrintedFormula) {
     }
 }
 
-/// A product on one line; a fraction's line encloses what stands alone on it, other products are `tight`.
+/// A product on one line. `tight` encloses sums; on the line of a fraction a single factor needs no parentheses.
 fn product_line(number: &str, factors: &[PrintedFormula], tight: bool) -> String {
     let mut parts = Vec::new();
     if number != "1" || factors.is_empty() {

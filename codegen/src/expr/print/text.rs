@@ -1,15 +1,18 @@
-//! Formulas as plain infix text that can be read again.
+//! Formulas as plain infix text, in a form that can be parsed again.
 
 use std::fmt::{self, Write};
 
 use super::formula::{PrintedFormula, digits};
 use crate::expr::Rational;
 
-/// How tightly the surroundings bind.
+/// How strongly the surroundings bind, which decides whether parentheses are needed.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum TextPrecedence {
+    /// A sum, or no surroundings.
     Sum,
+    /// A factor of a product.
     Factor,
+    /// The base of a power.
     Power,
 }
 
@@ -26,7 +29,9 @@ impl fmt::Display for PrintedFormula {
     }
 }
 
+/// Writes a formula where the surroundings have some precedence, in parentheses if it binds less.
 fn write_at(f: &mut dyn Write, formula: &PrintedFormula, level: TextPrecedence) -> fmt::Result {
+    // Negative numbers and fractions need parentheses in products.
     let enclosed = match formula {
         PrintedFormula::Sum(_) => level > TextPrecedence::Sum,
         PrintedFormula::Number(n) => {
@@ -56,6 +61,7 @@ fn write_at(f: &mut dyn Write, formula: &PrintedFormula, level: TextPrecedence) 
             index => write!(f, "{}[{index}]", symbol.text())?,
         },
         PrintedFormula::Sum(terms) => {
+            // Each term's sign is written here, so only its magnitude follows.
             for (i, term) in terms.iter().enumerate() {
                 match (i, term.is_negative()) {
                     (0, true) => f.write_str("-")?,
@@ -114,6 +120,7 @@ fn magnitude(f: &mut dyn Write, formula: &PrintedFormula) -> fmt::Result {
     }
 }
 
+/// Writes a number times factors, divided by factors, without the sign of the number.
 fn term(
     f: &mut dyn Write,
     factor: &Rational,
@@ -139,6 +146,7 @@ fn term(
             write_at(f, one, TextPrecedence::Factor)?;
         }
     }
+    // Several divisors are enclosed: a/(b*c).
     let several = divisors.len() + below.len() > 1;
     for one in below {
         let mut text = String::new();
