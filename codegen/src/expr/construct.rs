@@ -292,7 +292,8 @@ impl Graph {
         if flat[0].0 == Self::ONE {
             flat.rotate_left(1);
         }
-        // A factor that all terms share goes outwards; a mere common divisor stays, as it would only be multiplied back.
+        // A factor that all terms share goes outwards; a mere common divisor stays, as it would only be multiplied
+        // back.
         let first = flat[0].1.clone();
         let content = if flat.iter().all(|(_, k)| k.abs() == first.abs()) {
             first

@@ -1,5 +1,5 @@
-//! Forces of all joints above a link, read off in the link's own frame: `z_i . (M + (o - c_i) x F)` with the axis of
-//! joint i and a point on it (virtual power). Axes through one point share the moment about it, and axes and points are
+//! Forces of all joints above a link, computed in the link's own frame: `z_i . (M + (o - c_i) x F)` with the axis of
+//! joint i and a point on it (virtual power). Axes through one point share the moment about it. Axes and points are
 //! shared by all wrenches that are projected in the same frame.
 
 use super::rows::{ForceRows, moment_before_axis_offset};
@@ -8,7 +8,7 @@ use crate::expr::vector::{self, SymbolicVector};
 use crate::expr::{ExprId, Graph};
 use crate::tree::KinematicTree;
 
-/// Leaves the forces of a wrench at all joints above `at`.
+/// Adds the forces of a wrench on link `at` to all joints above it.
 pub(super) fn project_on_joints(
     graph: &mut Graph,
     tree: &KinematicTree,
@@ -23,6 +23,7 @@ pub(super) fn project_on_joints(
     };
     let moment = moment_before_axis_offset(graph, style, &tree.links[at], wrench);
     let points = axis_points(graph, tree, &path);
+    // From the nearest axes to the base, in groups of axes that meet in one point.
     let mut rest = above;
     while let Some(last) = rest.last() {
         let n = rest
@@ -32,6 +33,7 @@ pub(super) fn project_on_joints(
             .count();
         let (further, group) = rest.split_at(rest.len() - n);
         rest = further;
+        // A pure moment needs no point.
         let arm = if wrench.has_force() {
             lever_arm(graph, tree, style, *last, points[*last].along, &path)
         } else {
@@ -41,7 +43,7 @@ pub(super) fn project_on_joints(
             .iter()
             .map(|i| axis_direction(graph, tree, style, *i, at))
             .collect();
-        // One axis alone: the screw's two halves; several: the moment about their point.
+        // Several axes share the moment about their common point. A single axis needs only one component of it.
         let shared = (group.len() > 1).then(|| {
             let lever = graph.cross(&arm, &wrench.force);
             graph.add_vectors(&[moment, lever])
@@ -67,16 +69,16 @@ pub(super) fn project_on_joints(
     }
 }
 
-/// A point on a joint's axis.
+/// A point on a joint's axis, through which other axes may pass.
 #[derive(Clone, Copy)]
 struct AxisPoint {
     /// Axes with the same number go through the same point.
     group: usize,
-    /// Where it lies on the axis, from the link's origin.
+    /// Its position along the axis, from the link's origin, m.
     along: ExprId,
 }
 
-/// A point for every joint on a path, by link; neighbouring axes that meet share one.
+/// A point for every joint on a path, by link. Neighbouring axes that meet share a point.
 fn axis_points(graph: &mut Graph, tree: &KinematicTree, path: &[usize]) -> Vec<AxisPoint> {
     let mut points = vec![
         AxisPoint {
@@ -85,7 +87,7 @@ fn axis_points(graph: &mut Graph, tree: &KinematicTree, path: &[usize]) -> Vec<A
         };
         tree.links.len()
     ];
-    // Whether the point of the group may still be moved along its only axis.
+    // Whether the point of the group may still be moved along its only axis: a second axis fixes it.
     let mut is_free = true;
     for (k, i) in path.iter().enumerate() {
         points[*i].group = k;
@@ -93,11 +95,12 @@ fn axis_points(graph: &mut Graph, tree: &KinematicTree, path: &[usize]) -> Vec<A
         let above = k.checked_sub(1).map(|k| path[k]);
         let meets = above.and_then(|above| {
             let (axis, positive) = link.axis?;
+            // The axes meet if the position between them lies in the plane of both, and at the point of the group.
             let mut left = link.position;
             let own = std::mem::replace(&mut left[axis], Graph::ZERO);
             let [x, y, z] = left;
             let fits = is_free || points[above].along == z;
-            // A point must stay on both axes: a slide would take it along.
+            // A point must stay on both axes, but a prismatic joint would move it.
             let slides = !link.slides.is_empty() || !tree.links[above].slides.is_empty();
             let meets = axis != 2 && x == Graph::ZERO && y == Graph::ZERO && fits && !slides;
             meets.then(|| (above, z, if positive { graph.neg(own) } else { own }))
@@ -117,7 +120,7 @@ fn axis_points(graph: &mut Graph, tree: &KinematicTree, path: &[usize]) -> Vec<A
     points
 }
 
-/// Direction of a joint's axis in the frame of a link below it.
+/// Direction of a joint's axis in the frame of a link below it, as a unit vector.
 fn axis_direction(
     graph: &mut Graph,
     tree: &KinematicTree,
@@ -142,8 +145,8 @@ fn axis_direction(
     graph.rotate_in(style.joint_rotation(&tree.links[at]), &fixed)
 }
 
-/// From a point on the axis of `joint`, given by its place along it, to the point of the last link of `path` that is
-/// reached before its offset along its own axis, in that link's frame.
+/// Vector from a point on the axis of `joint`, given by its position along it, to the point of the last link of `path`
+/// that is reached before the offset along that link's own axis. In that link's frame, m.
 fn lever_arm(
     graph: &mut Graph,
     tree: &KinematicTree,
@@ -153,7 +156,7 @@ fn lever_arm(
     path: &[usize],
 ) -> SymbolicVector {
     let start = path.iter().position(|i| *i == joint).unwrap_or(0);
-    // On the fixed side of the first of parallel joints; turned on only where these end.
+    // On the fixed side of the first of parallel joints; the rotation is applied only where these end.
     let mut v = [Graph::ZERO, Graph::ZERO, graph.neg(along)];
     let mut above = joint;
     for i in &path[start + 1..] {

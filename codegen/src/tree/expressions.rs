@@ -1,4 +1,4 @@
-//! Expressions of the model file brought into the graph, and polynomials in the dynamic parameters.
+//! Expressions of the model file as nodes of the graph, and polynomials in the dynamic parameters.
 
 use std::collections::BTreeMap;
 
@@ -13,7 +13,7 @@ use crate::expr::{Atom, AtomAngleSum, ExprId, Graph, Rational, Unary};
 
 /// A product of powers of dynamic parameters: `m1*dc1^2` is `[(0, 1), (4, 2)]`. Sorted by parameter.
 ///
-/// Monomials are ordered as a dictionary orders the parameters written out one by one, in order of declaration;
+/// Monomials are ordered like words in a dictionary, with the parameters as letters in the order of their declaration;
 /// this is the order of eq. (5).
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
 pub struct ParameterMonomial(pub Vec<(usize, u32)>);
@@ -29,6 +29,7 @@ impl ParameterMonomial {
         Self(powers.into_iter().collect())
     }
 
+    /// The parameters, each as often as its power states.
     fn repeated_parameters(&self) -> impl Iterator<Item = usize> {
         self.0
             .iter()
@@ -55,7 +56,7 @@ impl ParameterMonomial {
         factors.join("*")
     }
 
-    /// Its value for given parameters.
+    /// Its value for given parameters, by index.
     pub fn value(&self, parameters: &[f64]) -> f64 {
         self.0
             .iter()
@@ -76,7 +77,7 @@ impl Ord for ParameterMonomial {
     }
 }
 
-/// A power of a sum of parameters can have more terms than anybody wants to see.
+/// Largest number of terms of a polynomial, since powers of sums of parameters can have very many.
 const MOST_TERMS: usize = 2000;
 
 /// A polynomial in the dynamic parameters whose coefficients are expressions over constants.
@@ -84,6 +85,7 @@ const MOST_TERMS: usize = 2000;
 pub(crate) struct ParameterPolynomial(pub(crate) BTreeMap<ParameterMonomial, ExprId>);
 
 impl ParameterPolynomial {
+    /// A polynomial without parameters.
     fn constant(value: ExprId) -> Self {
         let mut terms = BTreeMap::new();
         if value != Graph::ZERO {
@@ -92,6 +94,7 @@ impl ParameterPolynomial {
         Self(terms)
     }
 
+    /// The sum; terms that cancel are removed.
     pub(crate) fn plus(&self, other: &Self, graph: &mut Graph) -> Self {
         let mut terms = self.0.clone();
         for (monomial, value) in &other.0 {
@@ -102,6 +105,7 @@ impl ParameterPolynomial {
         Self(terms)
     }
 
+    /// The product with a number.
     pub(crate) fn scale(&self, factor: &Rational, graph: &mut Graph) -> Self {
         Self(
             self.0
@@ -111,7 +115,10 @@ impl ParameterPolynomial {
         )
     }
 
-    /// The product; an error where it would have thousands of terms.
+    /// The product of two polynomials.
+    ///
+    /// # Errors
+    /// [`DeriveError::TooManyTerms`] if it has more than [`MOST_TERMS`] terms.
     pub(crate) fn times(&self, other: &Self, graph: &mut Graph) -> Result<Self, DeriveError> {
         let mut terms: BTreeMap<ParameterMonomial, Vec<(ExprId, Rational)>> = BTreeMap::new();
         for (m, a) in &self.0 {
@@ -135,7 +142,7 @@ impl ParameterPolynomial {
     }
 }
 
-/// A multiple of pi/12 and a sum of atoms.
+/// An exact angle as a sum of atoms and a multiple of pi/12.
 pub(crate) fn angle_sum(angle: &ExactAngle) -> (AtomAngleSum, i32) {
     let twelfths = Rational::from(angle.pi.clone());
     let twelfths = &twelfths * &Rational::integer(12);
@@ -152,6 +159,7 @@ pub(crate) fn angle_sum(angle: &ExactAngle) -> (AtomAngleSum, i32) {
     )
 }
 
+/// The atom of a symbol of the model file; quantities of a place must have been replaced before.
 fn atom(symbol: ModelSymbol) -> Atom {
     match symbol {
         ModelSymbol::Constant(i) => Atom::Constant(i.0),
@@ -161,7 +169,7 @@ fn atom(symbol: ModelSymbol) -> Atom {
     }
 }
 
-/// The offset and the coordinates of a length as one expression.
+/// The offset and the coordinates of a length as one expression, m.
 pub(crate) fn length(graph: &mut Graph, length: &ExactLength) -> Result<ExprId, DeriveError> {
     let mut terms = vec![(expression(graph, &length.offset)?, Rational::ONE)];
     for (coordinate, factor) in &length.coordinates {
@@ -173,7 +181,10 @@ pub(crate) fn length(graph: &mut Graph, length: &ExactLength) -> Result<ExprId, 
     Ok(graph.sum(&terms))
 }
 
-/// An expression without dynamic parameters or quantities of a place.
+/// An expression without dynamic parameters and without quantities of a place.
+///
+/// # Errors
+/// [`DeriveError`] if it has any of these, or divides by zero.
 pub(crate) fn expression(
     graph: &mut Graph,
     exact: &ExactExpression,
@@ -181,12 +192,13 @@ pub(crate) fn expression(
     expression_at(graph, exact, &|_| None)
 }
 
-/// An expression over constants and the quantities of a place.
+/// An expression over constants and the quantities of a place, which `place` returns.
 pub(crate) fn expression_at(
     graph: &mut Graph,
     exact: &ExactExpression,
     place: &dyn Fn(PlaceQuantity) -> Option<ExprId>,
 ) -> Result<ExprId, DeriveError> {
+    // A polynomial without parameters has at most one term.
     let polynomial = polynomial_at(graph, exact, place)?;
     match polynomial.0.len() {
         0 => Ok(Graph::ZERO),
@@ -200,7 +212,7 @@ pub(crate) fn expression_at(
     }
 }
 
-/// An expression as a polynomial in the dynamic parameters.
+/// An expression without quantities of a place, as a polynomial in the dynamic parameters.
 pub(crate) fn polynomial(
     graph: &mut Graph,
     exact: &ExactExpression,
@@ -208,6 +220,7 @@ pub(crate) fn polynomial(
     polynomial_at(graph, exact, &|_| None)
 }
 
+/// An expression as a polynomial in the dynamic parameters, with the quantities of a place from `place`.
 fn polynomial_at(
     graph: &mut Graph,
     exact: &ExactExpression,
@@ -247,6 +260,7 @@ fn polynomial_at(
             }
             total
         }
+        // Parameters in a denominator are not supported.
         ExactExpression::Quotient(a, b) => {
             let divisor = expression_at(graph, b, place)?;
             if divisor == Graph::ZERO {
@@ -273,6 +287,7 @@ fn polynomial_at(
             }
             power
         }
+        // Sines and cosines of exact angles stay exact; other arguments become nodes of their own.
         ExactExpression::Apply(function, a) => {
             if let (ExactFunction::Sin | ExactFunction::Cos, Some((sum, pi12))) =
                 (function, AngleAccumulator::angle(a))
@@ -292,7 +307,7 @@ fn polynomial_at(
     })
 }
 
-/// The expression with a place's coordinate, or that of the other place, named.
+/// The expression with a quantity of a place replaced by a coordinate of the mechanism.
 pub(crate) fn name_place_coordinate(
     exact: &ExactExpression,
     quantity: PlaceQuantity,
@@ -321,6 +336,7 @@ pub(crate) fn name_place_coordinate(
     }
 }
 
+/// The graph's function for one of the model file.
 fn unary(function: ExactFunction) -> Unary {
     match function {
         ExactFunction::Sin => Unary::Sin,
@@ -333,17 +349,19 @@ fn unary(function: ExactFunction) -> Unary {
     }
 }
 
-/// An angle in the making: multiples of pi and of atoms.
+/// Terms of an angle that is being collected: multiples of pi and of atoms.
 #[derive(Default)]
 struct AngleAccumulator {
+    /// Factor of pi.
     pi: Rational,
+    /// Atoms with rational factors, in order of occurrence.
     atoms: Vec<(Atom, Rational)>,
 }
 
 impl AngleAccumulator {
     /// An expression as an exact angle; `None` if it is no sum of integer multiples of angles and of pi/12.
     fn angle(exact: &ExactExpression) -> Option<(AtomAngleSum, i32)> {
-        /// Sines of larger multiples are no polynomials that anyone wants to see.
+        /// Largest integer factor: sines of larger multiples have too many terms as polynomials.
         const MOST: u32 = 100;
         let mut parts = Self::default();
         parts.collect_terms(exact, &Rational::ONE)?;
@@ -362,6 +380,7 @@ impl AngleAccumulator {
         Some((AtomAngleSum::new(atoms?), pi12))
     }
 
+    /// Adds `factor` times an expression to the terms; `None` if that is not linear in angles and pi.
     fn collect_terms(&mut self, exact: &ExactExpression, factor: &Rational) -> Option<()> {
         match exact {
             ExactExpression::Rational(value) if Rational::from(value.clone()).is_zero() => {}
@@ -383,6 +402,7 @@ impl AngleAccumulator {
                 }
                 _ => return None,
             },
+            // At most one operand may be other than a number.
             ExactExpression::Product(operands) => {
                 let mut factor = factor.clone();
                 let mut rest = None;

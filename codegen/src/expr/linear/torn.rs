@@ -1,10 +1,10 @@
 //! Linear systems of legs that share a platform: too large for cofactors at once, small after they are torn apart.
 //!
-//! Without the columns that tie everything together, such as the rates of a platform, a system falls into parts with more
-//! rows than columns. A part with one row too many has one combination of its rows in which its own unknowns cancel; its
-//! factors are the part's maximal minors. These combinations make up a small system for the columns that were torn out,
-//! and every part follows by least squares, which here are exact and divide by a sum of squares: a part is singular only
-//! where its own unknowns are not determined. (Tearing: Kron 1963.)
+//! Without the columns that tie everything together, such as the rates of a platform, a system falls into parts with
+//! more rows than columns. A part with one row too many has one combination of its rows in which its own unknowns
+//! cancel; its factors are the part's maximal minors. These combinations make up a small system for the columns that
+//! were torn out, and every part follows by least squares, which here are exact and divide by a sum of squares: a part
+//! is singular only where its own unknowns are not determined. (Tearing: Kron 1963.)
 
 use super::cofactors::{LARGEST_BLOCK, determinant, solve_by_cofactors};
 use crate::expr::{ExprId, Graph, Rational};

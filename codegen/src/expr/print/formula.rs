@@ -310,8 +310,7 @@ pub(super) fn digits(value: &Rational) -> (String, Option<String>) {
 }
 
 /// A positive number as a decimal, if it is finite and its denominator has three digits or more: such a number is
-/// easier
-/// to read as a decimal than as a quotient.
+/// easier to read as a decimal than as a quotient.
 fn decimal(value: &Rational) -> Option<String> {
     // Longer decimals are no easier to read than the quotient.
     const MOST_DIGITS: usize = 40;

@@ -16,8 +16,7 @@ impl PrintedFormula {
     }
 
     /// As the contents of consecutive `math` elements. A line may end between them: before each sign of a sum, also of
-    /// sums in
-    /// parentheses. A long fraction or root, which cannot be split otherwise, is written on the line.
+    /// sums in parentheses. A long fraction or root, which cannot be split otherwise, is written on the line.
     pub fn mathml_segments(&self) -> Vec<String> {
         let mut out = MathmlWriter {
             may_part: true,

@@ -56,8 +56,7 @@ impl SplitTerm {
     }
 
     /// The factors above the line of the sum of two terms that differ only in `sin^2` and `cos^2` of one angle; `None`
-    /// for
-    /// other terms.
+    /// for other terms.
     fn pythagorean_sum(&self, other: &Self) -> Option<Vec<PrintedFormula>> {
         if self.factor != other.factor || self.below != other.below {
             return None;
