@@ -1,5 +1,5 @@
-//! The factors of eq. (6) as rational functions of the constants: reconstructed from points of motion for relations that
-//! are as simple as can be found, put together from there.
+//! The factors of eq. (6) as rational functions of the constants. Simple relations between columns are reconstructed
+//! from points of motion, and the factors are combined from these.
 
 use modelmill_algebra::field::{FieldElement, RandomStream};
 
@@ -11,16 +11,16 @@ use super::sample::SampledRegressor;
 use crate::DeriveError;
 use crate::expr::FieldPoint;
 
-/// Operations of the field that factors may take: a minute or so.
+/// Largest number of field operations for the factors, which takes about a minute.
 pub(super) const MOST_OPERATIONS: u64 = 20_000_000_000;
 
-/// Relations to retained columns that are not longer than this are as good as near ones.
+/// Relations to retained columns that are not longer than this are used directly.
 const FEW: usize = 12;
 
-/// Terms of all factors on retained columns beyond which nobody reads them: then columns are written by near ones.
+/// Above this number of terms in all factors on retained columns, columns are written by neighbouring columns.
 const MOST_TERMS: usize = 5_000;
 
-/// The dependent columns by others; factors that resist are `None`.
+/// The dependent columns as combinations of others. Factors that cannot be reconstructed are `None`.
 pub(super) fn find_factors(
     dependences: &DependenceStructure,
     regressor: &SampledRegressor,
@@ -32,6 +32,7 @@ pub(super) fn find_factors(
     if dependences.wanted.is_empty() {
         return Ok(Vec::new());
     }
+    // Relations to retained columns only.
     let direct: Vec<ColumnRelation> = (dependences.relations.iter())
         .filter(|relation| relation.has_retained_only())
         .cloned()
@@ -49,13 +50,13 @@ pub(super) fn find_factors(
         )
     };
     match by(&dependences.relations) {
-        // Which columns are near may depend on the constants, as with roots that take either sign.
+        // Which columns are near may depend on the constants, for example with roots of either sign.
         Err(DeriveError::RankChanged) if direct.len() < dependences.relations.len() => by(&direct),
         found => found,
     }
 }
 
-/// How many factors on retained columns have a sum in a denominator.
+/// Number of factors on retained columns with a sum in a denominator.
 pub(super) fn n_quotients(
     dependences: &DependenceStructure,
     regressor: &SampledRegressor,
@@ -77,7 +78,7 @@ pub(super) fn n_quotients(
     reconstruct::n_quotients(&mut oracle, variables, stream)
 }
 
-/// The dependent columns by some relations, those to retained columns among them.
+/// The dependent columns from given relations, which include those to retained columns.
 fn factors_by_relations(
     all: &[ColumnRelation],
     dependences: &DependenceStructure,
@@ -87,6 +88,7 @@ fn factors_by_relations(
     budget: &mut OperationBudget,
     stream: &mut RandomStream,
 ) -> Result<Vec<DependentColumn>, DeriveError> {
+    // Reconstructs the factors of some relations; those to retained columns are needed for all others.
     let mut found = |chosen: Vec<ColumnRelation>, stream: &mut RandomStream| {
         let mut oracle = MotionFactorOracle {
             regressor,
@@ -103,12 +105,12 @@ fn factors_by_relations(
         let factors = survey.reconstruct_functions(&mut oracle, &wanted, stream)?;
         Ok::<_, DeriveError>(SolvedRelations::new(chosen.iter(), factors))
     };
-    // Near relations come right behind those to retained columns.
+    // The relation to near columns comes directly after the one to retained columns.
     let nearest =
         (0..all.len()).filter(|i| all.get(i + 1).is_none_or(ColumnRelation::has_retained_only));
     let mut related = found(nearest.map(|i| all[i].clone()).collect(), stream)?;
-    // What is near need not be simple: where the first joints of an arm do not feel all of a link, relations between links
-    // divide by sines of twists, and those to retained columns do not.
+    // A near relation may be complicated: if the first joints of an arm have no effect on all of a link, relations
+    // between links divide by sines of twists, and relations to retained columns do not.
     let is_long = related.is_complete() && related.n_terms() > MOST_TERMS;
     let unwieldy = related.unwieldy_columns();
     let direct: Vec<ColumnRelation> = (all.iter())
@@ -119,10 +121,12 @@ fn factors_by_relations(
     if !direct.is_empty() && !related.has_unknown_factor() {
         related.replace(found(direct, stream)?);
     }
+    // Too many terms: columns are written by near columns.
     if is_long {
         return Ok(related.into_dependent_columns());
     }
     let mut written = related.expanded_factors(&dependences.wanted, roots);
+    // Factors that cannot be multiplied out are reconstructed from the combined relations.
     let missing: Vec<usize> = (0..written.len())
         .filter(|k| written[*k].is_none())
         .collect();
@@ -146,12 +150,17 @@ fn factors_by_relations(
     Ok(pairs.map(line).collect())
 }
 
-/// The factors of relations, from points of motion.
+/// Evaluates the factors of relations from points of motion.
 struct MotionFactorOracle<'a> {
+    /// The regressor's columns at random points.
     regressor: &'a SampledRegressor,
+    /// Dependences that the columns must show again.
     dependences: &'a DependenceStructure,
+    /// Relations whose factors are evaluated.
     relations: &'a [ColumnRelation],
+    /// Random numbers for the points.
     sampling: RandomStream,
+    /// Remaining field operations.
     budget: &'a mut OperationBudget,
 }
 
@@ -167,6 +176,7 @@ impl PrimeFieldOracle for MotionFactorOracle<'_> {
         &mut self,
         constants: &FieldPoint<FieldElement<P>>,
     ) -> Result<Vec<FieldElement<P>>, DeriveError> {
+        // Two ways: eliminate all columns at once, or each relation from its own columns. The cheaper one is used.
         let rank = self.dependences.pivots.len();
         let at_once = rank * rank * self.regressor.n_columns;
         let one_by_one: usize = self.relations.iter().map(|r| (r.len() + 1).pow(3)).sum();
@@ -192,12 +202,15 @@ impl PrimeFieldOracle for MotionFactorOracle<'_> {
     }
 }
 
-/// Wanted factors from relations, all of which must be known: much cheaper than from points of motion.
+/// Evaluates wanted factors from relations whose factors are all known; much cheaper than from points of motion.
 struct RelationFactorOracle<'a> {
+    /// The relations.
     related: &'a SolvedRelations,
+    /// Source of constants at which all functions exist.
     regressor: &'a SampledRegressor,
-    /// Which ones.
+    /// Pairs of a dependent and a retained column.
     wanted: Vec<(usize, usize)>,
+    /// Remaining field operations.
     budget: &'a mut OperationBudget,
 }
 

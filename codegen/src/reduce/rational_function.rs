@@ -1,4 +1,4 @@
-//! Rational functions of the model's constants: the factors a_k of eq. (6).
+//! Rational functions of the model's constants: the factors a_k of eq. (6), with their values and normal form.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,7 +9,7 @@ use num_traits::{ToPrimitive, Zero};
 
 use crate::expr::{Atom, AtomAngleSum, ExprId, FieldPoint, Graph, Rational};
 
-/// What is left of a sum's terms, relative to their sizes, below which it is added up exactly.
+/// A sum below this share of its terms' magnitudes is added up exactly, because rounding would dominate it.
 const CANCELLED: f64 = 1e-3;
 
 /// What a factor may depend on: a constant, or the cosine or sine of a constant angle.
@@ -43,7 +43,7 @@ impl FactorVariable {
         }
     }
 
-    /// Its value for constants in floating point, by index.
+    /// Its value in double precision, for constants by index.
     fn value_f64(self, constants: &[f64]) -> f64 {
         match self {
             Self::Constant(i) => constants[i],
@@ -112,9 +112,11 @@ impl RationalFunction {
     ) -> Self {
         assert!(!denominator.is_empty(), "a denominator is not zero");
         if numerator.is_empty() {
+            // A numerator without terms is zero.
             return Self::constant(Rational::ZERO);
         }
         (numerator, denominator) = (with_fewest_terms(numerator), with_fewest_terms(denominator));
+        // Powers of variables that all terms have are removed from both polynomials.
         let common = denominator
             .keys()
             .chain(numerator.keys())
@@ -138,6 +140,7 @@ impl RationalFunction {
                 .collect()
         };
         (numerator, denominator) = (strip(numerator), strip(denominator));
+        // The denominator gets coprime integer coefficients, the first of them positive.
         let mut content = denominator
             .values()
             .fold(Rational::ZERO, |c, k| c.content_with(k));
@@ -163,7 +166,7 @@ impl RationalFunction {
         self.numerator.is_empty()
     }
 
-    /// The number, if it is one.
+    /// The number that it equals; `None` if it depends on constants.
     pub fn as_constant(&self) -> Option<Rational> {
         if self.is_zero() {
             return Some(Rational::ZERO);
@@ -187,10 +190,11 @@ impl RationalFunction {
         Some(polynomial_value(&self.numerator, point)? * denominator)
     }
 
-    /// Its value for constants in floating point, by index. Sums whose terms all but cancel are added up exactly: quotients
-    /// of them are large, and would have lost their digits twice over.
+    /// Its value in double precision, for constants by index. Sums whose terms nearly cancel are added up exactly,
+    /// because quotients with them are large and would lose digits in both parts.
     pub fn value_f64(&self, constants: &[f64]) -> f64 {
         let evaluate = |p: &TrigonometricPolynomial| -> f64 {
+            // The sum and the sum of the magnitudes of its terms.
             let (mut sum, mut size) = (0.0, 0.0);
             for (powers, k) in p {
                 let term = powers.iter().fold(k.to_f64(), |product, (v, n)| {
@@ -210,7 +214,7 @@ impl RationalFunction {
         evaluate(&self.numerator) / evaluate(&self.denominator)
     }
 
-    /// Its exact value for exact constants, by index; sines, cosines and roots are those of floating point.
+    /// Its exact value for exact constants, by index; sines, cosines and roots are those of double precision.
     pub fn value_exact(&self, constants: &[BigRational]) -> BigRational {
         polynomial_exact(&self.numerator, constants)
             / polynomial_exact(&self.denominator, constants)
@@ -241,12 +245,12 @@ impl RationalFunction {
     }
 }
 
-/// The number that a float is; zero for what is none.
+/// The exact value of a double; zero if it is not finite.
 fn from_f64(value: f64) -> BigRational {
     BigRational::from_float(value).unwrap_or_else(BigRational::zero)
 }
 
-/// The exact value of a polynomial for exact constants; sines, cosines and roots are those of floating point.
+/// The exact value of a polynomial for exact constants; sines, cosines and roots are those of double precision.
 fn polynomial_exact(p: &TrigonometricPolynomial, constants: &[BigRational]) -> BigRational {
     let mut sum = BigRational::zero();
     for (powers, k) in p {
@@ -266,9 +270,10 @@ fn polynomial_exact(p: &TrigonometricPolynomial, constants: &[BigRational]) -> B
     sum
 }
 
-/// The same polynomial with even powers of a cosine as powers of the sine where that has fewer terms:
+/// The same polynomial with even powers of a cosine written as powers of the sine if that has fewer terms:
 /// `L^2 - L^2*cos(beta)^2` is `L^2*sin(beta)^2`.
 fn with_fewest_terms(mut p: TrigonometricPolynomial) -> TrigonometricPolynomial {
+    // Angles whose cosines occur.
     let angles: BTreeSet<usize> = p
         .keys()
         .flatten()
@@ -309,6 +314,7 @@ fn with_fewest_terms(mut p: TrigonometricPolynomial) -> TrigonometricPolynomial 
     p
 }
 
+/// The value of a product of powers at a point of the field; `None` if a root does not exist there.
 pub(crate) fn monomial_value<const P: u64>(
     powers: &PowerProduct,
     point: &FieldPoint<FieldElement<P>>,
@@ -320,6 +326,7 @@ pub(crate) fn monomial_value<const P: u64>(
         })
 }
 
+/// The value of a polynomial at a point of the field; `None` if a root does not exist there.
 fn polynomial_value<const P: u64>(
     p: &TrigonometricPolynomial,
     point: &FieldPoint<FieldElement<P>>,
