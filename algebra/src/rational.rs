@@ -1,4 +1,4 @@
-//! Exact rationals that stay small numbers as long as they can.
+//! Exact rationals that use machine words as long as these are sufficient.
 
 use std::fmt;
 use std::ops::{Add, Mul, Neg, Sub};
@@ -11,14 +11,16 @@ use num_traits::{One, Signed, ToPrimitive, Zero};
 #[derive(Clone, PartialEq, Eq, Hash)]
 pub struct Rational(RationalRepr);
 
+/// The two representations. Every number that fits into words is `Small`, so that equal numbers are equal as values.
 #[derive(Clone, PartialEq, Eq, Hash)]
 enum RationalRepr {
     /// Numerator and positive denominator, coprime.
     Small(i64, i64),
-    /// Only what does not fit into `Small`.
+    /// Numbers that do not fit into `Small`.
     Big(Box<BigRational>),
 }
 
+/// Greatest common divisor; `a` for `b = 0`.
 fn gcd(a: u128, b: u128) -> u128 {
     if b == 0 { a } else { gcd(b, a % b) }
 }
@@ -42,8 +44,9 @@ impl Rational {
         Self(RationalRepr::Small(value, 1))
     }
 
+    /// A fraction of double words in lowest terms; the denominator must not be zero.
     fn from_wide(numerator: i128, denominator: i128) -> Self {
-        // Nearly all numbers are words and most are whole, and long division is slow.
+        // Nearly all numbers are words and most are integers, and long division is slow.
         if let (Ok(n), Ok(d)) = (i64::try_from(numerator), i64::try_from(denominator))
             && n != i64::MIN
             && d != i64::MIN
@@ -56,6 +59,7 @@ impl Rational {
             let sign = if (x < 0) ^ (denominator < 0) { -1 } else { 1 };
             (magnitude, sign)
         };
+        // The sign goes to the numerator.
         let (n, sign) = divide(numerator);
         let d = denominator.unsigned_abs() / common;
         match (i64::try_from(n), i64::try_from(d)) {
@@ -67,11 +71,12 @@ impl Rational {
         }
     }
 
-    /// A fraction of words of which neither is the least one.
+    /// A fraction of words, neither of which is the least one, in lowest terms.
     fn from_words(numerator: i64, denominator: i64) -> Self {
         if denominator == 1 {
             return Self(RationalRepr::Small(numerator, 1));
         }
+        // Euclid's algorithm in words.
         let (mut common, mut rest) = (numerator.abs(), denominator.abs());
         while rest != 0 {
             (common, rest) = (rest, common % rest);
@@ -83,7 +88,7 @@ impl Rational {
         ))
     }
 
-    /// The same number as a fraction of big integers.
+    /// The same number as a fraction of big integers, in lowest terms.
     pub fn to_big(&self) -> BigRational {
         match &self.0 {
             RationalRepr::Small(n, d) => BigRational::new_raw(BigInt::from(*n), BigInt::from(*d)),
@@ -188,6 +193,7 @@ impl Rational {
     }
 }
 
+/// Greatest common divisor of big integers; 1 for two zeros.
 fn num_gcd(a: &BigInt, b: &BigInt) -> BigInt {
     let (mut a, mut b) = (a.abs(), b.abs());
     while !b.is_zero() {

@@ -1,4 +1,4 @@
-//! Degrees of a rational function of one variable, from its values.
+//! Polynomials and rational functions of one variable, from their values at points of the prime field.
 
 use crate::field::FieldElement;
 
@@ -22,6 +22,7 @@ pub fn interpolant_degrees(x: &[FieldElement], y: &[FieldElement]) -> Option<(us
         if r1.is_empty() {
             break;
         }
+        // The candidate with the least sum of degrees is the function, if it exists.
         let (numerator, denominator) = (r1.len() - 1, t1.len() - 1);
         if best.is_none_or(|(a, b)| numerator + denominator < a + b) {
             best = Some((numerator, denominator));
@@ -35,12 +36,14 @@ pub fn interpolant_degrees(x: &[FieldElement], y: &[FieldElement]) -> Option<(us
     best.filter(|(a, b)| a + b + 1 + 2 <= n)
 }
 
+/// Removes leading coefficients that are zero.
 fn trim(p: &mut Vec<FieldElement>) {
     while p.last() == Some(&FieldElement::ZERO) {
         p.pop();
     }
 }
 
+/// The product of two polynomials, lowest power first.
 fn multiply(a: &[FieldElement], b: &[FieldElement]) -> Vec<FieldElement> {
     if a.is_empty() || b.is_empty() {
         return Vec::new();
@@ -54,6 +57,7 @@ fn multiply(a: &[FieldElement], b: &[FieldElement]) -> Vec<FieldElement> {
     product
 }
 
+/// The difference of two polynomials.
 fn subtract(a: &[FieldElement], b: &[FieldElement]) -> Vec<FieldElement> {
     let at = |p: &[FieldElement], i: usize| p.get(i).copied().unwrap_or(FieldElement::ZERO);
     (0..a.len().max(b.len()))
@@ -61,6 +65,7 @@ fn subtract(a: &[FieldElement], b: &[FieldElement]) -> Vec<FieldElement> {
         .collect()
 }
 
+/// Quotient and remainder; the divisor must be trimmed and not zero.
 fn divide(a: &[FieldElement], b: &[FieldElement]) -> (Vec<FieldElement>, Vec<FieldElement>) {
     let mut rest = a.to_vec();
     trim(&mut rest);
@@ -82,9 +87,11 @@ fn divide(a: &[FieldElement], b: &[FieldElement]) -> (Vec<FieldElement>, Vec<Fie
     (quotient, rest)
 }
 
-/// The polynomial of least degree through some points, lowest power first, by Newton's divided differences.
+/// The polynomial of least degree through some points, lowest power first, by Newton's divided differences. The
+/// abscissae must differ.
 pub fn interpolate(x: &[FieldElement], y: &[FieldElement]) -> Vec<FieldElement> {
     let n = x.len();
+    // Divided differences, in place.
     let mut table = y.to_vec();
     for level in 1..n {
         for i in (level..n).rev() {
@@ -92,6 +99,7 @@ pub fn interpolate(x: &[FieldElement], y: &[FieldElement]) -> Vec<FieldElement> 
             table[i] = (table[i] - table[i - 1]) * gap;
         }
     }
+    // Newton's form is multiplied out from the highest difference.
     let mut polynomial = vec![table[n - 1]];
     for i in (0..n - 1).rev() {
         polynomial = multiply(&polynomial, &[-x[i], FieldElement::ONE]);
