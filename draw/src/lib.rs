@@ -28,9 +28,10 @@
 //! # name = "motor"
 //! # joint = "q"
 //! # "#;
-//! let mechanism = modelmill_spec::load("pendulum.toml", text, &modelmill_boundary::files::Memory::default()).expect("a model").mechanism;
-//! let scene = modelmill_draw::Scene::new(&mechanism, &[0.3]);
-//! let picture = modelmill_draw::svg(&[&scene], &scene.view(), &modelmill_draw::Style::default());
+//! let files = modelmill_boundary::files::MemoryFiles::default();
+//! let mechanism = modelmill_spec::load("pendulum.toml", text, &files).expect("a model").mechanism;
+//! let scene = modelmill_draw::MechanismScene::new(&mechanism, &[0.3]);
+//! let picture = modelmill_draw::svg(&[&scene], &scene.best_view(), &modelmill_draw::DrawingStyle::default());
 //! assert!(picture.starts_with("<svg"));
 //! ```
 

@@ -1,4 +1,4 @@
-//! From merged entries to a rig: names are looked up, numbers checked. All findings are collected.
+//! Assembles a rig from merged entries: names are resolved and numbers are checked. All errors are collected.
 
 use modelmill_spec::Diagnostic;
 use nalgebra::{Matrix3, Vector3};
@@ -19,9 +19,12 @@ use crate::pose::BodyPose;
 use crate::rig::{Rig, RigBody, RigCoordinate, RigDrive, RigJoint, RigLumpedMass, RigPoint};
 use crate::sensor::RigSensors;
 
-/// Makes the rig of a chain of files, the rig's own first, then what it extends.
+/// Assembles the rig of a chain of files, the rig's own first, then those that it extends.
+///
+/// Fails with all errors, in the order of their places.
 pub(crate) fn assemble(chain: Vec<(usize, RigEntry)>) -> Result<Rig, Vec<Diagnostic>> {
     let mut log = RigLog::default();
+    // The last file of the chain is the base of the others.
     let mut files = chain.into_iter().rev();
     let Some((file, first)) = files.next() else {
         return Err(Vec::new());
@@ -40,7 +43,7 @@ pub(crate) fn assemble(chain: Vec<(usize, RigEntry)>) -> Result<Rig, Vec<Diagnos
     }
 }
 
-/// The rig of merged entries.
+/// The rig of merged entries, with errors in the log.
 fn build(merged: &MergedRig, log: &mut RigLog) -> Rig {
     let mut rig = Rig {
         name: merged.name.clone(),
@@ -109,7 +112,7 @@ fn build(merged: &MergedRig, log: &mut RigLog) -> Rig {
     rig
 }
 
-/// A rig needs coordinates, as many drives, and columns that can be told apart.
+/// Checks that a rig has coordinates, as many drives, and columns with different names.
 fn check_columns(merged: &MergedRig, log: &mut RigLog) {
     let (n_coordinates, n_drives) = (merged.coordinates.len(), merged.drives.len());
     if n_coordinates == 0 || n_drives != n_coordinates {
@@ -153,6 +156,7 @@ fn check_columns(merged: &MergedRig, log: &mut RigLog) {
     }
 }
 
+/// A body; its inertia must be physically possible.
 fn body(item: &FileItem<BodyEntry>, log: &mut RigLog) -> RigBody {
     let (file, entry) = (item.file, &item.entry);
     let inertia = entry
@@ -166,7 +170,7 @@ fn body(item: &FileItem<BodyEntry>, log: &mut RigLog) -> RigBody {
             } else {
                 Vector3::repeat(f64::NAN)
             };
-            // A planar model gives zz alone, which no body has; it does no harm where only that one counts.
+            // A planar model has zz alone, which no real body has; this is accepted where only zz has an effect.
             if moments.min().is_nan() || moments.min() < -1e-9 * moments.amax() {
                 log.error(
                     source_span(file, &spanned.span()),
@@ -192,11 +196,10 @@ fn body(item: &FileItem<BodyEntry>, log: &mut RigLog) -> RigBody {
     }
 }
 
-/// Index of a body; `Some(None)` is the base.
-/// A name that leads nowhere, which was reported.
+/// A name that does not exist, which has been reported.
 struct UnknownBody;
 
-/// A body, or the base, which is none.
+/// Index of a body; `None` is the base.
 fn find_body(
     rig: &Rig,
     file: usize,
@@ -218,6 +221,7 @@ fn find_body(
     found.map(Some).ok_or(UnknownBody)
 }
 
+/// The place of a named point; reports an unknown name.
 fn find_point(rig: &Rig, file: usize, name: &RigName, log: &mut RigLog) -> Option<BodyAnchor> {
     let found = rig
         .points
@@ -230,6 +234,7 @@ fn find_point(rig: &Rig, file: usize, name: &RigName, log: &mut RigLog) -> Optio
     found.map(|point| point.anchor)
 }
 
+/// Index of a joint with exactly one coordinate; reports any other.
 fn find_joint(rig: &Rig, file: usize, name: &RigName, log: &mut RigLog) -> Option<usize> {
     let found = rig
         .joints
@@ -257,6 +262,7 @@ fn find_joint(rig: &Rig, file: usize, name: &RigName, log: &mut RigLog) -> Optio
     }
 }
 
+/// A lumped mass, whose two points must be on one body.
 fn lumped_mass(
     rig: &Rig,
     item: &FileItem<RigLumpedMassEntry>,
@@ -292,6 +298,7 @@ fn lumped_mass(
     })
 }
 
+/// A joint with its equations and its coordinate; without equations where an error has been reported.
 fn joint(rig: &Rig, item: &FileItem<RigJointEntry>, log: &mut RigLog) -> RigJoint {
     let (file, entry) = (item.file, &item.entry);
     let mut joint = RigJoint {
@@ -357,7 +364,7 @@ fn joint(rig: &Rig, item: &FileItem<RigJointEntry>, log: &mut RigLog) -> RigJoin
     joint
 }
 
-/// Where the joint is on each of its bodies.
+/// The place of a joint on each of its bodies.
 fn joint_anchors(
     rig: &Rig,
     file: usize,
@@ -425,6 +432,7 @@ fn joint_anchors(
     }
 }
 
+/// The distance of two points of different bodies.
 fn length(rig: &Rig, file: usize, entry: &LengthEntry, log: &mut RigLog) -> Option<PairFunction> {
     let from = find_point(rig, file, &entry.from, log);
     let to = find_point(rig, file, &entry.to, log);
@@ -445,6 +453,7 @@ fn length(rig: &Rig, file: usize, entry: &LengthEntry, log: &mut RigLog) -> Opti
     Some(pair)
 }
 
+/// Adds a coordinate, and sets its joint's nominal value.
 fn coordinate(rig: &mut Rig, item: &FileItem<RigCoordinateEntry>, log: &mut RigLog) {
     let (file, entry) = (item.file, &item.entry);
     let nominal = entry.nominal.as_ref().map(|n| *n.get_ref());
@@ -482,6 +491,7 @@ fn coordinate(rig: &mut Rig, item: &FileItem<RigCoordinateEntry>, log: &mut RigL
         }));
 }
 
+/// Adds a drive.
 fn drive(rig: &mut Rig, item: &FileItem<RigDriveEntry>, log: &mut RigLog) {
     let (file, entry) = (item.file, &item.entry);
     let measures = match (&entry.joint, &entry.linear) {
@@ -500,6 +510,7 @@ fn drive(rig: &mut Rig, item: &FileItem<RigDriveEntry>, log: &mut RigLog) {
     }));
 }
 
+/// Reports an entry with none or several of the keys that define it.
 fn report_unclear_kind(file: usize, name: &RigName, keys: &str, log: &mut RigLog) {
     log.error(
         source_span(file, &name.span()),
@@ -512,6 +523,7 @@ fn report_unclear_kind(file: usize, name: &RigName, keys: &str, log: &mut RigLog
     );
 }
 
+/// An effect; reports its errors at the places of the entry.
 fn effect(rig: &Rig, item: &FileItem<RigEffectEntry>, log: &mut RigLog) -> Option<RigEffect> {
     let (file, entry) = (item.file, &item.entry);
     let at: Vec<&str> = entry

@@ -1,11 +1,11 @@
-//! From the entries of encoders and force sensors to the channels of a rig.
+//! Converts the entries of encoders and force sensors to the channels of a rig.
 
 use crate::file::{RigName, SensorEntry};
 use crate::load::source_span;
 use crate::log::{FileItem, RigLog, above_zero, not_negative};
 use crate::sensor::SensorChannel;
 
-/// One channel per name; ideal where no sensor is described. A later sensor replaces an earlier one.
+/// One channel per name; ideal if no sensor is described. A later sensor replaces an earlier one.
 pub(crate) fn channels<'a>(
     items: &[FileItem<SensorEntry>],
     what: &str,
@@ -26,6 +26,7 @@ pub(crate) fn channels<'a>(
     channels
 }
 
+/// The channel of one entry; `what` is `coordinate` for encoders.
 fn channel(item: &FileItem<SensorEntry>, what: &str, log: &mut RigLog) -> SensorChannel {
     let (file, entry) = (item.file, &item.entry);
     let mut resolution = not_negative(file, entry.resolution.as_ref(), "a resolution", log);

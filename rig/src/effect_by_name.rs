@@ -1,14 +1,14 @@
-//! Effects from names: kind, places and values as rig files and programs write them go in, a checked [`Effect`]
-//! or every fault comes out, each with what was expected and what to do.
+//! Effects from names: kind, places and values go in as rig files and programs state them. A checked [`RigEffect`]
+//! or all errors come out, each with the expected entry and a remedy.
 
 use crate::effect::{RigEffect, RigLaw, RigPlace, ValueSign};
 use crate::pair::PairFunction;
 use crate::rig::Rig;
 
-/// What is wrong with an effect.
+/// An error in an effect.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EffectFault {
-    /// Which part of it.
+    /// The part that is wrong.
     pub part: EffectPart,
     /// What is wrong.
     pub message: String,
@@ -45,7 +45,7 @@ impl std::fmt::Display for EffectFault {
 
 impl std::error::Error for EffectFault {}
 
-/// Where a kind may act.
+/// The places where a kind may act.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum AllowedPlaces {
     DrivesAndJoints,
@@ -59,6 +59,7 @@ enum AllowedPlaces {
 }
 
 impl AllowedPlaces {
+    /// The allowed places of a kind.
     fn for_kind(kind: &str) -> Self {
         match kind {
             "load_friction" => Self::Drives,
@@ -72,6 +73,7 @@ impl AllowedPlaces {
         }
     }
 
+    /// The allowed places as text for messages.
     fn description(self) -> &'static str {
         match self {
             Self::DrivesAndJoints => "a drive, a coordinate or a joint with one coordinate",
@@ -87,6 +89,7 @@ impl AllowedPlaces {
         }
     }
 
+    /// Number of places; `None` for one or more.
     fn n_places(self) -> Option<usize> {
         match self {
             Self::TwoDrivesOrJoints | Self::TwoPointsOfABody => Some(2),
@@ -97,21 +100,21 @@ impl AllowedPlaces {
 }
 
 impl Rig {
-    /// An effect of this rig by names: a kind ([`Law::KINDS`]), its places, its values by symbol.
+    /// An effect of this rig by names: a kind ([`RigLaw::KINDS`]), its places, and its values by symbol.
     ///
-    /// Places are drives, coordinates, joints, points, `base` or `force`, as the kind has it. The effect acts once
-    /// it is pushed to [`Rig::effects`]. Fails with every fault of the description.
+    /// Places are drives, coordinates, joints, points, `base` or `force`, depending on the kind. The effect acts after
+    /// it has been pushed to [`Rig::effects`]. Fails with all errors of the description.
     ///
     /// ```
     /// # let text = "schema = 1\nname = 'm'\nbody = [{ name = 'cart', mass = 2 }]\n\
     /// #     joint = [{ name = 'rail', kind = 'prismatic', between = ['base', 'cart'], at = [0, 0, 0], axis = [1, 0, 0] }]\n\
     /// #     coordinate = [{ name = 'x', joint = 'rail' }]\ndrive = [{ name = 'screw', joint = 'rail' }]";
-    /// # let files = modelmill_boundary::files::Memory::default();
+    /// # let files = modelmill_boundary::files::MemoryFiles::default();
     /// # let mut rig = modelmill_rig::load("m.toml", text, &files)?.rig;
     /// let friction = rig.effect("viscous_friction", &["screw"], &[("Fv", 20.0)]).unwrap();
     /// rig.effects.push(friction);
-    /// let state = modelmill_rig::State { q: vec![0.0], qd: vec![0.1], qdd: vec![3.0] };
-    /// let force = modelmill_rig::forces(&rig, &modelmill_rig::Tracker::new(&rig)?.follow(&state)?)?[0];
+    /// let state = modelmill_rig::RigState { q: vec![0.0], qd: vec![0.1], qdd: vec![3.0] };
+    /// let force = modelmill_rig::forces(&rig, &modelmill_rig::RigTracker::new(&rig)?.follow(&state)?)?[0];
     /// assert!((force - (2.0 * 3.0 + 20.0 * 0.1)).abs() < 1e-12);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
@@ -187,6 +190,7 @@ impl Rig {
         }
     }
 
+    /// The places of an effect; reports those where its kind cannot act.
     fn places(&self, kind: &str, at: &[&str], faults: &mut Vec<EffectFault>) -> Vec<RigPlace> {
         let acts = AllowedPlaces::for_kind(kind);
         let mut places = Vec::new();
@@ -220,6 +224,7 @@ impl Rig {
         places
     }
 
+    /// The place of a name among the allowed ones.
     fn place(&self, acts: AllowedPlaces, name: &str) -> Option<RigPlace> {
         let joint = |pair: &PairFunction| {
             self.joints
@@ -260,6 +265,7 @@ impl Rig {
         }
     }
 
+    /// All names at which a kind may act.
     fn place_names(&self, acts: AllowedPlaces) -> Vec<&str> {
         let drives = self.drives.iter().map(|drive| drive.name.as_str());
         let coordinates = self.coordinates.iter().map(|c| c.name.as_str());
@@ -278,7 +284,7 @@ impl Rig {
     }
 }
 
-/// A list of names for a message, cut where nobody reads on.
+/// A list of names for a message, at most 24 of them.
 pub(crate) fn name_list(names: &[&str]) -> String {
     let mut list: Vec<String> = names
         .iter()

@@ -1,4 +1,4 @@
-//! Kinds of joints: each as the functions of two bodies' poses that it holds.
+//! Kinds of joints: each is a set of functions of two bodies' poses that are constant.
 //!
 //! A place on both bodies and an axis in the base frame go in; the equations and the joint's own coordinate come
 //! out. Source: E. Haug, "Computer Aided Kinematics and Dynamics of Mechanical Systems" (1989), table 9.4.
@@ -8,7 +8,7 @@ use nalgebra::Vector3;
 use crate::pair::{BodyAnchor, PairFunction, PairQuantity};
 use crate::pose::{BodyMotion, BodyPose};
 
-/// What a joint allows.
+/// The motion that a joint allows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum RigJointKind {
     Fixed,
@@ -17,7 +17,7 @@ pub(crate) enum RigJointKind {
     Cylindrical,
     Spherical,
     Planar,
-    /// A point of the second body stays on a line of the first.
+    /// A point of the second body is on a line of the first.
     PointOnLine,
 }
 
@@ -106,7 +106,7 @@ pub(crate) fn equations(
     (held.into_iter().map(|pair| (pair, 0.0)).collect(), motion)
 }
 
-/// Makes a joint's coordinate have a value while the bodies are at `poses`.
+/// Sets the value that a joint's coordinate has while the bodies are at `poses`.
 pub(crate) fn set_nominal(motion: &mut PairFunction, nominal: f64, poses: &[BodyPose]) {
     let bodies: Vec<BodyMotion> = poses
         .iter()
@@ -116,7 +116,7 @@ pub(crate) fn set_nominal(motion: &mut PairFunction, nominal: f64, poses: &[Body
     let value = motion.derive(&bodies, &base).value;
     match &mut motion.shape {
         PairQuantity::Angle { offset, .. } => *offset += nominal - value,
-        // The anchor of the second body moves along the axis, where the joint leaves it free.
+        // The anchor of the second body moves along the axis, in which direction the joint is not constrained.
         PairQuantity::Along(axis) => {
             let turned = |body: Option<usize>| body.map_or(base.pose.q_WB, |b| poses[b].q_WB);
             let axis_W = turned(motion.from.body) * *axis;
@@ -126,7 +126,7 @@ pub(crate) fn set_nominal(motion: &mut PairFunction, nominal: f64, poses: &[Body
     }
 }
 
-/// Two unit vectors across a unit vector and each other, a right-handed triad with it.
+/// Two unit vectors that form a right-handed triad with a unit vector.
 fn perpendicular_axes(axis: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
     let mut other = Vector3::zeros();
     other[axis.iamin()] = 1.0;

@@ -1,7 +1,7 @@
-//! Effects with mass: rods along drives, masses at points, masses that moments see elsewhere, and a tilted base.
+//! Effects with mass: rods along drives, masses at points, masses with another place in the moments, and a tilted base.
 //!
-//! The motion of the bodies goes in; forces and moments that the bodies must supply besides come out, or gravity.
-//! Source: Newton and Euler's equations of a slender rod that a pivot holds at one point and a slide across itself
+//! The motion of the bodies goes in. The additional forces and moments on the bodies, or gravity, come out.
+//! Source: Newton and Euler's equations of a slender rod with a pivot at one point and a guide along the rod
 //! at another.
 //!
 //! Decision: a rod, a tool or a tilted base acts on the bodies here and is no term at a drive, so that friction by
@@ -16,7 +16,7 @@ use crate::pair::BodyAnchor;
 use crate::pose::BodyMotion;
 use crate::rig::Rig;
 
-/// Gravity as the bodies of a rig with all its effects feel it, m/s^2.
+/// Gravity that acts on the bodies of a rig with all its effects, in the base frame, m/s^2.
 pub(crate) fn gravity(rig: &Rig) -> Vector3<f64> {
     let mut gravity = rig.gravity;
     for effect in &rig.effects {
@@ -27,7 +27,7 @@ pub(crate) fn gravity(rig: &Rig) -> Vector3<f64> {
     gravity
 }
 
-/// The rotation of a rotation vector (O. Rodrigues 1840).
+/// The rotation matrix of a rotation vector (O. Rodrigues 1840).
 fn rotation_from_vector(by: Vector3<f64>) -> Matrix3<f64> {
     let angle = by.norm();
     if angle == 0.0 {
@@ -37,8 +37,8 @@ fn rotation_from_vector(by: Vector3<f64>) -> Matrix3<f64> {
     Matrix3::identity() + k * libm::sin(angle) + k * k * (1.0 - libm::cos(angle))
 }
 
-/// Calls `add` with each body, a force on it and its moment about the body's origin, which an effect needs for the
-/// motion of its masses.
+/// Calls `add` with each body, a force on it in N and its moment about the body's origin in N m, which an effect needs
+/// for the motion of its masses.
 pub(crate) fn inertial_forces(
     rig: &Rig,
     effect: &RigEffect,
@@ -96,7 +96,7 @@ pub(crate) fn inertial_forces(
     }
 }
 
-/// Forces that a rod needs at its pivot and, across itself, at its slide.
+/// Forces that a rod needs at its pivot and, perpendicular to itself, at its guide, N.
 fn rod_forces(
     motion: &RigMotion,
     ends: [&BodyAnchor; 2],
@@ -124,7 +124,7 @@ fn rod_forces(
     let ud = (dd - rate * u) / length;
     let acceleration = ud.dot(&dd) + u.dot(&ddd);
     let udd = (ddd - acceleration * u - 2.0 * rate * ud) / length;
-    // The rod does not turn about itself, so that its angular acceleration is u x u''.
+    // The rod does not rotate about itself, so its angular acceleration is u x u''.
     let alpha = u.cross(&udd);
     let force = m * (one[2] + c * udd - gravity);
     let moment = c * u.cross(&force) + inertia * alpha;
@@ -132,12 +132,14 @@ fn rod_forces(
     [force - slide, slide]
 }
 
+/// The motion of the body that carries a place.
 fn anchor_motion(motion: &RigMotion, anchor: &BodyAnchor) -> BodyMotion {
     anchor
         .body
         .map_or_else(base_motion, |body| motion.bodies[body])
 }
 
+/// The place of a point; `None` for other places and unknown indices.
 fn point_anchor(rig: &Rig, place: RigPlace) -> Option<BodyAnchor> {
     match place {
         RigPlace::Point(at) => Some(rig.points.get(at)?.anchor),
@@ -145,7 +147,7 @@ fn point_anchor(rig: &Rig, place: RigPlace) -> Option<BodyAnchor> {
     }
 }
 
-/// Energy of all masses that effects add, J, beside the potential zero at the base frame's origin.
+/// Energy of all masses of effects, J; the potential energy is zero at the base frame's origin.
 pub(crate) fn energy(rig: &Rig, motion: &RigMotion, gravity: &Vector3<f64>) -> f64 {
     let mut sum = 0.0;
     for effect in &rig.effects {

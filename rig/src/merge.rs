@@ -1,4 +1,4 @@
-//! A rig file and those that it extends, as one: entries of a variant replace those of the same name or join them.
+//! Merges a rig file and those that it extends: entries of a variant replace those of the same name or are added.
 
 use crate::file::{
     BodyEntry, RigCoordinateEntry, RigDriveEntry, RigEffectEntry, RigEntry, RigJointEntry,
@@ -7,8 +7,9 @@ use crate::file::{
 use crate::load::source_span;
 use crate::log::{FileItem, RigLog};
 
-/// Entries of all files of a chain.
+/// Entries of all files of a chain, each with its file.
 pub(crate) struct MergedRig {
+    /// Name of the last variant.
     pub(crate) name: String,
     pub(crate) title: String,
     pub(crate) gravity: Option<FileItem<SpannedTriple>>,
@@ -27,6 +28,7 @@ pub(crate) struct MergedRig {
 }
 
 impl MergedRig {
+    /// The entries of one file; reports wrong names and an unknown schema.
     pub(crate) fn new(file: usize, entry: RigEntry, log: &mut RigLog) -> Self {
         if *entry.schema.get_ref() != 1 {
             log.error(
@@ -71,7 +73,7 @@ impl MergedRig {
         }
     }
 
-    /// Takes over the entries of a variant.
+    /// Adds the entries of a variant.
     pub(crate) fn extend(&mut self, variant: Self) {
         self.name = variant.name;
         if !variant.title.is_empty() {
@@ -97,7 +99,7 @@ impl MergedRig {
     }
 }
 
-/// Wraps the entries of one file; names must be words and differ.
+/// The entries of one file with its index; names must be words and must differ.
 fn collect_items<T>(
     file: usize,
     entries: Vec<T>,
@@ -137,7 +139,7 @@ fn collect_items<T>(
         .collect()
 }
 
-/// Entries of a variant replace those of the same name where they stand, or join them.
+/// Entries of a variant replace those of the same name at their place; the others are added.
 fn merge_items<T>(
     base: &mut Vec<FileItem<T>>,
     variant: Vec<FileItem<T>>,

@@ -28,7 +28,7 @@ impl GaussianNoise {
         ((self.bits() >> 11) as f64 + 1.0) / (1_u64 << 53) as f64
     }
 
-    /// Normal with mean zero and deviation one (G. Box, M. Muller 1958).
+    /// Normal distribution with mean zero and standard deviation one (G. Box, M. Muller 1958).
     pub fn normal(&mut self) -> f64 {
         let radius = (-2.0 * libm::log(self.uniform())).sqrt();
         radius * libm::cos(2.0 * std::f64::consts::PI * self.uniform())

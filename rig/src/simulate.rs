@@ -1,4 +1,4 @@
-//! A run of the rig along a trajectory: motion, forces of the drives with all effects, readings of the sensors.
+//! A run of the rig along a trajectory: motion, forces of the drives with all effects, and readings of the sensors.
 
 use std::fmt;
 
@@ -10,7 +10,7 @@ use crate::pair::PairFunction;
 use crate::rig::Rig;
 use crate::trajectory::Trajectory;
 
-/// Most samples of one run: beyond, the sampling rate is a slip.
+/// Largest number of samples of a run; a higher sampling rate is probably a mistake.
 const MOST_SAMPLES: f64 = 1e7;
 
 /// Exact forces and motion at one time.
@@ -27,7 +27,7 @@ pub struct SimulatedInstant {
 pub struct RigRecording {
     /// Names and numbers of the columns: `t`, coordinates, their derivatives, drives; all of the same length.
     pub columns: Vec<(String, Vec<f64>)>,
-    /// What the user should know.
+    /// Remarks for the user.
     pub notes: Vec<String>,
 }
 
@@ -43,28 +43,28 @@ pub enum SimulationError {
     },
     /// The rig does not stand in its nominal configuration.
     Nominal(RigPoseError),
-    /// It cannot be where the trajectory wants it.
+    /// It cannot reach a pose of the trajectory.
     Pose {
-        /// When, s.
+        /// Time, s.
         time: f64,
-        /// Why.
+        /// Reason.
         reason: RigPoseError,
     },
-    /// A force or a reading is infinite or no number.
+    /// A force or a reading is infinite or NaN.
     NotFinite {
-        /// When, s.
+        /// Time, s.
         time: f64,
-        /// The column that it belongs to.
+        /// Name of the column.
         column: String,
-        /// The body with the largest number, by name, and what is so large there.
+        /// The body with the largest number, by name, and that number.
         largest: Option<String>,
     },
-    /// No sample is left: the delay is longer than the trajectory.
+    /// There is no sample, because the delay is longer than the trajectory.
     NothingLeft {
         /// The longest delay, s.
         delay: f64,
     },
-    /// The sampling rate makes more samples than anybody wants.
+    /// The sampling rate gives too many samples.
     TooManySamples {
         /// Samples per second.
         rate: f64,
@@ -109,7 +109,7 @@ impl std::error::Error for SimulationError {}
 
 /// The exact motion and forces at given times, without sensors; `progress` is called after each.
 ///
-/// Fails where the rig cannot follow.
+/// Fails if the rig cannot follow the trajectory.
 pub fn forces_along(
     rig: &Rig,
     trajectory: &Trajectory,
@@ -138,9 +138,9 @@ pub fn forces_along(
 
 /// Forces of the drives for a motion, N or N m, with all effects; in the rig's order.
 ///
-/// Effects at drives add to their forces; effects in joints are loads that the drives balance, and effects with
-/// mass are loads like those of bodies. A `time_delay` belongs to the sensors and does nothing here.
-/// Fails where the drives cannot balance a load.
+/// Effects at drives add to their forces. Effects in joints are loads that the drives balance, and effects with
+/// mass are loads like those of bodies. A `time_delay` belongs to the sensors and has no effect here.
+/// Fails if the drives cannot balance a load.
 pub fn forces(rig: &Rig, motion: &RigMotion) -> Result<Vec<f64>, RigPoseError> {
     let mechanical = drive_forces(rig, motion, &[])?;
     if rig.effects.is_empty() {
@@ -151,7 +151,7 @@ pub fn forces(rig: &Rig, motion: &RigMotion) -> Result<Vec<f64>, RigPoseError> {
             .pair(rig)
             .map_or_else(ScalarMotion::default, |pair| scalar_motion(pair, motion))
     };
-    // Programs may write places down themselves: an index that leads nowhere does nothing.
+    // Programs may construct places directly: an index out of range has no effect.
     let load = |drive: usize| mechanical.get(drive).copied().unwrap_or(0.0);
     let mut at_drives = vec![0.0; rig.drives.len()];
     let mut in_joints: Vec<(&PairFunction, f64)> = Vec::new();
@@ -183,15 +183,15 @@ pub fn place_motion(rig: &Rig, place: RigPlace, motion: &RigMotion) -> Option<Sc
     Some(scalar_motion(place.pair(rig)?, motion))
 }
 
-/// How many times the mechanics is solved in a run, for progress.
+/// Number of times that the mechanics is solved in a run, for progress.
 pub fn n_instants(rig: &Rig, trajectory: &Trajectory) -> usize {
     let (times, _) = sample_times(rig, trajectory).unwrap_or_default();
     times.len() * (1 + delays(rig).len())
 }
 
-/// Drives the rig along a trajectory and measures; `seed` replaces the rig's own.
+/// Simulates the rig along a trajectory and reads its sensors; `seed` replaces the rig's own.
 ///
-/// Fails where the rig cannot follow, and when delays or the sampling rate leave no sensible recording.
+/// Fails if the rig cannot follow, or if delays or the sampling rate give no useful recording.
 pub fn simulate(
     rig: &Rig,
     trajectory: &Trajectory,
@@ -200,6 +200,7 @@ pub fn simulate(
 ) -> Result<RigRecording, SimulationError> {
     let (times, mut notes) = sample_times(rig, trajectory)?;
     let present = forces_along(rig, trajectory, &times, &mut progress)?;
+    // Delayed sensors read the motion of earlier times, which is computed for every different delay.
     let mut past: Vec<(f64, Vec<SimulatedInstant>)> = Vec::new();
     for delay in delays(rig) {
         let earlier: Vec<f64> = times.iter().map(|t| t - delay).collect();
@@ -214,6 +215,7 @@ pub fn simulate(
             .map_or(&present, |(_, instants)| instants)
     };
     let seed = seed.unwrap_or(rig.seed);
+    // Every channel has an independent stream of noise.
     let mut channel = 0;
     let mut noise = || {
         channel += 1;
@@ -257,7 +259,7 @@ pub fn simulate(
     Ok(RigRecording { columns, notes })
 }
 
-/// That a recording holds numbers only.
+/// Checks that a recording contains finite numbers only.
 fn check_finite(rig: &Rig, columns: &[(String, Vec<f64>)]) -> Result<(), SimulationError> {
     let first = columns.iter().filter_map(|(name, values)| {
         let at = values.iter().position(|value| !value.is_finite())?;
@@ -273,9 +275,9 @@ fn check_finite(rig: &Rig, columns: &[(String, Vec<f64>)]) -> Result<(), Simulat
     })
 }
 
-/// The number of a body that makes forces overflow, in words, if there is one.
+/// The largest number of a body that makes forces overflow, as text, if there is one.
 fn largest_number(rig: &Rig) -> Option<String> {
-    /// Forces multiply masses by squares of lengths, of rates and more.
+    /// Forces are products of masses, squares of lengths and of rates.
     const TOO_LARGE: f64 = 1e60;
     let numbers = rig.bodies.iter().flat_map(|body| {
         [
@@ -290,8 +292,8 @@ fn largest_number(rig: &Rig) -> Option<String> {
     (value > TOO_LARGE).then(|| format!("the {what} of the body `{}` ({value:e})", body.name))
 }
 
-/// Times of the samples: those of the trajectory, or evenly spaced; from where every delayed reading lies
-/// inside the trajectory.
+/// Times of the samples, those of the trajectory or evenly spaced, with notes. Times at which a delayed reading would
+/// lie before the trajectory are left out.
 fn sample_times(
     rig: &Rig,
     trajectory: &Trajectory,
@@ -301,7 +303,7 @@ fn sample_times(
     let all = match rig.sensors.rate {
         None => given.to_vec(),
         Some(rate) => {
-            // A last sample that rounding puts just behind the end is meant.
+            // A last sample that rounding moves just behind the end is included.
             let n = ((end - start) * rate + 1e-6).floor();
             if n > MOST_SAMPLES {
                 return Err(SimulationError::TooManySamples { rate });
@@ -330,7 +332,7 @@ fn sample_times(
     Ok((times, notes))
 }
 
-/// The different delays of all sensors, zero left out.
+/// The different delays of all sensors, without zero, s.
 fn delays(rig: &Rig) -> Vec<f64> {
     let encoders = rig.sensors.encoders.iter().map(|channel| channel.delay);
     let lag = force_delay(rig);
@@ -345,7 +347,7 @@ fn delays(rig: &Rig) -> Vec<f64> {
     delays
 }
 
-/// How much later all forces are read, by effects, s.
+/// Delay of all forces by effects, s.
 fn force_delay(rig: &Rig) -> f64 {
     let lag = |law: &RigLaw| match law {
         RigLaw::TimeDelay { T } => *T,
