@@ -1,4 +1,4 @@
-//! The page's figures.
+//! The figures of the page as SVG: forces and errors over time, base parameters, and errors over a length.
 
 use std::fmt::Write as _;
 
@@ -23,6 +23,7 @@ fn round_limit(columns: &[&DriveColumns]) -> f64 {
         .unwrap_or(largest)
 }
 
+/// A panel with a given largest value.
 fn scale(limit: f64) -> PanelStyle<'static> {
     PanelStyle {
         limit: Some(limit),
@@ -62,6 +63,7 @@ pub(crate) fn motion(
     figure.finish()
 }
 
+/// Curves with the names of their drives.
 fn names<'a>(drives: &'a [String], columns: &'a DriveColumns) -> Vec<(&'a str, &'a [f64])> {
     drives
         .iter()
@@ -103,7 +105,7 @@ pub(crate) fn errors(title: &str, along: &TreatmentRun, drives: &[String]) -> St
     figure.finish()
 }
 
-/// The error of the paper's treatment, the force of the misplaced mass, and what is left of the one without the other.
+/// The error of the paper's treatment, the force of the misplaced mass, and the difference of both.
 pub(crate) fn decomposition(title: &str, along: &TreatmentRun, drives: &[String]) -> String {
     let mut figure = SvgFigure::new(title, &along.time);
     let error = along.error(&along.calculated[0]);
@@ -133,7 +135,7 @@ pub(crate) fn decomposition(title: &str, along: &TreatmentRun, drives: &[String]
     figure.finish()
 }
 
-/// What the paper's own identification changed in the forces, beside the force of the misplaced mass.
+/// The change of the forces by the paper's own identification, together with the force of the misplaced mass.
 pub(crate) fn printed_change(title: &str, along: &TreatmentRun, drives: &[String]) -> String {
     let mut figure = SvgFigure::new(title, &along.time);
     let (change, placement) = (along.printed_change(), along.placement());
@@ -151,7 +153,7 @@ pub(crate) fn printed_change(title: &str, along: &TreatmentRun, drives: &[String
     figure.finish()
 }
 
-/// Why relative errors have peaks: force, error and their quotient, with the zeros of the force marked.
+/// The cause of the peaks of relative errors: force, error and their quotient, with the zeros of the force marked.
 pub(crate) fn peaks(title: &str, along: &TreatmentRun, drive: usize, name: &str) -> String {
     let mut figure = SvgFigure::new(title, &along.time);
     let zeros = along.zeros(drive);
@@ -182,7 +184,7 @@ pub(crate) fn peaks(title: &str, along: &TreatmentRun, drive: usize, name: &str)
     figure.finish()
 }
 
-/// Where base parameters lie between calculated (0) and consistent (1).
+/// Positions of the base parameters between calculated (0) and consistent (1) values.
 pub(crate) fn base_parameter_positions(experiment: &PaperExperiment) -> String {
     const ROW: f64 = 46.0;
     let [calculated, consistent, estimated] = &experiment.base;
@@ -195,6 +197,7 @@ pub(crate) fn base_parameter_positions(experiment: &PaperExperiment) -> String {
         ("ours, rig as in Table 1", "c0", &ours[0]),
         ("ours, rig with spindle rods", "c2", &ours[1]),
     ];
+    // Horizontal position of a value, and the lower end of the chart.
     let x = |share: f64| 150.0 + 220.0 * (share + 0.2);
     let bottom = 70.0 + ROW * calculated.len() as f64;
     let mut body = String::new();
@@ -219,6 +222,7 @@ pub(crate) fn base_parameter_positions(experiment: &PaperExperiment) -> String {
             x(-0.1),
             x(3.0)
         );
+        // The position of every estimate between the two values, limited to the chart.
         let span = consistent[k] - calculated[k];
         for (i, (_, colour, values)) in series.iter().enumerate() {
             let share = ((values[k] - calculated[k]) / span).clamp(-0.1, 3.0);
@@ -247,7 +251,7 @@ pub(crate) fn base_parameter_positions(experiment: &PaperExperiment) -> String {
     )
 }
 
-/// The error for other distances of the base joints.
+/// The error for other distances of the base joints; empty if there are fewer than two.
 pub(crate) fn lengths(lengths: &[DistanceErrors], paper: [f64; 2]) -> String {
     let (top, height, left, width) = (60.0, 240.0, 80.0, 780.0);
     let most = 0.35;
@@ -257,9 +261,11 @@ pub(crate) fn lengths(lengths: &[DistanceErrors], paper: [f64; 2]) -> String {
         }
         _ => return String::new(),
     };
+    // Coordinates of the chart for a distance and an error.
     let x = |distance: f64| left + width * (distance - first) / (last - first);
     let y = |share: f64| top + height * (1.0 - share.min(most) / most);
     let mut body = String::new();
+    // The band of the paper's errors.
     let _ = writeln!(
         body,
         r#"<rect class="part" x="{left}" y="{:.1}" width="{width}" height="{:.1}"/><text x="{:.1}" y="{:.1}" class="scale">the paper's calculated 7.8 to 10.2 % (mean relative)</text>"#,
@@ -320,6 +326,7 @@ pub(crate) fn lengths(lengths: &[DistanceErrors], paper: [f64; 2]) -> String {
     )
 }
 
+/// A sheet with a title.
 fn frame(title: &str, height: f64, body: &str) -> String {
     sheet(title, 30.0, height, body)
 }

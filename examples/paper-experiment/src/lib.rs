@@ -1,5 +1,5 @@
-//! `experiment`: the paper's experiment, its Section 5, on the bundled rig: excitation, runs, both treatments of m4,
-//! Tables 1 and 2 beside the paper's, and where the errors come from, as one page.
+//! `experiment`: the paper's experiment, its Section 5, on the bundled rig. One page has the excitation, the runs, both
+//! treatments of m4, Tables 1 and 2 compared with the paper's, and the cause of the errors.
 //!
 //! Decision: every number and figure of `docs/experiment.html` comes from a run of the command. Coefficients of
 //! trajectories are rounded to four decimals before the simulation, so that the page can print what was used.
@@ -26,12 +26,12 @@ use serde_json::json;
 use runs::PeriodicTrajectory;
 use study::TreatmentStudy;
 
-/// How the experiment is made.
+/// Options of the experiment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ExperimentRequest {
     /// Random trajectories within the limits that the search for the excitation tries first.
     pub random: usize,
-    /// How many of the best random trajectories the search starts from.
+    /// Number of the best random trajectories from which the search starts.
     pub starts: usize,
     /// Seed of the search and of the test trajectory.
     pub seed: u64,
@@ -39,8 +39,9 @@ pub struct ExperimentRequest {
     pub rate: f64,
 }
 
-/// Everything that the page tells.
+/// All results that the page shows.
 pub struct PaperExperiment {
+    /// The model with the paper's treatment of m4.
     paper: Model,
     /// Excitation for identification, and the test trajectory for verification.
     trajectories: [PeriodicTrajectory; 2],
@@ -50,14 +51,14 @@ pub struct PaperExperiment {
     base: [Vec<f64>; 3],
     /// The error for other distances of the base joints.
     lengths: Vec<lengths::DistanceErrors>,
-    /// Samples per second.
+    /// Samples per second, Hz.
     rate: f64,
 }
 
 impl PaperExperiment {
-    /// Makes the experiment.
+    /// Runs the experiment.
     ///
-    /// Fails only when whoever watches stops it, or a search within the limits finds nothing.
+    /// Fails only if the user cancels it, or if no trajectory within the limits is found.
     pub fn new(host: &Host, args: &ExperimentRequest) -> Outcome<Self> {
         let load = |name: &str| bundled::model(host, name);
         let paper = load("spidermill-paper.toml")?;
@@ -71,7 +72,7 @@ impl PaperExperiment {
             seed: args.seed,
             ..Options::default()
         };
-        // A test is any lively motion; the best of a few random ones will do.
+        // Any motion with several harmonics is a test; the best of a few random ones is sufficient.
         let test = Options {
             harmonics: 5,
             period: 5.0,

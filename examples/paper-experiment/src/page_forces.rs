@@ -1,4 +1,4 @@
-//! Chapters 1 to 4 of the page: what is simulated, the errors of the forces, and what they are made of.
+//! Chapters 1 to 4 of the page: the simulated runs, the errors of the forces, and the cause of these errors.
 
 use crate::page::ExperimentPage;
 use crate::study::DriveColumns;
@@ -10,6 +10,7 @@ use modelmill::text::table::significant;
 const NEAR_ZERO: f64 = 0.1;
 
 impl ExperimentPage {
+    /// The summary at the top of the page.
     pub(crate) fn summary(&mut self, experiment: &PaperExperiment) {
         let plain = &experiment.benches[0].runs;
         let rods = &experiment.benches[1].runs;
@@ -47,6 +48,7 @@ impl ExperimentPage {
         self.0.push_str("</div>\n");
     }
 
+    /// Chapter 1: excitation, rigs and models.
     pub(crate) fn method(&mut self, experiment: &PaperExperiment) {
         let [excitation, test] = &experiment.trajectories;
         self.heading("1  Method");
@@ -93,6 +95,7 @@ impl ExperimentPage {
         }
     }
 
+    /// Chapter 2: errors of both treatments, compared with Table 2 of the paper.
     pub(crate) fn table_2(&mut self, experiment: &PaperExperiment) {
         self.heading("2  Table 2, compared with the paper's");
         self.paragraph(
@@ -106,6 +109,7 @@ impl ExperimentPage {
             .enumerate()
         {
             self.paragraph(&format!("{title}:"));
+            // One row per run, stage of identification, and drive.
             let mut rows = Vec::new();
             for (k, run) in ["identification", "verification"].into_iter().enumerate() {
                 for (s, stage) in ["calculated", "estimated"].into_iter().enumerate() {
@@ -163,6 +167,7 @@ impl ExperimentPage {
         );
     }
 
+    /// Chapter 3: the error of the paper's treatment compared with the force of the misplaced mass.
     pub(crate) fn placement(&mut self, experiment: &PaperExperiment) {
         self.heading("3  The error of the paper's treatment is the force of the misplaced m4");
         self.paragraph(
@@ -204,6 +209,7 @@ impl ExperimentPage {
         }
     }
 
+    /// Chapter 4: the relative error where a force passes through zero.
     pub(crate) fn peaks(&mut self, experiment: &PaperExperiment) {
         self.heading("4  The peaks of the relative error");
         let along = &experiment.benches[0].runs[1];

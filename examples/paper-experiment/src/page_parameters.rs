@@ -1,5 +1,5 @@
-//! Chapters 5 to 7 of the page: what becomes of the parameters, where our numbers differ from the paper's, and the coefficients of
-//! the motions.
+//! Chapters 5 to 7 of the page: changes of the parameters, differences to the paper's numbers with their reasons, and
+//! the coefficients of the trajectories.
 
 use std::fmt::Write as _;
 
@@ -8,10 +8,11 @@ use crate::study::{self, UNKNOWN};
 use crate::wording::{decimals, largest, least, percent, share};
 use crate::{PaperExperiment, figures, printed};
 
-/// Least and largest of the paper's errors with calculated parameters, Table 2.
+/// Least and largest of the paper's errors with calculated parameters, from Table 2, as shares.
 const PAPER_ERRORS: [f64; 2] = [0.0782, 0.1020];
 
 impl ExperimentPage {
+    /// Chapter 5: base parameters before and after identification.
     pub(crate) fn base_parameters(&mut self, experiment: &PaperExperiment) {
         self.heading("5  Base parameters: identification corrects the place of the mass");
         let [calculated, consistent, estimated] = &experiment.base;
@@ -89,6 +90,7 @@ impl ExperimentPage {
         );
     }
 
+    /// Chapter 6: physical parameters, compared with Table 1 of the paper.
     pub(crate) fn table_1(&mut self, experiment: &PaperExperiment) {
         self.heading("6  Table 1, compared with the paper's");
         self.paragraph(
@@ -144,6 +146,7 @@ impl ExperimentPage {
         );
     }
 
+    /// Chapter 7: reasons for other numbers than the paper's, and the influence of one length.
     pub(crate) fn differences(&mut self, experiment: &PaperExperiment) {
         self.heading("7  Where our numbers differ from the paper's, and why");
         let plain = &experiment.benches[0].runs;
@@ -202,6 +205,7 @@ impl ExperimentPage {
         );
     }
 
+    /// Coefficients of both trajectories, so that the runs can be repeated.
     pub(crate) fn coefficients(&mut self, experiment: &PaperExperiment) {
         self.paragraph("Coefficients of the trajectories, eq. (15), rad and rad/s:");
         let names = experiment.paper.active_coordinates();

@@ -15,26 +15,27 @@ use modelmill::excite::plant::ModelPlant;
 use modelmill::stretch::RecordingSegment;
 use modelmill::{Error, Outcome};
 
-/// Decimals of the coefficients: few enough to be printed, so that anybody can repeat the runs.
+/// Inverse of the step to which coefficients are rounded, so that they can be printed and everybody can repeat the
+/// runs.
 const DECIMALS: f64 = 1e4;
-/// Samples of a period at which limits are checked once more after rounding.
+/// Number of samples of a period at which limits are checked again after rounding.
 const FINE: usize = 4000;
 
 /// A periodic trajectory.
 pub(crate) struct PeriodicTrajectory {
     /// One series for each active coordinate.
     pub(crate) series: Vec<FourierSeries>,
-    /// s
+    /// Period, s.
     pub(crate) period: f64,
     /// Condition number of the regressor along it.
     pub(crate) condition_number: f64,
-    /// The same for the best of the random trajectories.
+    /// The same for the best random trajectory.
     pub(crate) start: f64,
-    /// Random trajectories that were tried.
+    /// Number of random trajectories that were tried.
     pub(crate) random: usize,
 }
 
-/// Searches for a trajectory; its coefficients are rounded, and it keeps all limits nevertheless.
+/// Searches for a trajectory; it satisfies all limits with rounded coefficients.
 pub(crate) fn search(
     model: &Model,
     options: &Options,
@@ -49,7 +50,7 @@ pub(crate) fn search(
             excite(&plant, &coordinates, options, &|more| job.flow(more))
         })?;
     let found = search.map_err(|error| Error::input(format!("{}: {error}", model.path)))?;
-    // Rounding may leave the limits by a hair; shrinking by parts in a thousand returns.
+    // Rounding may exceed the limits slightly. The motion is then reduced in steps of 0.1 %.
     let series = (0..50)
         .map(|k| round_coefficients(&found.series, 1.0 - 1e-3 * f64::from(k), options.period))
         .find(|series| is_within_limits(&plant, &coordinates, series))
@@ -74,6 +75,7 @@ pub(crate) fn search(
     })
 }
 
+/// Coefficients multiplied by a factor and rounded to four decimals.
 fn round_coefficients(series: &[FourierSeries], factor: f64, period: f64) -> Vec<FourierSeries> {
     let round = |x: f64| (x * DECIMALS).round() / DECIMALS;
     let scaled = |list: &[f64]| list.iter().map(|x| round(factor * x)).collect();
@@ -86,6 +88,7 @@ fn round_coefficients(series: &[FourierSeries], factor: f64, period: f64) -> Vec
     series.iter().map(one).collect()
 }
 
+/// Whether a trajectory satisfies the limits of coordinates, rates and accelerations, and those of the plant.
 fn is_within_limits(
     plant: &ModelPlant<'_>,
     limits: &[ExcitationLimits],
@@ -103,14 +106,15 @@ fn is_within_limits(
         && excess.is_some_and(|all| all.iter().flatten().all(|excess| *excess <= 0.0))
 }
 
-/// Drives a rig along a trajectory: exact states and forces, as sensors without faults would read them. What remains
-/// between them and a model is then the model's doing.
+/// Simulates a rig along a trajectory: exact states and forces, as of ideal sensors. Differences between them and a
+/// model are then errors of the model.
 pub(crate) fn run(
     rig: &Rig,
     model: &Model,
     periodic: &PeriodicTrajectory,
     rate: f64,
 ) -> Outcome<RecordingSegment> {
+    // Order of coordinates and drives in the rig for those of the model.
     let coordinates = model
         .active_coordinates()
         .iter()
@@ -146,6 +150,7 @@ pub(crate) fn run(
         modelmill_rig::forces_along(rig, &trajectory, &time, || job.add(1))
     })?;
     let instants = made.map_err(|error| Error::input(format!("{}: {error}", rig.name)))?;
+    // One column per coordinate or drive of the model.
     let state = |of: fn(&RigState) -> &Vec<f64>| -> Vec<Vec<f64>> {
         let column = |k: &usize| instants.iter().map(|i| of(&i.state)[*k]).collect();
         coordinates.iter().map(column).collect()
