@@ -15,6 +15,7 @@ const RELATIVE: f64 = 1.0;
 fn round_limit(columns: &[&DriveColumns]) -> f64 {
     let values = columns.iter().flat_map(|c| c.iter()).flatten();
     let largest = values.fold(0.0_f64, |m, v| m.max(v.abs()));
+    // A round number is a factor from the list times a power of ten.
     let decade = 10_f64.powf(largest.max(f64::MIN_POSITIVE).log10().floor());
     [1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0]
         .into_iter()
@@ -39,6 +40,7 @@ pub(crate) fn motion(
     drives: &[String],
 ) -> String {
     let mut figure = SvgFigure::new(title, &along.time);
+    // Angles relative to their means, so that both cranks have one scale.
     let angles: DriveColumns = periodic
         .series
         .iter()
@@ -75,8 +77,10 @@ fn names<'a>(drives: &'a [String], columns: &'a DriveColumns) -> Vec<(&'a str, &
 /// Forces, and errors before and after identification of both treatments on one scale.
 pub(crate) fn errors(title: &str, along: &TreatmentRun, drives: &[String]) -> String {
     let mut figure = SvgFigure::new(title, &along.time);
+    // Errors of both treatments before and after identification.
     let calculated = [0, 1].map(|t| along.error(&along.calculated[t]));
     let estimated = [0, 1].map(|t| along.error(&along.estimated[t]));
+    // One scale for all forces and one for all errors, so that panels can be compared.
     let force = round_limit(&[&along.measured]);
     let error = round_limit(&[&calculated[0], &calculated[1], &estimated[0], &estimated[1]]);
     for (d, drive) in drives.iter().enumerate() {
@@ -110,6 +114,7 @@ pub(crate) fn decomposition(title: &str, along: &TreatmentRun, drives: &[String]
     let mut figure = SvgFigure::new(title, &along.time);
     let error = along.error(&along.calculated[0]);
     let placement = along.placement();
+    // One scale for the three panels of every drive.
     let limit = round_limit(&[&error, &placement]);
     for (d, drive) in drives.iter().enumerate() {
         let rest: Vec<f64> = error[d]
@@ -117,6 +122,7 @@ pub(crate) fn decomposition(title: &str, along: &TreatmentRun, drives: &[String]
             .zip(&placement[d])
             .map(|(e, p)| e - p)
             .collect();
+        // The error, its explanation from the models alone, and the difference.
         for (what, values) in [
             ("error of the paper's treatment, rig minus model", &error[d]),
             (
@@ -158,6 +164,7 @@ pub(crate) fn peaks(title: &str, along: &TreatmentRun, drive: usize, name: &str)
     let mut figure = SvgFigure::new(title, &along.time);
     let zeros = along.zeros(drive);
     let error = along.error(&along.calculated[0]);
+    // Relative errors above the limit are cut off, since they are unbounded where the force is zero.
     let relative: Vec<f64> = error[drive]
         .iter()
         .zip(&along.measured[drive])
@@ -165,6 +172,7 @@ pub(crate) fn peaks(title: &str, along: &TreatmentRun, drive: usize, name: &str)
         .collect();
     let mut look = scale(round_limit(&[&along.measured]));
     look.marks = &zeros;
+    // The same scale for force and error shows that the error has no peaks.
     figure.panel_with(
         &format!("{name}, N; dashed where it passes through zero"),
         &[("rig", &along.measured[drive])],
@@ -192,6 +200,7 @@ pub(crate) fn base_parameter_positions(experiment: &PaperExperiment) -> String {
         experiment.benches[0].fits[0].values(),
         experiment.benches[1].fits[0].values(),
     ];
+    // Estimates with their colours in the style of the pages.
     let series: [(&str, &str, &[f64]); 3] = [
         ("the paper's estimate, Table 1", "c1", estimated),
         ("ours, rig as in Table 1", "c0", &ours[0]),
@@ -201,6 +210,7 @@ pub(crate) fn base_parameter_positions(experiment: &PaperExperiment) -> String {
     let x = |share: f64| 150.0 + 220.0 * (share + 0.2);
     let bottom = 70.0 + ROW * calculated.len() as f64;
     let mut body = String::new();
+    // Vertical lines for calculated, consistent, and twice the distance.
     for (share, label) in [
         (0.0, "calculated"),
         (1.0, "consistent"),
@@ -212,6 +222,7 @@ pub(crate) fn base_parameter_positions(experiment: &PaperExperiment) -> String {
             x(share)
         );
     }
+    // One row per base parameter, with a point per estimate.
     for k in 0..calculated.len() {
         let y = 90.0 + ROW * k as f64;
         let _ = writeln!(
@@ -234,6 +245,7 @@ pub(crate) fn base_parameter_positions(experiment: &PaperExperiment) -> String {
             );
         }
     }
+    // The legend.
     for (i, (name, colour, _)) in series.iter().enumerate() {
         let at = 40.0 + 280.0 * i as f64;
         let _ = writeln!(
@@ -274,6 +286,7 @@ pub(crate) fn lengths(lengths: &[DistanceErrors], paper: [f64; 2]) -> String {
         left + 8.0,
         y(paper[0]) + 14.0
     );
+    // Horizontal lines at every 5 %.
     for k in 0..=7 {
         let share = most * f64::from(k) / 7.0;
         let _ = writeln!(
@@ -286,6 +299,7 @@ pub(crate) fn lengths(lengths: &[DistanceErrors], paper: [f64; 2]) -> String {
             100.0 * share
         );
     }
+    // Labels of the distances.
     for length in lengths {
         let _ = writeln!(
             body,
@@ -295,6 +309,7 @@ pub(crate) fn lengths(lengths: &[DistanceErrors], paper: [f64; 2]) -> String {
             length.distance
         );
     }
+    // One curve per spindle.
     for (d, (name, colour)) in [("left spindle", "c0"), ("right spindle", "c2")]
         .into_iter()
         .enumerate()

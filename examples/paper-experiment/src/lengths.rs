@@ -29,7 +29,7 @@ pub(crate) struct DistanceErrors {
 ///
 /// Fails only if the user cancels it.
 pub(crate) fn scan(host: &Host, series: &[FourierSeries]) -> Outcome<Vec<DistanceErrors>> {
-    host.run_job("computing other distances of the base joints", DISTANCES.len(), |job| {
+    host.run_job("comparing other distances", DISTANCES.len(), |job| {
         let distances = DISTANCES.iter().map(|cm| f64::from(*cm) / 100.0);
         distances
             .filter_map(|distance| {

@@ -60,9 +60,11 @@ impl PaperExperiment {
     ///
     /// Fails only if the user cancels it, or if no trajectory within the limits is found.
     pub fn new(host: &Host, args: &ExperimentRequest) -> Outcome<Self> {
+        // Both models come from the bundled files.
         let load = |name: &str| bundled::model(host, name);
         let paper = load("spidermill-paper.toml")?;
         let consistent = load("spidermill.toml")?;
+        // The excitation has as many harmonics and the same period as the paper's.
         let (harmonics, period) = printed::EXCITATION;
         let excitation = Options {
             harmonics,
@@ -81,10 +83,12 @@ impl PaperExperiment {
             seed: args.seed.wrapping_add(1),
             ..Options::default()
         };
+        // Both trajectories are within the limits of the paper's model.
         let trajectories = [
             runs::search(&paper, &excitation, "searching for the excitation")?,
             runs::search(&paper, &test, "drawing the test trajectory")?,
         ];
+        // Both treatments on one rig: identified on one run and verified on the other.
         let bench = |name: &str| -> Outcome<TreatmentStudy> {
             let rig = bundled::rig(name)?;
             let [identification, verification] = &trajectories;
@@ -98,6 +102,7 @@ impl PaperExperiment {
             bench("spidermill-full.toml")?,
             bench("spidermill-with-rods.toml")?,
         ];
+        // The consistent parameters of the paper's model are determined along the identification run.
         let rig = bundled::rig("spidermill-full.toml")?;
         let data = runs::run(&rig, &paper, &trajectories[0], args.rate)?;
         let base = [
@@ -105,6 +110,7 @@ impl PaperExperiment {
             study::consistent_values(&paper, &consistent, &data)?,
             study::values_with(&paper, &printed::ESTIMATED),
         ];
+        // The test motion once more, with other distances of the base joints.
         let lengths = lengths::scan(host, &trajectories[1].series)?;
         Ok(Self {
             lengths,
@@ -128,6 +134,7 @@ impl PaperExperiment {
             number(self.trajectories[0].condition_number),
             printed::CONDITION_NUMBER
         ))];
+        // One row per rig, run and treatment.
         let mut rows = Vec::new();
         for (bench, rig) in self.benches.iter().zip(["rig", "rig with rods"]) {
             for (along, run) in bench.runs.iter().zip(["identification", "verification"]) {
@@ -161,6 +168,7 @@ impl PaperExperiment {
 
     /// All figures as one JSON object.
     pub fn json(&self) -> serde_json::Value {
+        // The same numbers for scripts.
         let bench = |bench: &TreatmentStudy| {
             let run = |k: usize| {
                 let along = &bench.runs[k];

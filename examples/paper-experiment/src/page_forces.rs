@@ -16,6 +16,7 @@ impl ExperimentPage {
         let rods = &experiment.benches[1].runs;
         let [calculated, consistent, estimated] = &experiment.base;
         self.0.push_str("<div class=\"short\">\n");
+        // The result of the page: the reduction is exact, and the paper's error has one cause.
         self.paragraph(&format!(
             "Summary. Before identification, the forces of the paper's reduced model differ from those of its \
              multibody model by 8 to 10 %. The paper names the places of the lumped masses in general as the cause. \
@@ -30,6 +31,7 @@ impl ExperimentPage {
             percent(largest(plain, |along, d| along.errors(d, &along.calculated[0]).nrms)),
             explained_text(plain),
         ));
+        // The same conclusion from the paper's own numbers.
         self.paragraph(&format!(
             "The paper's own Table 1 agrees: p4,min = m4 (1 - dc3/d3), which is zero for a mass in one place, falls \
              from {} kg to {} kg by identification (with d3 = 1.03 m; for any d3, by more than {}). p3,min and p5,min \
@@ -40,6 +42,7 @@ impl ExperimentPage {
             percent((estimated[2] / consistent[2] - 1.0).abs()),
             percent((estimated[4] / consistent[4] - 1.0).abs()),
         ));
+        // The part of the error that has another cause.
         self.paragraph(&format!(
             "With spindles that have mass (rods of 8 kg), {} of the error of the paper's treatment (2-norm, \
              verification run) is not caused by m4. This part comes from the rods.",
@@ -52,6 +55,7 @@ impl ExperimentPage {
     pub(crate) fn method(&mut self, experiment: &PaperExperiment) {
         let [excitation, test] = &experiment.trajectories;
         self.heading("1  Method");
+        // The trajectories, so that the experiment can be repeated.
         self.paragraph(&format!(
             "Excitation, eq. (14), (15) and (17): {} harmonics and a period of {} s, as in the paper, within the \
              limits of spidermill.toml. The best of {} random trajectories has condition number {}, the optimised one \
@@ -67,6 +71,7 @@ impl ExperimentPage {
             test.series.first().map_or(0, |s| s.mu.len()),
             test.period,
         ));
+        // The rigs in the place of the paper's multibody model, and the two reduced models.
         self.paragraph(&format!(
             "Both are simulated at {} Hz on two rigs: spidermill-full.toml, whose 11 groups sum up to Table 1, and \
              spidermill-with-rods.toml, the same with a rod of 8 kg and 0.9 m in each spindle. The sensors are \
@@ -75,12 +80,14 @@ impl ExperimentPage {
              consistent one.",
             experiment.rate
         ));
+        // The difference between the two models.
         self.paragraph(
             "The paper assigns half of m4 to each coupler. In the coupler's balance of forces it acts at the joint \
              R3m. In the balance of moments about the elbow it acts at the coupler's centre of mass. This is the \
              origin of the products m4 dc3 and m4 dc3^2 of eq. (5). A mass at one place gives four base parameters \
              instead of five.",
         );
+        // Motion and forces of both runs.
         let drives = experiment.paper.drives();
         let runs = &experiment.benches[0].runs;
         for (k, title) in ["Identification run", "Verification run"]
@@ -98,12 +105,14 @@ impl ExperimentPage {
     /// Chapter 2: errors of both treatments, compared with Table 2 of the paper.
     pub(crate) fn table_2(&mut self, experiment: &PaperExperiment) {
         self.heading("2  Table 2, compared with the paper's");
+        // The measures of error: the paper's, and two without its peaks.
         self.paragraph(
             "The paper's measure is the mean of |error| / |force|. It is dominated by the times at which a force \
              passes through zero (section 4). The tables therefore also show the median of the same quotient and the \
              nrms (2-norm of the error divided by that of the force).",
         );
         let names = ["fe1, left", "fe10, right"];
+        // One table per treatment; only the first one has numbers of the paper.
         for (t, title) in ["The paper's treatment", "The consistent treatment"]
             .into_iter()
             .enumerate()
@@ -114,6 +123,7 @@ impl ExperimentPage {
             for (k, run) in ["identification", "verification"].into_iter().enumerate() {
                 for (s, stage) in ["calculated", "estimated"].into_iter().enumerate() {
                     for (d, name) in names.into_iter().enumerate() {
+                        // The paper's number first, then the errors on both rigs.
                         let mut row = vec![format!("{run}, {stage}, {name}")];
                         if t == 0 {
                             row.push(format!("{:.2} %", printed::TABLE_2[s][d][k]));
@@ -131,6 +141,7 @@ impl ExperimentPage {
                     }
                 }
             }
+            // Three measures of error for each of the two rigs.
             let columns = [
                 "rig: mean",
                 "median",
@@ -146,6 +157,7 @@ impl ExperimentPage {
             head.extend(columns);
             self.table(&head, &rows);
         }
+        // Errors over time on both rigs.
         let drives = experiment.paper.drives();
         self.figure(
             &figures::errors(
@@ -170,12 +182,14 @@ impl ExperimentPage {
     /// Chapter 3: the error of the paper's treatment compared with the force of the misplaced mass.
     pub(crate) fn placement(&mut self, experiment: &PaperExperiment) {
         self.heading("3  The error of the paper's treatment is the force of the misplaced m4");
+        // Two independent ways to the same curve.
         self.paragraph(
             "Subtract the forces of the two reduced models with the parameters of Table 1: the difference is the \
              force of m4 at R3m minus its force where the paper's balance of moments places it. This needs no rig. \
              The error of the paper's treatment needs the rig, which is independent of both models. Both are the same \
              curve:",
         );
+        // Correlation and residual for each rig and run.
         let mut rows = Vec::new();
         for (bench, name) in experiment.benches.iter().zip(["rig", "rig with rods"]) {
             for (along, run) in bench.runs.iter().zip(["identification", "verification"]) {
@@ -197,6 +211,7 @@ impl ExperimentPage {
             ],
             &rows,
         );
+        // Error, explanation and residual over time.
         let drives = experiment.paper.drives();
         for (bench, title) in experiment.benches.iter().zip([
             "Verification run, rig as in Table 1",
@@ -212,9 +227,11 @@ impl ExperimentPage {
     /// Chapter 4: the relative error where a force passes through zero.
     pub(crate) fn peaks(&mut self, experiment: &PaperExperiment) {
         self.heading("4  The peaks of the relative error");
+        // The left spindle in the verification run, since its force often passes through zero.
         let along = &experiment.benches[0].runs[1];
         let drives = experiment.paper.drives();
         let modelled = &along.calculated[0];
+        // Samples near zero, and their contribution to the mean relative error.
         let [samples, part] = along.near_zero(0, modelled, NEAR_ZERO);
         let errors = along.errors(0, modelled);
         self.paragraph(&format!(

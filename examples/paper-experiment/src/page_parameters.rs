@@ -16,6 +16,7 @@ impl ExperimentPage {
     pub(crate) fn base_parameters(&mut self, experiment: &PaperExperiment) {
         self.heading("5  Base parameters: identification corrects the place of the mass");
         let [calculated, consistent, estimated] = &experiment.base;
+        // Where the paper's estimate and ours move, compared with the consistent values.
         self.paragraph(
             "The consistent treatment is a special case of eq. (16): the five values in column two give exactly its \
              forces, with p4,min = 0. Identification with the paper's treatment arrives at these values on the rig. \
@@ -24,6 +25,7 @@ impl ExperimentPage {
              spindles are rods, which add to the inertia of the cranks. The paper does not state whether its \
              multibody model has such spindles.",
         );
+        // Estimates with the paper's treatment, without and with rods.
         let ours = [0, 1].map(|k| experiment.benches[k].fits[0].values());
         let units: Vec<&str> = experiment
             .paper
@@ -31,6 +33,7 @@ impl ExperimentPage {
             .iter()
             .map(|b| b.unit.as_str())
             .collect();
+        // Values that are zero up to rounding are printed as zero.
         let value = |x: f64| {
             if x.abs() < 1e-6 {
                 "0.000".to_owned()
@@ -38,6 +41,7 @@ impl ExperimentPage {
                 format!("{x:.3}")
             }
         };
+        // One row per base parameter.
         let rows: Vec<Vec<String>> = (0..calculated.len())
             .map(|k| {
                 vec![
@@ -61,6 +65,7 @@ impl ExperimentPage {
             ],
             &rows,
         );
+        // The change by the paper's own identification, explained by the misplaced mass along both runs.
         let runs = &experiment.benches[0].runs;
         let changes =
             [0, 1].map(|k| study::explain_error(&runs[k].printed_change(), &runs[k].placement()));
@@ -69,6 +74,7 @@ impl ExperimentPage {
             "0 is the value that the paper calculates from Table 1; 1 is the value of the same masses at one place. \
              Values above 3 or below -0.1 are drawn at the edge.",
         );
+        // The same comparison in forces, which needs neither rig.
         self.paragraph(&format!(
             "In forces: take the paper's estimated and calculated parameters, put both into eq. (16) along our runs, \
              and subtract. Of this change, {} (identification run) and {} (verification run) is the force of the \
@@ -93,6 +99,7 @@ impl ExperimentPage {
     /// Chapter 6: physical parameters, compared with Table 1 of the paper.
     pub(crate) fn table_1(&mut self, experiment: &PaperExperiment) {
         self.heading("6  Table 1, compared with the paper's");
+        // The parameters that are assumed to be known, as in the paper.
         self.paragraph(
             "As in the paper, m1, m3 and dc1 are known and the others are solved from the five estimated base parameters; all real \
              solutions are given.",
@@ -104,6 +111,7 @@ impl ExperimentPage {
             "*paper's estimate".to_owned(),
         ];
         let names = ["rig", "with rods"];
+        // One column per rig and real solution.
         let mut columns: Vec<&[f64]> = Vec::new();
         for (bench, name) in experiment.benches.iter().zip(names) {
             for (k, one) in bench.physical.iter().enumerate() {
@@ -111,6 +119,7 @@ impl ExperimentPage {
                 columns.push(&one.values);
             }
         }
+        // One row per parameter that Table 1 determines.
         let rows: Vec<Vec<String>> = UNKNOWN
             .iter()
             .enumerate()
@@ -128,6 +137,7 @@ impl ExperimentPage {
             .collect();
         let head: Vec<&str> = head.iter().map(String::as_str).collect();
         self.table(&head, &rows);
+        // A rig without a real solution is explained in the text.
         for (bench, name) in experiment.benches.iter().zip(names) {
             if bench.physical.is_empty() {
                 let p4 = bench.fits[0].values()[3];
@@ -137,6 +147,7 @@ impl ExperimentPage {
                 ));
             }
         }
+        // Why no solution is the robot.
         self.paragraph(
             "With p4,min = 0 the printed treatment allows only m4 = 0 or dc3 = d3: the two solutions for the rig. \
              Neither is the robot, which has m4 = 12.456 kg and dc3 = 0.515 m; the negative values show this. The \
@@ -150,6 +161,7 @@ impl ExperimentPage {
     pub(crate) fn differences(&mut self, experiment: &PaperExperiment) {
         self.heading("7  Where our numbers differ from the paper's, and why");
         let plain = &experiment.benches[0].runs;
+        // The size of the errors depends on lengths that the paper does not print.
         self.paragraph(&format!(
             "The paper prints masses but no lengths, limits or coefficients. The lengths of spidermill.toml (d1, d3, \
              b, dA, Bx, By) and both trajectories are assumptions, and they determine how large the errors are in per \
@@ -162,11 +174,13 @@ impl ExperimentPage {
             percent(least(plain, |a, d| a.errors(d, &a.calculated[0]).mean_relative)),
             percent(largest(plain, |a, d| a.errors(d, &a.calculated[0]).mean_relative)),
         ));
+        // The influence of one of these lengths.
         self.paragraph(
             "The influence of one unprinted length: the same test motion with other distances b of the base joints \
              (all else unchanged), compared with the consistent treatment, which represents the rig. The error is the \
              force of the misplaced m4 at every b. Its size relative to the other forces changes.",
         );
+        // Distances at which the errors of both spindles are within the paper's band.
         let reached: Vec<_> = experiment
             .lengths
             .iter()
@@ -197,6 +211,7 @@ impl ExperimentPage {
                     .join(", "),
             ));
         }
+        // The errors after identification have no counterpart on the rig without rods.
         self.paragraph(
             "The paper's errors after identification, 3.3 to 3.6 %, have no counterpart on the rig without rods, \
              where the residual is zero. They must come from something that its multibody model has in addition to a \
@@ -209,6 +224,7 @@ impl ExperimentPage {
     pub(crate) fn coefficients(&mut self, experiment: &PaperExperiment) {
         self.paragraph("Coefficients of the trajectories, eq. (15), rad and rad/s:");
         let names = experiment.paper.active_coordinates();
+        // One table per trajectory, with the coefficients as they were used.
         for (periodic, run) in experiment
             .trajectories
             .iter()
@@ -225,6 +241,7 @@ impl ExperimentPage {
                 periodic.period,
                 means.join(", ")
             ));
+            // Two columns per coordinate: the coefficients mu and nu of every harmonic.
             let mut head = vec!["k".to_owned()];
             for name in &names {
                 head.extend([format!("mu, {name}"), format!("nu, {name}")]);

@@ -41,6 +41,7 @@ pub(crate) fn search(
     options: &Options,
     message: &str,
 ) -> Outcome<PeriodicTrajectory> {
+    // Limits of the model file, for the active coordinates.
     let all_limits = limits::merged_limits(model, &[])?;
     let coordinates = limits::active_limits(model, &all_limits)?;
     let plant = ModelPlant::new(model, &all_limits);
@@ -51,6 +52,7 @@ pub(crate) fn search(
         })?;
     let found = search.map_err(|error| Error::input(format!("{}: {error}", model.path)))?;
     // Rounding may exceed the limits slightly. The motion is then reduced in steps of 0.1 %.
+    // The first factor with which the rounded trajectory is within all limits.
     let series = (0..50)
         .map(|k| round_coefficients(&found.series, 1.0 - 1e-3 * f64::from(k), options.period))
         .find(|series| is_within_limits(&plant, &coordinates, series))
@@ -60,6 +62,7 @@ pub(crate) fn search(
                 model.path
             ))
         })?;
+    // The condition number belongs to the rounded coefficients.
     let motion = ExcitationMotion::sample(
         &series,
         modelmill_identify::excite::samples_per_period(options),
@@ -94,6 +97,7 @@ fn is_within_limits(
     limits: &[ExcitationLimits],
     series: &[FourierSeries],
 ) -> bool {
+    // Extremes of a Fourier series and of its derivatives.
     let within = |one: &FourierSeries, limits: &ExcitationLimits| {
         let ranges = [Some(limits.position), limits.rate, limits.acceleration];
         ranges.into_iter().enumerate().all(|(derivative, range)| {
@@ -101,6 +105,7 @@ fn is_within_limits(
             range.is_none_or(|range| range[0] <= low && high <= range[1])
         })
     };
+    // Other limits, such as those of passive coordinates and forces, at finely spaced times.
     let excess = plant.excess(&ExcitationMotion::sample(series, FINE));
     series.iter().zip(limits).all(|(s, l)| within(s, l))
         && excess.is_some_and(|all| all.iter().flatten().all(|excess| *excess <= 0.0))
@@ -131,10 +136,12 @@ pub(crate) fn run(
             rig.name, model.path
         )));
     };
+    // Times of the samples, with the end of the period included.
     let mut time = Vec::new();
     while time.len() as f64 <= rate * periodic.period {
         time.push(time.len() as f64 / rate);
     }
+    // The trajectory in the order of the rig's coordinates.
     let trajectory = Trajectory::from_function(time.clone(), |t| {
         let mut state = RigState::default();
         let zeros = || vec![0.0; rig.coordinates.len()];

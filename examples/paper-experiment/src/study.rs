@@ -78,6 +78,7 @@ impl TreatmentStudy {
             identify(paper, &data, &[], &check, &plain)?,
             identify(consistent, &data, &[], &check, &plain)?,
         ];
+        // Table 1 is computed from the fit of the paper's treatment.
         let physical = physical(paper, &fits[0].fit)?;
         let [identification] = &data;
         let [verification] = &check;
@@ -165,6 +166,7 @@ impl TreatmentRun {
         let n = force.len() as f64;
         let rms = (force.iter().map(|y| y * y).sum::<f64>() / n).sqrt();
         let (mut count, mut part, mut all) = (0.0, 0.0, 0.0);
+        // Counts samples near zero, and sums relative errors near zero and in total.
         for (y, m) in force
             .iter()
             .zip(&modelled[drive])
@@ -244,6 +246,7 @@ fn physical(model: &Model, fit: &FitFile) -> Outcome<Vec<PhysicalSolution>> {
     let names = UNKNOWN.map(str::to_owned);
     let unknown = table_1::unknown_indices(model, &names)?;
     let values: Vec<f64> = fit.parameters.iter().map(|p| p.value).collect();
+    // The equations of the base parameters, solved for the unknown physical parameters.
     let (system, _) = table_1::system(model, &unknown, &values, fit);
     match interpret(&system) {
         Ok(
