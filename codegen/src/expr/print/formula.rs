@@ -1,3 +1,5 @@
+//!
+//! Expressions and exact numbers go in through the constructors; renderings as text, LaTeX and MathML read the tree.
 //! The tree that is printed: sums of terms, fractions, powers and functions, as a person would write them.
 
 use num_bigint::BigInt;
@@ -14,13 +16,21 @@ use crate::expr::Rational;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[allow(missing_docs)]
 pub enum FormulaFunction {
+    /// Sine.
     Sin,
+    /// Cosine.
     Cos,
+    /// Square root.
     Sqrt,
+    /// Sign: -1, 0 or 1.
     Sign,
+    /// Absolute value.
     Abs,
+    /// Hyperbolic tangent.
     Tanh,
+    /// Exponential.
     Exp,
+    /// Angle of the point with the second operand as abscissa and the first as ordinate.
     Atan2,
 }
 
@@ -129,6 +139,7 @@ impl PrintedFormula {
         if let Some(first) = flat.iter().position(|term| !term.is_negative()) {
             flat[..=first].rotate_right(1);
         }
+        // Sums of no term or one term are simpler formulas.
         match flat.len() {
             0 => Self::integer(0),
             1 => flat.remove(0),
@@ -146,7 +157,7 @@ impl PrintedFormula {
         Self::term(Rational::ONE, [above], [below])
     }
 
-    /// A number times a product over a product; nothing below must be zero.
+    /// A number times a product, divided by a product; no factor below the line may be zero.
     pub fn term(
         factor: Rational,
         above: impl IntoIterator<Item = Self>,
@@ -177,6 +188,7 @@ impl PrintedFormula {
                 number = -&number;
             }
         }
+        // A product with a factor zero is zero, and one without factors is its number.
         if number.is_zero() {
             return Self::Number(number);
         }
@@ -230,6 +242,7 @@ impl PrintedFormula {
     /// Appends a factor, as a power where it is there already.
     fn multiply_factor(factors: &mut Vec<Self>, factor: Self) {
         let (base, n) = factor.into_power();
+        // Whether a factor of the list has the same base.
         let same = |there: &&mut Self| match there {
             Self::Power(inner, _) => **inner == base,
             other => **other == base,
@@ -257,8 +270,8 @@ impl PrintedFormula {
     #[must_use]
     pub fn power(self, n: i32) -> Self {
         let magnitude = match (self, n.unsigned_abs()) {
-            (_, 0) => return Self::integer(1),
             // Powers of numbers are computed, and powers of powers and of products are merged.
+            (_, 0) => return Self::integer(1),
             (base, 1) => base,
             (Self::Number(value), m) => Self::Number(value.pow(i32::try_from(m).unwrap_or(1))),
             (Self::Power(base, k), m) => Self::Power(base, k * m),
@@ -278,6 +291,7 @@ impl PrintedFormula {
             }
             (base, m) => Self::Power(Box::new(base), m),
         };
+        // Negative exponents become denominators.
         if n < 0 {
             Self::quotient(Self::integer(1), magnitude)
         } else {
@@ -299,6 +313,7 @@ impl PrintedFormula {
 
 /// Numerator and denominator of the magnitude of a number, as decimal digits. Long finite decimals have no denominator.
 pub(super) fn digits(value: &Rational) -> (String, Option<String>) {
+    // Numbers with long denominators are printed as decimals where that is exact.
     if let Some(decimal) = decimal(&value.abs()) {
         return (decimal, None);
     }

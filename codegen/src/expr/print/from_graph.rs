@@ -1,4 +1,6 @@
 //! Formulas of the expressions in a graph.
+//!
+//! The graph shares subexpressions, but a formula is a tree, so shared subexpressions are repeated.
 
 use modelmill_spec::Mechanism;
 
@@ -23,6 +25,7 @@ pub fn atom(mechanism: &Mechanism, atom: Atom) -> FormulaSymbol {
 
 /// The formula of an expression, written out as a tree. Check [`tree_size`] first where the tree may be large.
 pub fn formula(graph: &Graph, mechanism: &Mechanism, id: ExprId) -> PrintedFormula {
+    // Formula of an operand.
     let of = |id: ExprId| formula(graph, mechanism, id);
     match graph.node(id) {
         Node::Rational(value) => PrintedFormula::Number(value.clone()),
@@ -33,6 +36,7 @@ pub fn formula(graph: &Graph, mechanism: &Mechanism, id: ExprId) -> PrintedFormu
         Node::Cos(angle) => {
             PrintedFormula::apply(FormulaFunction::Cos, angle_sum_formula(mechanism, angle))
         }
+        // Every term with its rational factor.
         Node::Sum(terms) => PrintedFormula::sum(
             terms
                 .iter()
@@ -54,6 +58,7 @@ pub fn formula(graph: &Graph, mechanism: &Mechanism, id: ExprId) -> PrintedFormu
 
 /// Number of nodes of the expression when it is written out as a tree, counted up to `limit`.
 pub fn tree_size(graph: &Graph, id: ExprId, limit: usize) -> usize {
+    // Nodes that are waiting to be counted; shared nodes are counted as often as they occur.
     let mut size = 0;
     let mut left = vec![id];
     while let Some(next) = left.pop() {
@@ -68,6 +73,7 @@ pub fn tree_size(graph: &Graph, id: ExprId, limit: usize) -> usize {
 
 /// The formula of a sum of angles, without its constant part.
 pub(crate) fn angle_sum_formula(mechanism: &Mechanism, angle: &AtomAngleSum) -> PrintedFormula {
+    // Each atom with its integer factor.
     PrintedFormula::sum(angle.terms().iter().map(|(a, n)| {
         PrintedFormula::product(
             Rational::integer(i64::from(*n)),

@@ -1,4 +1,6 @@
 //! Formulas as LaTeX, for amsmath.
+//!
+//! A [`PrintedFormula`] goes in; text for a math environment comes out.
 
 use std::fmt::Write;
 
@@ -18,12 +20,14 @@ impl PrintedFormula {
 impl FormulaSymbol {
     /// As LaTeX: `\dot{\theta}_{1}`.
     pub fn latex(&self) -> String {
+        // The name is split into its letter or word and the parts of its index.
         let set = typeset(&self.name);
         let mut base = glyphs(&set.base);
         // A word stands upright, with the dots above it.
         if matches!(set.base, GlyphRun::Word(_)) {
             base = format!("\\mathrm{{{}}}", inner(&set.base));
         }
+        // Time derivatives are dots above the letter.
         match self.order {
             0 => {}
             1 => base = format!("\\dot{{{base}}}"),
@@ -61,6 +65,7 @@ fn glyphs(one: &GlyphRun) -> String {
 
 /// Writes a formula. With `tight`, sums and negative numbers or terms are put into parentheses.
 fn write(out: &mut String, formula: &PrintedFormula, tight: bool) {
+    // Only sums and signs need parentheses in a product; fractions and roots enclose themselves.
     let enclosed = tight
         && match formula {
             PrintedFormula::Sum(_) => true,
@@ -110,6 +115,7 @@ fn write(out: &mut String, formula: &PrintedFormula, tight: bool) {
 
 /// Writes a power: the exponent stands behind the name of sine, cosine and tanh, and behind the base otherwise.
 fn power(out: &mut String, base: &PrintedFormula, n: u32) {
+    // Where the exponent stands depends on the base.
     match base {
         PrintedFormula::Apply(
             f @ (FormulaFunction::Sin | FormulaFunction::Cos | FormulaFunction::Tanh),
@@ -127,6 +133,7 @@ fn power(out: &mut String, base: &PrintedFormula, n: u32) {
             write(out, base, true);
             _ = write!(out, "}}^{{{n}}}");
         }
+        // All other bases get parentheses, whatever they contain.
         other => {
             _ = write!(out, "\\left({}\\right)^{{{n}}}", other.latex());
         }
@@ -140,8 +147,10 @@ fn apply(
     exponent: Option<u32>,
     operands: &[PrintedFormula],
 ) {
+    // Operands are separated by commas.
     let arguments: Vec<String> = operands.iter().map(PrintedFormula::latex).collect();
     let arguments = arguments.join(", ");
+    // Roots and absolute values enclose their operand; all others have a command before it.
     let command = match function {
         FormulaFunction::Sqrt => {
             _ = write!(out, "\\sqrt{{{arguments}}}");
@@ -158,6 +167,7 @@ fn apply(
         FormulaFunction::Sign => "\\operatorname{sign}",
         FormulaFunction::Atan2 => "\\operatorname{atan2}",
     };
+    // The exponent belongs to the function's name, as in sin^2.
     out.push_str(command);
     if let Some(n) = exponent {
         _ = write!(out, "^{{{n}}}");
@@ -176,6 +186,7 @@ fn apply(
 /// Writes a number or a term without its sign.
 fn magnitude(out: &mut String, formula: &PrintedFormula) {
     match formula {
+        // Fractions of numbers stand above each other.
         PrintedFormula::Number(n) => match digits(n) {
             (n, Some(d)) => _ = write!(out, "\\frac{{{n}}}{{{d}}}"),
             (n, None) => out.push_str(&n),
@@ -189,6 +200,7 @@ fn magnitude(out: &mut String, formula: &PrintedFormula) {
             // Without a denominator no fraction is needed.
             if d.is_none() && below.is_empty() {
                 out.push_str(&product_line(&n, above, true));
+            // The sign is written by the caller; numbers go into the numerator and the denominator.
             } else {
                 let one = Rational::ONE.to_string();
                 let d = d.unwrap_or(one);
@@ -206,15 +218,18 @@ fn magnitude(out: &mut String, formula: &PrintedFormula) {
 
 /// A product on one line. `tight` encloses sums; on the line of a fraction a single factor needs no parentheses.
 fn product_line(number: &str, factors: &[PrintedFormula], tight: bool) -> String {
+    // The number 1 is written only if nothing else is on the line.
     let mut parts = Vec::new();
     if number != "1" || factors.is_empty() {
         parts.push(number.to_owned());
     }
+    // A single factor on the line of a fraction needs no parentheses.
     let alone = !tight && parts.is_empty() && factors.len() == 1;
     for factor in factors {
         let mut text = String::new();
         write(&mut text, factor, !alone);
         parts.push(text);
     }
+    // Thin spaces separate the factors.
     parts.join(" \\, ")
 }

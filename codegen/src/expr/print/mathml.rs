@@ -1,4 +1,6 @@
-//! Formulas as presentation MathML, readable by any browser without scripts.
+//!
+//! A [`PrintedFormula`] goes in; the content of one `math` element, or of several between which lines may end, comes
+//! out. Formulas as presentation MathML, readable by any browser without scripts.
 
 use std::fmt::Write;
 
@@ -60,6 +62,7 @@ impl MathmlWriter {
 
     /// Writes a part in which no line may end.
     fn write_unbroken(&mut self, write: impl FnOnce(&mut Self)) {
+        // The permission to end lines is restored afterwards.
         let may_part = std::mem::replace(&mut self.may_part, false);
         write(self);
         self.may_part = may_part;
@@ -99,18 +102,21 @@ impl FormulaSymbol {
         } {
             base = format!("<mover>{base}<mo scriptlevel=\"0\">{dots}</mo></mover>");
         }
+        // Without an index the exponent belongs to the letter.
         if set.index.is_empty() {
             return match exponent {
                 Some(n) => format!("<msup>{base}<mn>{n}</mn></msup>"),
                 None => base,
             };
         }
+        // Parts of the index are separated by commas.
         let parts: Vec<String> = set
             .index
             .iter()
             .map(|part| part.iter().map(glyphs).collect::<String>())
             .collect();
         let index = parts.join("<mo lspace=\"0\" rspace=\"0\">,</mo>");
+        // With an index, the exponent stands above it.
         match exponent {
             Some(n) => format!("<msubsup>{base}<mrow>{index}</mrow><mn>{n}</mn></msubsup>"),
             None => format!("<msub>{base}<mrow>{index}</mrow></msub>"),
@@ -174,6 +180,7 @@ fn write_fenced_power(
 
 /// Writes a formula. With `tight`, sums and negative numbers or terms are put into parentheses.
 fn write(out: &mut MathmlWriter, formula: &PrintedFormula, tight: bool) {
+    // Only sums and signs need parentheses in a product.
     let enclosed = tight
         && match formula {
             PrintedFormula::Sum(_) => true,
@@ -192,6 +199,7 @@ fn write(out: &mut MathmlWriter, formula: &PrintedFormula, tight: bool) {
         }
         PrintedFormula::Sum(terms) => {
             for (i, term) in terms.iter().enumerate() {
+                // A line may end before every sign but the first.
                 if i > 0 {
                     out.end_segment();
                 }
@@ -231,6 +239,7 @@ fn power(out: &mut MathmlWriter, base: &PrintedFormula, n: u32) {
             apply(out, *f, Some(n), operands);
         }
         PrintedFormula::Symbol(symbol) => out.push_str(&symbol.mathml_power(Some(n))),
+        // Indices and bars stay in one piece with their exponent.
         PrintedFormula::Indexed(..) | PrintedFormula::Apply(FormulaFunction::Abs, _) => out
             .write_unbroken(|out| {
                 out.push_str("<msup><mrow>");
@@ -248,6 +257,7 @@ fn apply(
     exponent: Option<u32>,
     operands: &[PrintedFormula],
 ) {
+    // Operands are separated by commas.
     let arguments = |out: &mut MathmlWriter| {
         for (i, operand) in operands.iter().enumerate() {
             if i > 0 {
@@ -271,6 +281,7 @@ fn apply(
             });
             return;
         }
+        // Bars enclose the operand of an absolute value.
         FormulaFunction::Abs => {
             write_fenced(out, "|", "|", arguments);
             return;
@@ -278,6 +289,7 @@ fn apply(
         _ => {}
     }
     let name = format!("<mi>{}</mi>", function.name());
+    // The exponent belongs to the function's name, as in sin^2.
     match exponent {
         Some(n) => _ = write!(out, "<msup>{name}<mn>{n}</mn></msup>"),
         None => out.push_str(&name),
@@ -300,6 +312,7 @@ fn apply(
 /// Writes a number or a term without its sign, as a fraction where it has a denominator.
 fn magnitude(out: &mut MathmlWriter, formula: &PrintedFormula) {
     match formula {
+        // Fractions of numbers stand above each other.
         PrintedFormula::Number(n) => match digits(n) {
             (n, Some(d)) => _ = write!(out, "<mfrac><mn>{n}</mn><mn>{d}</mn></mfrac>"),
             (n, None) => _ = write!(out, "<mn>{n}</mn>"),
@@ -310,10 +323,11 @@ fn magnitude(out: &mut MathmlWriter, formula: &PrintedFormula) {
             below,
         } => {
             let (n, d) = digits(factor);
+            // Without a denominator no fraction is needed.
             if d.is_none() && below.is_empty() {
                 write_product_line(out, &n, above, true);
-            // A wide fraction is written on the line with a slash.
             } else if out.is_too_wide(formula) {
+                // A wide fraction is written on the line with a slash.
                 write_product_line(out, &n, above, true);
                 out.end_segment();
                 out.push_str("<mo form=\"infix\" stretchy=\"false\">/</mo>");
@@ -326,6 +340,7 @@ fn magnitude(out: &mut MathmlWriter, formula: &PrintedFormula) {
                     write_fenced(out, "(", ")", |out| write_product_line(out, d, below, true));
                 }
             } else {
+                // A narrow fraction has a line between numerator and denominator.
                 out.write_unbroken(|out| {
                     out.push_str("<mfrac><mrow>");
                     write_product_line(out, &n, above, false);
@@ -346,10 +361,12 @@ fn write_product_line(
     factors: &[PrintedFormula],
     tight: bool,
 ) {
+    // The number 1 is written only if nothing else is on the line.
     let with_number = number != "1" || factors.is_empty();
     if with_number {
         _ = write!(out, "<mn>{number}</mn>");
     }
+    // A single factor on the line of a fraction needs no parentheses.
     let alone = !tight && !with_number && factors.len() == 1;
     for (i, factor) in factors.iter().enumerate() {
         if i > 0 || with_number {

@@ -1,4 +1,6 @@
 //! Formulas as plain infix text, in a form that can be parsed again.
+//!
+//! The inverse is `parse`, with which tests check that a text has the value of its formula.
 
 use std::fmt::{self, Write};
 
@@ -45,6 +47,7 @@ fn write_at(f: &mut dyn Write, formula: &PrintedFormula, level: TextPrecedence) 
             false
         }
     };
+    // Parentheses around everything that follows.
     if enclosed {
         f.write_char('(')?;
     }
@@ -56,6 +59,7 @@ fn write_at(f: &mut dyn Write, formula: &PrintedFormula, level: TextPrecedence) 
             number(f, n)?;
         }
         PrintedFormula::Symbol(symbol) => f.write_str(&symbol.text())?,
+        // An index that is a single name is joined to it by an underscore.
         PrintedFormula::Indexed(symbol, index) => match index.as_ref() {
             PrintedFormula::Symbol(inner) => write!(f, "{}_{}", symbol.text(), inner.text())?,
             index => write!(f, "{}[{index}]", symbol.text())?,
@@ -78,6 +82,7 @@ fn write_at(f: &mut dyn Write, formula: &PrintedFormula, level: TextPrecedence) 
             }
             magnitude(f, formula)?;
         }
+        // The base is enclosed unless it is a name or a function.
         PrintedFormula::Power(base, n) => {
             write_at(f, base, TextPrecedence::Power)?;
             write!(f, "^{n}")?;
@@ -101,6 +106,7 @@ fn write_at(f: &mut dyn Write, formula: &PrintedFormula, level: TextPrecedence) 
 
 /// Writes the magnitude of a number.
 fn number(f: &mut dyn Write, value: &Rational) -> fmt::Result {
+    // A fraction of integers, or a decimal.
     match digits(value) {
         (n, Some(d)) => write!(f, "{n}/{d}"),
         (n, None) => f.write_str(&n),
@@ -128,12 +134,14 @@ fn term(
     below: &[PrintedFormula],
 ) -> fmt::Result {
     let (n, d) = digits(factor);
+    // Factors below the line, with the denominator of the number if nothing stands above.
     let mut divisors = Vec::new();
     if above.is_empty() {
         // 1/2/x is written 1/(2*x).
         f.write_str(&n)?;
         divisors.extend(d);
     } else {
+        // The number comes first, except for the factor 1.
         match d {
             Some(d) => write!(f, "{n}/{d}*")?,
             None if n != "1" => write!(f, "{n}*")?,
@@ -153,6 +161,7 @@ fn term(
         write_at(&mut text, one, TextPrecedence::Factor)?;
         divisors.push(text);
     }
+    // No divisor, one divisor, or several in parentheses.
     match (divisors.is_empty(), several) {
         (true, _) => Ok(()),
         (false, false) => write!(f, "/{}", divisors[0]),
