@@ -18,6 +18,7 @@ pub(crate) struct BigFloatPoint {
 impl BigFloatPoint {
     /// Sets the value of an atom. `None` where it is used as an angle and is too large for a cosine and a sine.
     pub(crate) fn set(&mut self, atom: Atom, value: BigFloat, is_angle: bool) -> Option<()> {
+        // Cosine and sine are computed once, when the value is set.
         if is_angle {
             self.circles.insert(atom, value.cos_sin()?);
         }
@@ -62,6 +63,7 @@ impl EvaluationDomain for BigFloatPoint {
         self.values.get(&atom).cloned()
     }
     fn cos_sin(&self, angle: &AtomAngleSum) -> Option<(BigFloat, BigFloat)> {
+        // Angles are added one unit at a time by the addition theorems.
         let mut total = (BigFloat::integer(1), BigFloat::zero());
         for (atom, n) in angle.terms() {
             let (c, s) = self.circles.get(atom)?;

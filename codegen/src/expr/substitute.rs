@@ -21,11 +21,13 @@ impl Graph {
         let mut rewritten: Vec<ExprId> = Vec::new();
         for (i, needed) in self.reachable(roots).into_iter().enumerate() {
             let id = ExprId(u32::try_from(i).expect("graph below 4G nodes"));
+            // Nodes that no root needs stay as they are.
             let value = if !needed {
                 id
             } else if let Some(replacement) = replacements.get(&id) {
                 *replacement
             } else {
+                // Nodes are rebuilt only if an operand has changed.
                 match self.node(id) {
                     Node::Sum(terms) if terms.iter().any(|(c, _)| rewritten[c.index()] != *c) => {
                         let terms: Vec<_> = terms

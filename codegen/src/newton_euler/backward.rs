@@ -52,10 +52,12 @@ pub(crate) fn backward_recursion(
             let Some(wrench) = total[side as usize][i] else {
                 continue;
             };
+            // All six components of the wrench act on a free body, which has no joint.
             if let Some(body) = &link.free {
                 rows.add_free_body_wrench(graph, body, &wrench);
                 continue;
             }
+            // A joint takes the components about and along its z axis.
             rows.add_joint_force(link, wrench.moment[2], wrench.force[2]);
             if let Some(parent) = link.parent {
                 let wrench = to_parent(graph, style, link, side, &wrench);
@@ -89,6 +91,7 @@ pub(crate) fn carry_wrench(
     wrenches: impl IntoIterator<Item = (usize, JointSide, SymbolicWrench)>,
 ) -> Vec<ExprId> {
     let mut rows = ForceRows::new(n_coordinates);
+    // Each wrench has its own way down.
     for (start, side, wrench) in wrenches {
         let depth = if wrench.has_force() {
             depths.forces
@@ -98,6 +101,7 @@ pub(crate) fn carry_wrench(
         let mut at = Some((start, side, wrench));
         while let Some((i, side, wrench)) = at {
             let link = &tree.links[i];
+            // A free body at the base takes all six components.
             if let Some(body) = &link.free {
                 rows.add_free_body_wrench(graph, body, &wrench);
                 break;
@@ -149,11 +153,13 @@ fn cross_parallel_joints(
         if i == first {
             break;
         }
+        // The force in the axes of the parent.
         if here == JointSide::Moving {
             force = graph.rotate_out(&joint.joint, &force);
         }
         here = JointSide::Moving;
         force = rotate_into_outer(graph, &joint.pre, &force);
+        // The moment about z of the force at the parent's origin.
         let [px, py, _] = joint.position;
         let (x, y) = (graph.mul(px, force[1]), graph.mul(py, force[0]));
         about_z = graph.linear_combination([
@@ -178,6 +184,7 @@ fn cross_parallel_joints(
     };
     let arm = graph.add_vectors(&arms);
     let lever = graph.cross(&arm, &force);
+    // The third component is the one from the loop.
     let moment = [
         graph.add(turned[0], lever[0]),
         graph.add(turned[1], lever[1]),

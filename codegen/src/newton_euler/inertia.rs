@@ -27,6 +27,7 @@ impl InertiaByProduct {
         tree: &KinematicTree,
     ) -> Result<Self, DeriveError> {
         let mut by_product = Self::default();
+        // Parts and lumped masses of the file.
         for part in &mechanism.parts {
             let elements = part_elements(graph, &part.inertial)?;
             by_product.add_elements(graph, tree.link_of(part.frame), elements);
@@ -45,9 +46,11 @@ impl InertiaByProduct {
                 let elements = lump_elements(graph, lump)?;
                 by_product.add_elements(graph, tree.link_of(lump.frame), elements);
             }
+            // Effects with mechanics of their own are not additional masses.
             if effect.mechanics.is_some() {
                 continue;
             }
+            // The terms of an effect at a point are masses there.
             for place in &effect.places {
                 let EffectPlace::Point(point) = place else {
                     continue;
@@ -86,6 +89,7 @@ impl InertiaByProduct {
         graph: &mut Graph,
         value: impl Fn(&ParameterMonomial) -> ExprId,
     ) -> BTreeMap<usize, InertiaFactors> {
+        // Terms of every element of every link.
         let mut terms: BTreeMap<usize, [Vec<ExprId>; ELEMENTS]> = BTreeMap::new();
         for (product, links) in &self.0 {
             let value = value(product);
@@ -124,6 +128,7 @@ impl InertiaByProduct {
 
 /// The point mass that a term of an effect adds at a point.
 fn added_point_mass(point: &FramePoint, term: &EffectTerm) -> LumpedMass {
+    // The mass is the parameter times the term's expression.
     let parameter = ExactExpression::Symbol(modelmill_spec::ModelSymbol::Parameter(term.parameter));
     LumpedMass {
         mass: ExactExpression::Product(vec![parameter, term.expression.clone()]),
@@ -141,6 +146,7 @@ fn part_elements(
 ) -> Result<[ParameterPolynomial; ELEMENTS], DeriveError> {
     let mut elements: [ParameterPolynomial; ELEMENTS] = Default::default();
     match inertial {
+        // Linear parameters are the elements themselves, with one first moment for both balances.
         PartInertia::Linear {
             mass,
             first_moment,
@@ -181,6 +187,7 @@ fn lump_elements(
     graph: &mut Graph,
     lump: &LumpedMass,
 ) -> Result<[ParameterPolynomial; ELEMENTS], DeriveError> {
+    // A lumped mass may be shared by several bodies, each with its share.
     let share = Rational::from(lump.share.clone());
     let mass = expressions::polynomial(graph, &lump.mass)?.scale(&share, graph);
     let force_at = polynomials(graph, &lump.force_at)?;
@@ -208,6 +215,7 @@ fn point_elements(
     moment_at: &[ParameterPolynomial; 3],
 ) -> Result<[ParameterPolynomial; ELEMENTS], DeriveError> {
     let mut elements: [ParameterPolynomial; ELEMENTS] = Default::default();
+    // The first moment is the mass times the place, separately for both balances.
     elements[InertiaElement::Mass.index()] = mass.clone();
     for i in 0..3 {
         elements[InertiaElement::ForceMoment(i).index()] = mass.times(&force_at[i], graph)?;

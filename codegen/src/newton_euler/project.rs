@@ -21,11 +21,13 @@ pub(super) fn project_on_joints(
     let Some((_, above)) = path.split_last() else {
         return;
     };
+    // The moment about the point before the offset along the axis, for which axes and arms are computed.
     let moment = moment_before_axis_offset(graph, style, &tree.links[at], wrench);
     let points = axis_points(graph, tree, &path);
     // From the nearest axes to the base, in groups of axes that meet in one point.
     let mut rest = above;
     while let Some(last) = rest.last() {
+        // Joints whose axes share the point of the nearest one.
         let n = rest
             .iter()
             .rev()
@@ -39,6 +41,7 @@ pub(super) fn project_on_joints(
         } else {
             vector::ZERO
         };
+        // Axes in the frame of the link.
         let axes: Vec<SymbolicVector> = group
             .iter()
             .map(|i| axis_direction(graph, tree, style, *i, at))
@@ -53,12 +56,14 @@ pub(super) fn project_on_joints(
             let about = match shared {
                 Some(moment) => graph.dot(axis, &moment),
                 None => {
+                    // Virtual power: velocity of the point of action and angular velocity for a unit rate of the joint.
                     let speed = graph.cross(axis, &arm);
                     let turned = graph.dot(axis, &moment);
                     let moved = graph.dot(&speed, &wrench.force);
                     graph.add(turned, moved)
                 }
             };
+            // The force along the axis, for joints that translate.
             let along = if link.slides.is_empty() {
                 Graph::ZERO
             } else {
@@ -80,6 +85,7 @@ struct AxisPoint {
 
 /// A point for every joint on a path, by link. Neighbouring axes that meet share a point.
 fn axis_points(graph: &mut Graph, tree: &KinematicTree, path: &[usize]) -> Vec<AxisPoint> {
+    // Each axis begins with a point of its own, the origin of its link.
     let mut points = vec![
         AxisPoint {
             group: 0,
@@ -96,6 +102,7 @@ fn axis_points(graph: &mut Graph, tree: &KinematicTree, path: &[usize]) -> Vec<A
         let meets = above.and_then(|above| {
             let (axis, positive) = link.axis?;
             // The axes meet if the position between them lies in the plane of both, and at the point of the group.
+            // The position without its component along the joint's axis.
             let mut left = link.position;
             let own = std::mem::replace(&mut left[axis], Graph::ZERO);
             let [x, y, z] = left;
@@ -140,6 +147,7 @@ fn axis_direction(
     let Some(parent) = tree.links[first].parent else {
         return z;
     };
+    // The direction in the parent's frame, rotated to this link.
     let above = axis_direction(graph, tree, style, joint, parent);
     let fixed = rotate_into_inner(graph, &tree.links[first].pre, &above);
     graph.rotate_in(style.joint_rotation(&tree.links[at]), &fixed)
@@ -163,14 +171,17 @@ fn lever_arm(
         let link = &tree.links[*i];
         let (across, own) = style.split_position(link);
         let turn = style.joint_rotation(&tree.links[above]).clone();
+        // At the end of parallel joints the vector is rotated and the position added in the parent's frame.
         if style.first_rotated_link(tree, *i) == *i {
             v = graph.rotate_in(&turn, &v);
             v = graph.add_vectors(&[v, across]);
             v = rotate_into_inner(graph, &link.pre, &v);
+        // Between parallel joints only the position is rotated.
         } else {
             let across = graph.rotate_out(&turn, &across);
             v = graph.add_vectors(&[v, across]);
         }
+        // The offset along the last link's own axis is not included.
         if Some(i) != path.last() {
             v[2] = graph.add(v[2], own);
         }

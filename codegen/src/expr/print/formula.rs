@@ -1,14 +1,14 @@
-//!
-//! Expressions and exact numbers go in through the constructors; renderings as text, LaTeX and MathML read the tree.
 //! The tree that is printed: sums of terms, fractions, powers and functions, as a person would write them.
+//!
+//! Expressions and exact numbers go in through the constructors. Renderings as text, LaTeX and MathML read the tree.
 
 use num_bigint::BigInt;
 
 use super::simplify;
 use super::symbol::FormulaSymbol;
 
-/// Largest number of terms of a sum in which like terms are searched for.
-/// Longer sums are printed without a search for like terms, because that search is quadratic.
+/// Largest number of terms of a sum in which like terms are collected. The search is quadratic, so longer sums are printed
+/// without it.
 const MOST_COMPARED: usize = 100;
 use crate::expr::Rational;
 

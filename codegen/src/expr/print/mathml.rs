@@ -1,6 +1,6 @@
+//! Formulas as presentation MathML, readable by any browser without scripts.
 //!
-//! A [`PrintedFormula`] goes in; the content of one `math` element, or of several between which lines may end, comes
-//! out. Formulas as presentation MathML, readable by any browser without scripts.
+//! A [`PrintedFormula`] goes in. The content of one `math` element comes out, or of several between which lines may end.
 
 use std::fmt::Write;
 
