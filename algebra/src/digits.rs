@@ -217,6 +217,7 @@ impl BigFloat {
     fn argument_halvings(&self) -> Option<(u64, u64)> {
         /// Larger arguments than 2^40 do not occur in mechanisms.
         const LARGEST: i64 = 40;
+        /// Arguments are halved until they are below 2^-20.
         const SMALL: i64 = 20;
         let n = (self.binary_magnitude() + SMALL).max(0);
         let n = (self.binary_magnitude() <= LARGEST).then(|| n.unsigned_abs())?;
@@ -291,6 +292,7 @@ impl BigFloat {
 
     /// The hyperbolic tangent; 1 or -1 for arguments above 400 in magnitude.
     pub fn tanh(&self) -> Option<Self> {
+        // Above this argument the difference to 1 is below the last bit.
         const FLAT: f64 = 400.0;
         let size = self.to_f64();
         if size.abs() > FLAT {
@@ -302,6 +304,7 @@ impl BigFloat {
 
     /// pi, by Machin's formula (1706).
     pub fn pi() -> Self {
+        // Computed once and shared by all threads.
         static PI: OnceLock<BigFloat> = OnceLock::new();
         PI.get_or_init(|| {
             let places = BITS + GUARD_BITS;

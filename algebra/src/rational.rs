@@ -47,6 +47,7 @@ impl Rational {
     /// A fraction of double words in lowest terms; the denominator must not be zero.
     fn from_wide(numerator: i128, denominator: i128) -> Self {
         // Nearly all numbers are words and most are integers, and long division is slow.
+        // The least word has no negative, so it is left to the general case.
         if let (Ok(n), Ok(d)) = (i64::try_from(numerator), i64::try_from(denominator))
             && n != i64::MIN
             && d != i64::MIN
@@ -62,6 +63,7 @@ impl Rational {
         // The sign goes to the numerator.
         let (n, sign) = divide(numerator);
         let d = denominator.unsigned_abs() / common;
+        // Numbers that do not fit into words become big integers.
         match (i64::try_from(n), i64::try_from(d)) {
             (Ok(n), Ok(d)) => Self(RationalRepr::Small(sign * n, d)),
             _ => Self::from(BigRational::new(
@@ -155,6 +157,7 @@ impl Rational {
         if self.is_one() || exponent == 1 {
             return self.clone();
         }
+        // A negative exponent inverts the number first.
         let base = if exponent < 0 {
             self.recip()
         } else {
@@ -179,6 +182,7 @@ impl Rational {
                 return Self(RationalRepr::Small(n, m));
             }
         }
+        // The same with big integers, if words overflow.
         let (x, y) = (self.to_big(), other.to_big());
         let n = num_gcd(&(x.numer() * y.denom()), &(y.numer() * x.denom()));
         Self::from(BigRational::new(n, x.denom() * y.denom()))
@@ -206,6 +210,7 @@ fn num_gcd(a: &BigInt, b: &BigInt) -> BigInt {
 
 impl From<BigRational> for Rational {
     fn from(big: BigRational) -> Self {
+        // The numerator must have a negative that fits as well.
         match (big.numer().to_i64(), big.denom().to_i64()) {
             (Some(n), Some(d)) if n != i64::MIN => Self(RationalRepr::Small(n, d)),
             _ => Self(RationalRepr::Big(Box::new(big))),
@@ -228,6 +233,7 @@ impl From<i64> for Rational {
 impl Add for &Rational {
     type Output = Rational;
     fn add(self, other: Self) -> Rational {
+        // Sums of integers need no common denominator.
         match (&self.0, &other.0) {
             (RationalRepr::Small(a, 1), RationalRepr::Small(c, 1)) => {
                 Rational::from_wide(i128::from(*a) + i128::from(*c), 1)
@@ -286,6 +292,7 @@ impl Ord for Rational {
     fn cmp(&self, other: &Self) -> std::cmp::Ordering {
         match (&self.0, &other.0) {
             (RationalRepr::Small(a, b), RationalRepr::Small(c, d)) => {
+                // Denominators are positive, so cross products compare the fractions.
                 let [a, b, c, d] = [*a, *b, *c, *d].map(i128::from);
                 (a * d).cmp(&(c * b))
             }

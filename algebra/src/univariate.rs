@@ -5,6 +5,7 @@ use crate::field::FieldElement;
 /// Degrees of numerator and denominator of the rational function of least degree through the points, if the points
 /// confirm it: at least two more than it has coefficients. The abscissae must differ.
 pub fn interpolant_degrees(x: &[FieldElement], y: &[FieldElement]) -> Option<(usize, usize)> {
+    // A constant function has degree zero in both polynomials.
     let n = x.len();
     if y.iter().all(|v| *v == y[0]) {
         return Some((0, 0));
@@ -16,6 +17,7 @@ pub fn interpolant_degrees(x: &[FieldElement], y: &[FieldElement]) -> Option<(us
     });
     let (mut r0, mut r1) = (nodes, interpolate(x, y));
     let (mut t0, mut t1) = (vec![], vec![FieldElement::ONE]);
+    // The candidate with the least sum of degrees so far.
     let mut best = None;
     loop {
         trim(&mut r1);
@@ -38,6 +40,7 @@ pub fn interpolant_degrees(x: &[FieldElement], y: &[FieldElement]) -> Option<(us
 
 /// Removes leading coefficients that are zero.
 fn trim(p: &mut Vec<FieldElement>) {
+    // The last coefficient is that of the highest power.
     while p.last() == Some(&FieldElement::ZERO) {
         p.pop();
     }
@@ -67,6 +70,7 @@ fn subtract(a: &[FieldElement], b: &[FieldElement]) -> Vec<FieldElement> {
 
 /// Quotient and remainder; the divisor must be trimmed and not zero.
 fn divide(a: &[FieldElement], b: &[FieldElement]) -> (Vec<FieldElement>, Vec<FieldElement>) {
+    // A dividend of lower degree is the remainder.
     let mut rest = a.to_vec();
     trim(&mut rest);
     if rest.len() < b.len() {
@@ -76,6 +80,7 @@ fn divide(a: &[FieldElement], b: &[FieldElement]) -> (Vec<FieldElement>, Vec<Fie
         .inverse()
         .expect("a trimmed polynomial has a leading coefficient");
     let mut quotient = vec![FieldElement::ZERO; rest.len() - b.len() + 1];
+    // From the highest power down.
     for k in (0..quotient.len()).rev() {
         let factor = rest[k + b.len() - 1] * inverse;
         quotient[k] = factor;

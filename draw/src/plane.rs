@@ -56,6 +56,7 @@ fn orient_to_viewer(normal: Vector3<f64>) -> Vector3<f64> {
 
 /// The axes of the base frame.
 trait IdentityAxes {
+    /// y, z and x, in the order in which they are tried.
     fn identity_axes() -> [Vector3<f64>; 3];
 }
 

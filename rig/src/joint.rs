@@ -35,6 +35,7 @@ impl RigJointKind {
 
     /// The kind of a name.
     pub(crate) fn from_name(name: &str) -> Option<Self> {
+        // In the order of `NAMES`.
         const KINDS: [RigJointKind; 7] = [
             RigJointKind::Fixed,
             RigJointKind::Revolute,

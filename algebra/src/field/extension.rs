@@ -122,7 +122,7 @@ impl<const P: u64> FieldNumber for ExtensionElement<P> {
             });
         }
         // (u + v i)^2 = re + im i gives u^2 = (re + s)/2, where s^2 is the norm. For one of the two signs of s this is
-        // a square.
+        // a square. The norm must have a root in the prime field.
         let root = self.norm().square_root()?;
         let half = FieldElement::from_i64(2).inverse()?;
         let u = ((self.re + root) * half)
@@ -137,6 +137,7 @@ impl<const P: u64> FieldNumber for ExtensionElement<P> {
         if self.im == FieldElement::ZERO {
             return self.re.hash_with_seed(seed).into();
         }
+        // Both parts depend on both parts of the number.
         let part = self.im.hash_with_seed(seed).representative();
         Self {
             re: self.re.hash_with_seed(seed ^ part),

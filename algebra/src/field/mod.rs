@@ -122,6 +122,7 @@ impl<const P: u64> FieldElement<P> {
 
 /// A product of two elements modulo `P`. As `P` is just below 2^61, the upper bits are folded onto the lower ones.
 fn reduce<const P: u64>(x: u128) -> FieldElement<P> {
+    // The lower 61 bits.
     const MASK: u128 = (1 << 61) - 1;
     let excess = u128::from((1 << 61) - P);
     let x = (x & MASK) + (x >> 61) * excess;

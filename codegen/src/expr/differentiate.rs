@@ -31,6 +31,7 @@ impl Graph {
     ) -> Vec<ExprId> {
         // Forward differentiation: operands come before the nodes that use them.
         let needed = self.reachable(roots);
+        // Derivative of every node so far.
         let mut derivative: BTreeMap<ExprId, ExprId> = BTreeMap::new();
         for (i, needed) in needed.into_iter().enumerate() {
             if !needed {
@@ -42,6 +43,7 @@ impl Graph {
                 Node::Atom(atom) => speed(self, atom),
                 // Chain rule with the sum of the atoms' speeds as the inner derivative.
                 Node::Sin(angle) | Node::Cos(angle) => {
+                    // (sin u)' = cos u u', (cos u)' = -sin u u'
                     let is_sine = matches!(self.node(id), Node::Sin(_));
                     let mut terms = Vec::new();
                     for (atom, n) in angle.terms() {
@@ -52,6 +54,7 @@ impl Graph {
                     let outer = if is_sine { c } else { self.neg(s) };
                     self.mul(outer, rate)
                 }
+                // A sum keeps its factors.
                 Node::Sum(terms) => {
                     let terms: Vec<_> = terms
                         .into_iter()
@@ -67,6 +70,7 @@ impl Graph {
                         if inner == Self::ZERO {
                             continue;
                         }
+                        // The exponent is reduced by one, and the derivative of the base is a further factor.
                         let mut rest = factors.clone();
                         rest[k].1 -= 1;
                         rest.push((inner, 1));

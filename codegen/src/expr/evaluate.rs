@@ -41,14 +41,16 @@ pub struct EvaluationTape {
 impl EvaluationTape {
     /// Collects what `roots` need.
     pub fn new(graph: &Graph, roots: &[ExprId]) -> Self {
-        // Position on the tape of every node of the graph.
+        // The position of nodes that are not on the tape.
         const NOWHERE: usize = usize::MAX;
+        // Position on the tape of every node of the graph.
         let mut positions = vec![NOWHERE; graph.len()];
         let mut steps = Vec::new();
         let mut operands = Vec::new();
         for (i, needed) in graph.reachable(roots).into_iter().enumerate() {
             if needed {
                 let id = ExprId(u32::try_from(i).expect("graph below 4G nodes"));
+                // Operands precede their nodes, so their positions are known.
                 let mut children = Vec::new();
                 graph.for_each_child(id, |child| children.push(positions[child.index()]));
                 positions[i] = steps.len();
@@ -77,6 +79,7 @@ impl EvaluationTape {
     pub fn evaluate<D: EvaluationDomain>(&self, domain: &D) -> Option<Vec<D::Value>> {
         let mut values: Vec<D::Value> = Vec::with_capacity(self.steps.len());
         for (node, operands) in self.steps.iter().zip(&self.operands) {
+            // Values of operands are known, since the tape has them before their nodes.
             let value = match node {
                 Node::Rational(value) => domain.rational(value)?,
                 Node::Atom(atom) => domain.atom(*atom)?,
@@ -317,6 +320,7 @@ impl EvaluationDomain for RationalPoint {
     }
     fn unary(&self, function: Unary, a: &Rational) -> Option<Rational> {
         match function {
+            // The sign of zero is zero.
             Unary::Sign if a.is_zero() => Some(Rational::ZERO),
             Unary::Sign => Some(if a.is_negative() {
                 Rational::MINUS_ONE
@@ -331,6 +335,7 @@ impl EvaluationDomain for RationalPoint {
                 let root = num_rational::BigRational::new(n, d);
                 (&root * &root == big).then(|| Rational::from(root))
             }
+            // These functions have no rational values except at single points.
             Unary::Tanh | Unary::Exp | Unary::Sin | Unary::Cos => None,
         }
     }

@@ -193,6 +193,7 @@ impl Graph {
 
     /// Calls `visit` for every operand of `id`.
     pub fn for_each_child(&self, id: ExprId, mut visit: impl FnMut(ExprId)) {
+        // Sines and cosines contain atoms, but no nodes.
         match self.node(id) {
             Node::Rational(_) | Node::Atom(_) | Node::Sin(_) | Node::Cos(_) => {}
             Node::Sum(terms) => terms.iter().for_each(|(child, _)| visit(*child)),
@@ -229,8 +230,10 @@ impl Graph {
         // New id of each old node; zero and one keep their places.
         let mut new = vec![Self::ZERO; self.nodes.len()];
         new[Self::ONE.index()] = Self::ONE;
+        // The first two nodes are 0 and 1 in every graph.
         for (i, needed) in self.reachable(roots).into_iter().enumerate().skip(2) {
             if needed {
+                // The same node with the new ids of its operands.
                 let node = match self.nodes[i].clone() {
                     Node::Sum(terms) => Node::Sum(
                         terms

@@ -96,6 +96,7 @@ impl<'a> NumericLoops<'a> {
     /// A random pose whose moved coordinates lie within `reach` of the nominal one (rad, or relative to the size of the
     /// loops), reached in small steps; `None` if the loops cannot be followed so far.
     pub(crate) fn random_pose(&self, reach: f64, stream: &mut RandomStream) -> Option<Vec<f64>> {
+        // Number of small steps, each of which is closed again.
         const STEPS: u32 = 8;
         let mut q = self.declared_nominal_pose();
         let moves: Vec<(usize, f64)> = self
@@ -139,6 +140,7 @@ impl<'a> NumericLoops<'a> {
 
     /// Whether the loops determine the unknown coordinates at a pose: full rank of the scaled derivatives.
     pub(crate) fn is_regular(&self, q: &[f64]) -> bool {
+        // Least singular value relative to the largest.
         const SINGULAR: f64 = 1e-9;
         let Some((_, mut jacobian)) = self.linearise(q) else {
             return false;

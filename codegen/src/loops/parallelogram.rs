@@ -258,6 +258,7 @@ fn fixed_angles(graph: &Graph, roots: &[ExprId]) -> Vec<usize> {
 
 /// One candidate of each list, in all combinations, up to a largest number.
 fn combinations(candidates: &[Vec<AngleRelation>]) -> impl Iterator<Item = Vec<AngleRelation>> {
+    // Largest number of combinations that are tried.
     const MOST: usize = 64;
     let n = candidates
         .iter()

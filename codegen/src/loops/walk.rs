@@ -134,6 +134,7 @@ impl<'a> PoseWalk<'a> {
 
     /// The next pose at which the passive coordinates are determined; `None` if the walk makes no progress.
     pub(crate) fn next_pose(&mut self, stream: &mut RandomStream) -> Option<Vec<f64>> {
+        // Steps that are tried before the walk is given up.
         const TRIES: usize = 400;
         let mut steps = 0;
         for _ in 0..TRIES {
@@ -246,7 +247,9 @@ impl<'a> PoseWalk<'a> {
     /// The nearest pose at which all loops are closed, by Newton's method with the least change; `None` if it does not
     /// converge.
     fn close_loops(&self, mut q: Vec<f64>) -> Option<Vec<f64>> {
+        // Largest number of Newton steps.
         const ROUNDS: usize = 12;
+        // A shorter step, in units of the coordinates, changes nothing.
         const STILL: f64 = 1e-12;
         for _ in 0..ROUNDS {
             let here = self.loop_tangent(&q)?;

@@ -22,6 +22,7 @@ pub(crate) fn expanded_formula(
     reduction: &BaseReduction,
     k: usize,
 ) -> PrintedFormula {
+    // The retained product itself.
     let mut terms = vec![product_formula(
         mechanism,
         &reduction.products[reduction.retained[k]],
@@ -42,6 +43,7 @@ pub(crate) fn dependent_sums(
     mechanism: &Mechanism,
     reduction: &BaseReduction,
 ) -> Vec<(String, PrintedFormula)> {
+    // Sums that others need come after those that refer to them.
     let outer_first = reduction.lines_in_dependency_order().into_iter().rev();
     let sum = |line: usize| {
         let name = sum_name(mechanism, reduction, line)?;
@@ -71,6 +73,7 @@ fn sum_name(mechanism: &Mechanism, reduction: &BaseReduction, line: usize) -> Op
     let parameters = mechanism.parameters.iter().map(|p| p.name.as_str());
     let taken: Vec<&str> = constants.chain(parameters).collect();
     let mut stem = "sum".to_owned();
+    // An underscore is added until no name begins with the stem.
     while taken.iter().any(|name| name.starts_with(&stem)) {
         stem.push('_');
     }
@@ -107,6 +110,7 @@ pub(crate) fn denominators(
     mechanism: &Mechanism,
     reduction: &BaseReduction,
 ) -> Vec<BaseDenominator> {
+    // A set, because many factors have the same denominator.
     let mut found: BTreeSet<TrigonometricPolynomial> = BTreeSet::new();
     let lines = reduction.dependencies.iter();
     for (_, factor) in lines.flat_map(|line| line.equals.iter().chain(&line.via)) {
@@ -121,9 +125,11 @@ pub(crate) fn denominators(
             variables.map(|v| TrigonometricPolynomial::from([(vec![(v, 1)], Rational::ONE)])),
         );
     }
+    // Denominators are printed as functions with denominator 1.
     let one = || TrigonometricPolynomial::from([(Vec::new(), Rational::ONE)]);
     let denominator = |p: TrigonometricPolynomial| BaseDenominator {
         size: PrintedFormula::sum(p.iter().map(|(powers, k)| {
+            // Sines and cosines count as 1, so they are left out.
             let magnitude = |v: FactorVariable| match v {
                 FactorVariable::Cos(_) | FactorVariable::Sin(_) => None,
                 FactorVariable::Constant(_) => {
@@ -168,6 +174,7 @@ pub(crate) fn product_formula(
 
 /// The base parameters as expressions of the graph, by eq. (7).
 pub(crate) fn base_expressions(graph: &mut Graph, reduction: &BaseReduction) -> Vec<ExprId> {
+    // Every base parameter begins with its retained product.
     let mut terms: Vec<Vec<ExprId>> = reduction
         .retained
         .iter()
@@ -180,10 +187,12 @@ pub(crate) fn base_expressions(graph: &mut Graph, reduction: &BaseReduction) -> 
         .collect();
     for i in reduction.lines_in_dependency_order().into_iter().rev() {
         let value = graph.add_all(&worth[i]);
+        // Contributions to base parameters.
         for (k, factor) in &lines[i].equals {
             let factor = factor.expression(graph);
             terms[*k].push(graph.mul(factor, value));
         }
+        // Contributions to the sums of other dependent products.
         for (inner, factor) in &lines[i].via {
             let factor = factor.expression(graph);
             worth[reduction.line_of(*inner)].push(graph.mul(factor, value));

@@ -16,6 +16,7 @@ pub(super) fn constant_occurrences(
     // Atoms outside of angles, and atoms in sines and cosines.
     let mut found = BTreeSet::new();
     for node in graph.nodes_of(&roots) {
+        // Atoms outside of angles are values; atoms in angles are angles.
         match node {
             Node::Atom(Atom::Constant(i)) => _ = found.insert((*i, false)),
             Node::Sin(angle) | Node::Cos(angle) => {
@@ -35,6 +36,7 @@ pub(super) fn root_radicands(graph: &Graph, outputs: &[ExprId], residual: &[Expr
     let mut roots = outputs.to_vec();
     roots.extend(residual);
     let mut found = Vec::new();
+    // Roots of constants that are no integers do not occur here.
     for node in graph.nodes_of(&roots) {
         if let Node::Unary(Unary::Sqrt, inner) = node
             && let Node::Rational(value) = graph.node(*inner)

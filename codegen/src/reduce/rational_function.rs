@@ -31,10 +31,12 @@ impl FactorVariable {
         self,
         point: &FieldPoint<FieldElement<P>>,
     ) -> Option<FieldElement<P>> {
+        // Sine and cosine of a constant are drawn independently of its value.
         match self {
             Self::Constant(i) => point.values.get(&Atom::Constant(i)).copied(),
             Self::Cos(i) => point.angles.get(&Atom::Constant(i)).map(|cs| cs.0),
             Self::Sin(i) => point.angles.get(&Atom::Constant(i)).map(|cs| cs.1),
+            // Both signs of the root are possible; the point has chosen one.
             Self::Root(n) => crate::expr::EvaluationDomain::unary(
                 point,
                 crate::expr::Unary::Sqrt,
@@ -93,6 +95,7 @@ pub struct RationalFunction {
 impl RationalFunction {
     /// A number.
     pub fn constant(value: Rational) -> Self {
+        // Zero is the polynomial without terms.
         let one = BTreeMap::from([(PowerProduct::new(), Rational::ONE)]);
         let numerator = if value.is_zero() {
             BTreeMap::new()
@@ -121,12 +124,14 @@ impl RationalFunction {
             .keys()
             .chain(numerator.keys())
             .map(|powers| powers.iter().copied().collect::<BTreeMap<_, _>>())
+            // The smallest exponent of every variable.
             .reduce(|a, b| {
                 a.into_iter()
                     .filter_map(|(v, n)| b.get(&v).map(|m| (v, n.min(*m))))
                     .collect()
             })
             .unwrap_or_default();
+        // Divides every term by the common powers.
         let strip = |p: TrigonometricPolynomial| -> TrigonometricPolynomial {
             p.into_iter()
                 .map(|(powers, k)| {
@@ -171,6 +176,7 @@ impl RationalFunction {
         if self.is_zero() {
             return Some(Rational::ZERO);
         }
+        // Both polynomials are numbers.
         match (
             self.numerator.len(),
             self.numerator.get(&PowerProduct::new()),
@@ -205,6 +211,7 @@ impl RationalFunction {
                 sum += term;
                 size += term.abs();
             }
+            // Most digits have cancelled, so the terms are added as fractions.
             if sum.abs() < CANCELLED * size && size.is_finite() {
                 let exact: Vec<BigRational> = constants.iter().map(|c| from_f64(*c)).collect();
                 return polynomial_exact(p, &exact).to_f64().unwrap_or(f64::NAN);
@@ -222,6 +229,7 @@ impl RationalFunction {
 
     /// As an expression of the graph.
     pub fn expression(&self, graph: &mut Graph) -> ExprId {
+        // Each polynomial as a sum of products of powers.
         let mut build = |p: &TrigonometricPolynomial| {
             let terms: Vec<_> = p
                 .iter()
@@ -256,6 +264,7 @@ fn polynomial_exact(p: &TrigonometricPolynomial, constants: &[BigRational]) -> B
     for (powers, k) in p {
         let mut product = k.to_big();
         for (v, n) in powers {
+            // Angles are rounded to double precision before their sine or cosine is computed.
             let angle = |i: &usize| constants[*i].to_f64().unwrap_or(f64::NAN);
             let value = match v {
                 FactorVariable::Constant(i) => constants[*i].clone(),
@@ -285,6 +294,7 @@ fn with_fewest_terms(mut p: TrigonometricPolynomial) -> TrigonometricPolynomial 
     for i in angles {
         let mut in_sines = TrigonometricPolynomial::new();
         for (powers, k) in &p {
+            // Exponent of a variable in this term.
             let power_of = |v: FactorVariable| {
                 let found = powers.iter().find(|(w, _)| *w == v);
                 found.map_or(0, |(_, n)| *n)
@@ -306,6 +316,7 @@ fn with_fewest_terms(mut p: TrigonometricPolynomial) -> TrigonometricPolynomial 
                 coefficient = &coefficient * &Rational::new(-i64::from(n - j), i64::from(j) + 1);
             }
         }
+        // Terms may have cancelled.
         in_sines.retain(|_, k| !k.is_zero());
         if in_sines.len() < p.len() {
             p = in_sines;

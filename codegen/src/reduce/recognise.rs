@@ -173,6 +173,7 @@ impl<'a> FileConstants<'a> {
 
     /// `value` divided by `power`, if that is a small rational number.
     fn small_rational(&self, value: &BigFloat, power: &ConstantPower) -> Option<Rational> {
+        // Relative difference up to which the exact comparison is made.
         const ROUGH: f64 = 1e-9;
         let ratio = value.to_f64() / power.rough;
         // Denominators in increasing order; double precision rules out most of them before the exact comparison.
@@ -224,6 +225,7 @@ pub(super) fn length_exponent(unit: &str) -> Option<i32> {
 /// A number rounded to thirteen significant digits, as an exact rational, so that later steps treat it like any other
 /// factor.
 fn decimal_function(value: f64) -> RationalFunction {
+    // Digits after the decimal point of the mantissa.
     const DIGITS: i32 = 12;
     let written = format!("{value:.12e}");
     let rational = written.split_once('e').and_then(|(mantissa, exponent)| {

@@ -240,6 +240,7 @@ impl<'a> WalkSampler<'a> {
 /// A constant angle with all digits: a multiple of a quarter of a degree if the value equals one up to rounding, else
 /// the decimal that was written.
 fn declared_angle(value: f64) -> Option<BigFloat> {
+    // Quarters of a degree in half a revolution.
     const PER_HALF_TURN: f64 = 720.0;
     let n = (value / std::f64::consts::PI * PER_HALF_TURN).round();
     let is_near = (n * std::f64::consts::PI / PER_HALF_TURN - value).abs()

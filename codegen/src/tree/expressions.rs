@@ -22,6 +22,7 @@ impl ParameterMonomial {
     /// The product of two monomials.
     #[must_use]
     pub fn times(&self, other: &Self) -> Self {
+        // Exponents of equal parameters add up.
         let mut powers: BTreeMap<usize, u32> = self.0.iter().copied().collect();
         for (parameter, n) in &other.0 {
             *powers.entry(*parameter).or_insert(0) += n;
@@ -133,6 +134,7 @@ impl ParameterPolynomial {
                 }
             }
         }
+        // Coefficients of equal monomials are added, and those that cancel are dropped.
         let mut product: BTreeMap<ParameterMonomial, ExprId> = terms
             .into_iter()
             .map(|(m, values)| (m, graph.sum(&values)))
@@ -151,6 +153,7 @@ pub(crate) fn angle_sum(angle: &ExactAngle) -> (AtomAngleSum, i32) {
         "a validated angle's fixed part is a multiple of pi/12, not pi * {}",
         angle.pi
     );
+    // Full turns are dropped.
     let pi12 = twelfths.to_big().to_integer() % num_bigint::BigInt::from(24);
     let terms = angle.terms.iter().map(|(symbol, n)| (atom(*symbol), *n));
     (
@@ -200,6 +203,7 @@ pub(crate) fn expression_at(
 ) -> Result<ExprId, DeriveError> {
     // A polynomial without parameters has at most one term.
     let polynomial = polynomial_at(graph, exact, place)?;
+    // Only the monomial without parameters is allowed.
     match polynomial.0.len() {
         0 => Ok(Graph::ZERO),
         1 if polynomial.0.contains_key(&ParameterMonomial::default()) => {
@@ -234,6 +238,7 @@ fn polynomial_at(
         ExactExpression::Symbol(ModelSymbol::Parameter(i)) => ParameterPolynomial(BTreeMap::from(
             [(ParameterMonomial(vec![(i.0, 1)]), Graph::ONE)],
         )),
+        // Quantities of places exist only inside effects.
         ExactExpression::Symbol(ModelSymbol::Place(quantity)) => match place(*quantity) {
             Some(value) => ParameterPolynomial::constant(value),
             None => {
@@ -279,6 +284,7 @@ fn polynomial_at(
             }
             ParameterPolynomial::constant(graph.pow(base, *n))
         }
+        // Repeated multiplication: exponents in files are small.
         ExactExpression::Power(a, n) => {
             let base = polynomial_at(graph, a, place)?;
             let mut power = ParameterPolynomial::constant(Graph::ONE);
@@ -289,6 +295,7 @@ fn polynomial_at(
         }
         // Sines and cosines of exact angles stay exact; other arguments become nodes of their own.
         ExactExpression::Apply(function, a) => {
+            // An exact angle, if the argument is one.
             if let (ExactFunction::Sin | ExactFunction::Cos, Some((sum, pi12))) =
                 (function, AngleAccumulator::angle(a))
             {
@@ -313,6 +320,7 @@ pub(crate) fn name_place_coordinate(
     quantity: PlaceQuantity,
     coordinate: CoordinateIdx,
 ) -> ExactExpression {
+    // Replaces the quantity in an operand.
     let inner = |a: &ExactExpression| Box::new(name_place_coordinate(a, quantity, coordinate));
     let all = |operands: &[ExactExpression]| {
         operands

@@ -39,6 +39,7 @@ impl SplitTerm {
         &self,
     ) -> impl Iterator<Item = (FormulaFunction, &PrintedFormula, Vec<PrintedFormula>)> {
         self.above.iter().enumerate().filter_map(|(i, factor)| {
+            // Only squares of one function of one angle count.
             let PrintedFormula::Power(base, 2) = factor else {
                 return None;
             };
@@ -49,6 +50,7 @@ impl SplitTerm {
             else {
                 return None;
             };
+            // The term without this factor.
             let mut rest = self.above.clone();
             rest.remove(i);
             Some((*function, operands.first()?, rest))
@@ -58,6 +60,7 @@ impl SplitTerm {
     /// The factors above the line of the sum of two terms that differ only in `sin^2` and `cos^2` of one angle; `None`
     /// for other terms.
     fn pythagorean_sum(&self, other: &Self) -> Option<Vec<PrintedFormula>> {
+        // Both terms must have the same number and the same denominator.
         if self.factor != other.factor || self.below != other.below {
             return None;
         }
