@@ -229,7 +229,7 @@ impl Graph {
                     self.neg(value)
                 }
             }
-            // sign(k x) = sign(x) and abs(k x) = k abs(x) for k > 0, which holds here.
+            // sign(k x) = sign(x) and abs(k x) = k abs(x) for k > 0, which is true here.
             Unary::Sign if !k.is_one() => self.unary(Unary::Sign, base),
             Unary::Abs if !k.is_one() => {
                 let value = self.unary(Unary::Abs, base);
@@ -312,7 +312,8 @@ impl Graph {
         self.scaled_node(base, content)
     }
 
-    /// If a nested sum holds a term that cancels against the others, the list with that sum opened.
+    /// The list with one nested sum opened, if a term of that sum cancels against the others; `None` if nothing
+    /// cancels.
     fn open_cancelling(&self, flat: &[(ExprId, Rational)]) -> Option<Vec<(ExprId, Rational)>> {
         // Terms of a true sum; a single scaled term is not one.
         let inner_terms = |id: ExprId| match self.node(id) {

@@ -79,12 +79,12 @@ impl Graph {
         })
     }
 
-    /// Components, in the outer frame, of a vector given in the turned frame.
+    /// Components, in the outer frame, of a vector given in the rotated frame.
     pub(crate) fn rotate_out(&mut self, turn: &AxisRotation, v: &SymbolicVector) -> SymbolicVector {
         self.rotate_by(turn, v, false)
     }
 
-    /// Components, in the turned frame, of a vector given in the outer frame.
+    /// Components, in the rotated frame, of a vector given in the outer frame.
     pub(crate) fn rotate_in(&mut self, turn: &AxisRotation, v: &SymbolicVector) -> SymbolicVector {
         self.rotate_by(turn, v, true)
     }

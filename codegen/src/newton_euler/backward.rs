@@ -174,7 +174,7 @@ fn cross_parallel_joints(
         arms.push(graph.rotate_out(&tree.links[parent].absolute, &joint.position));
         i = parent;
     }
-    // Moments about x and y: once, for the whole way.
+    // Moments about x and y: once, for all of these joints.
     let [force, turned] = match side {
         JointSide::Moving => {
             let absolute = &tree.links[start].absolute;

@@ -280,7 +280,7 @@ impl TreeMotion {
     }
 
     /// The moment, on the fixed side of a joint, of a body whose only inertia is a moment of inertia of 1 about the
-    /// joint's axis. It does not depend on the angle of the joint. it does not depend on how far the joint has turned.
+    /// joint's axis. It does not depend on the angle of the joint.
     pub(crate) fn axial_moment(&self, graph: &mut Graph, link: usize) -> SymbolicVector {
         let moved = &self.links[link];
         let [x, y, _] = moved.carried;

@@ -114,7 +114,7 @@ pub(crate) fn denominators(
     let mut found: BTreeSet<TrigonometricPolynomial> = BTreeSet::new();
     let lines = reduction.dependencies.iter();
     for (_, factor) in lines.flat_map(|line| line.equals.iter().chain(&line.via)) {
-        // A sum may vanish as a whole; a product vanishes where one of its factors does.
+        // The value of a sum may vanish; a product vanishes where one of its factors does.
         if factor.denominator.len() > 1 {
             found.insert(factor.denominator.clone());
             continue;

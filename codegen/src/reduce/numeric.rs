@@ -541,8 +541,8 @@ mod tests {
         }
     }
 
-    /// Lengths that a person has rounded close a loop with more equations than it needs only nearly: the base is that
-    /// of the loop that was meant, and what is left says how nearly.
+    /// With rounded lengths, a loop with more equations than needed closes only approximately. The base is that of the
+    /// exact loop, and the residual shows the rounding.
     #[test]
     fn rounded_lengths_keep_the_base() {
         let rounded = [(

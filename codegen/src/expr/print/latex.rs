@@ -133,7 +133,7 @@ fn power(out: &mut String, base: &PrintedFormula, n: u32) {
             write(out, base, true);
             _ = write!(out, "}}^{{{n}}}");
         }
-        // All other bases get parentheses, whatever they contain.
+        // All other bases get parentheses.
         other => {
             _ = write!(out, "\\left({}\\right)^{{{n}}}", other.latex());
         }
