@@ -1,8 +1,8 @@
-//! Programs in the widest vectors of the machine, by way of `pulp`, which asks the machine at run time and keeps the
-//! instructions behind a safe face: 512 bits with AVX-512, 256 with AVX2, 128 with NEON, else one number at a time.
+//! Programs in the widest vectors of the machine. The crate `pulp` detects the machine at run time and wraps its
+//! instructions in a safe interface: 512 bits with AVX-512, 256 with AVX2, 128 with NEON, else one number at a time.
 //!
-//! Products are fused with the sums that they go into where the machine has an instruction for that, so that results agree
-//! with those of one state, and between machines, to rounding.
+//! Products are fused with the sums that they go into where the machine has an instruction for that, so that results
+//! agree with those of one state, and between machines, to rounding.
 //!
 //! Decision: `pulp` and not arrays. The compiler leaves a loop over an array of eight in memory; values of `pulp`
 //! are registers from the start. Products are fused in vectors only: that saves a third of the instructions where
@@ -27,8 +27,8 @@ use crate::lanes::{self, LARGEST_ANGLE, reduced_sin_cos};
 use crate::numbers::AngleBatch;
 use crate::{Numbers, OutputSink, PoseError, Real};
 
-/// The widest vectors of the machine, or narrower ones if the environment variable `MODELMILL_VECTORS` asks for `256` bits
-/// or `none`, so that the figures of another machine can be seen on this one.
+/// The widest vectors of the machine. The environment variable `MODELMILL_VECTORS` reduces them to `256` bits or
+/// `none`, so that the timings of a smaller machine can be measured on this one.
 fn widest_vectors() -> Arch {
     static CHOSEN: OnceLock<Arch> = OnceLock::new();
     *CHOSEN.get_or_init(|| match std::env::var("MODELMILL_VECTORS").as_deref() {
@@ -39,7 +39,7 @@ fn widest_vectors() -> Arch {
     })
 }
 
-/// A job inside the vectors that `pulp` chose.
+/// Passes a job on to the vectors that `pulp` selected.
 struct DispatchedJob<J, T>(J, core::marker::PhantomData<T>);
 
 macro_rules! wide {
@@ -49,7 +49,7 @@ macro_rules! wide {
         $fused:ident, $fused_less:ident, $sqrt:ident, $abs:ident, $less:ident, $greater:ident, $at_least:ident, $and:ident, $not:ident, $first:ident,
         $select:ident, $max:ident, $of_slice:ident, $of_slice_mut:ident
     ) => {
-        /// As many numbers as a vector holds.
+        /// One vector register of numbers.
         #[derive(Clone, Copy)]
         struct $value<S: Simd> {
             simd: S,
@@ -199,7 +199,7 @@ macro_rules! wide {
             #[inline(always)]
             fn angles<const N: usize>(&self, angles: [Var<$value<S>>; N]) -> AngleBatch<$value<S>, N> {
                 let (simd, largest) = (self.simd, <$float as Real>::from_f64(LARGEST_ANGLE));
-                // What is no number may be lost in the larger of two; inputs are looked at before.
+                // The maximum of two may drop NaN; inputs are therefore checked before.
                 let mut size = simd.$splat(0.0);
                 for angle in angles {
                     size = simd.$max(size, simd.$abs(angle.0.v));
@@ -393,7 +393,7 @@ impl<S: Simd> Wide64<S> {
         reduced_sin_cos(self)
     }
 
-    /// The other one where the mask is set.
+    /// The other value where the mask is set.
     #[inline(always)]
     fn select_lanes(self, mask: S::m64s, other: Self) -> Self {
         Self {
@@ -402,7 +402,7 @@ impl<S: Simd> Wide64<S> {
         }
     }
 
-    /// Turned around in the third and fourth quarter.
+    /// Sign changed in the third and fourth quadrant.
     #[inline(always)]
     fn with_sign(self, quarter: S::u64s) -> Self {
         let (simd, two) = (self.simd, self.simd.splat_u64s(2));
