@@ -248,7 +248,7 @@ with_numbers! { Var DeferredProduct }
 mod tests {
     use super::*;
 
-    /// Every operator on every pair of terms, beside plain arithmetic; all results are exact.
+    /// Every operator on every pair of terms agrees with plain arithmetic; all results are exact.
     #[test]
     fn terms_compute_as_numbers_do() {
         let [a, b, c, d] = [3.0, 5.0, 7.0, 11.0_f64];

@@ -60,8 +60,8 @@ pub enum PoseError {
     Singular,
     /// A term of the model, such as an effect of its own, has no finite value there.
     Undefined,
-    /// An input is no number, or larger than [`Real::largest`]; its name in the model file, with `_d` and `_dd` for rates
-    /// and accelerations.
+    /// An input is NaN, infinite or larger than [`Real::largest`]. Contains its name in the model file, with `_d` and
+    /// `_dd` for rates and accelerations.
     NotFinite(&'static str),
 }
 
@@ -80,10 +80,10 @@ impl fmt::Display for PoseError {
 
 impl core::error::Error for PoseError {}
 
-/// Names the first of some inputs that is no number, or larger than [`Real::largest`].
+/// Checks that inputs are finite and not larger than [`Real::largest`].
 ///
 /// # Errors
-/// [`PoseError::NotFinite`] with its name.
+/// [`PoseError::NotFinite`] with the name of the first that is not.
 #[inline]
 pub fn check_finite<T: Real>(values: &[T], names: &[&'static str]) -> Result<(), PoseError> {
     // One branch for all of them.

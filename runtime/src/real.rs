@@ -20,7 +20,7 @@ pub trait Real:
     fn to_f64(self) -> f64;
     /// Distance from 1 to the next larger number.
     fn epsilon() -> Self;
-    /// Upper limit of inputs, whatever their unit. Below it, powers up to the fifth are finite, or for `f32` up to the
+    /// Upper limit of inputs, in any unit. Below it, powers up to the fifth are finite, or for `f32` up to the
     /// third. Products of more inputs may still overflow.
     #[inline]
     #[must_use]
