@@ -37,6 +37,7 @@ pub(crate) fn assemble(chain: Vec<(usize, RigEntry)>) -> Result<Rig, Vec<Diagnos
     if log.0.is_empty() {
         Ok(rig)
     } else {
+        // In the order of the files, and of the places in each file.
         log.0
             .sort_by_key(|found| found.span.map(|span| (span.file, span.start)));
         Err(log.0)
@@ -45,6 +46,7 @@ pub(crate) fn assemble(chain: Vec<(usize, RigEntry)>) -> Result<Rig, Vec<Diagnos
 
 /// The rig of merged entries, with errors in the log.
 fn build(merged: &MergedRig, log: &mut RigLog) -> Rig {
+    // Bodies first, since points name them; joints, coordinates, drives and effects then name what precedes.
     let mut rig = Rig {
         name: merged.name.clone(),
         title: merged.title.clone(),
@@ -63,6 +65,7 @@ fn build(merged: &MergedRig, log: &mut RigLog) -> Rig {
         seed: merged.seed.unwrap_or(0),
     };
     for point in &merged.points {
+        // A point on an unknown body is attached to the base, so that its name still exists.
         let on = find_body(&rig, point.file, &point.entry.on, log);
         let at = vector(point.file, Some(&point.entry.at), log);
         rig.points.push(RigPoint {
@@ -95,6 +98,7 @@ fn build(merged: &MergedRig, log: &mut RigLog) -> Rig {
             .rate
             .as_ref()
             .map(|rate| above_zero(rate.file, &rate.entry, "a sampling rate", log)),
+        // Without encoders a recording contains exact derivatives, unless the file states otherwise.
         derivatives: merged.derivatives.unwrap_or(merged.encoders.is_empty()),
         encoders: channels(
             &merged.encoders,
@@ -115,6 +119,7 @@ fn build(merged: &MergedRig, log: &mut RigLog) -> Rig {
 /// Checks that a rig has coordinates, as many drives, and columns with different names.
 fn check_columns(merged: &MergedRig, log: &mut RigLog) {
     let (n_coordinates, n_drives) = (merged.coordinates.len(), merged.drives.len());
+    // One drive per degree of freedom; the error is placed at the last entry.
     if n_coordinates == 0 || n_drives != n_coordinates {
         let drives = merged.drives.last().map(|d| (d.file, d.entry.name.span()));
         let last = drives.or(merged
@@ -129,6 +134,7 @@ fn check_columns(merged: &MergedRig, log: &mut RigLog) {
             "give one `[[coordinate]]` and one `[[drive]]` per degree of freedom",
         );
     }
+    // Columns of a recording: time, each coordinate with its derivatives, and each drive.
     let mut columns = vec!["t".to_owned()];
     let coordinates = merged
         .coordinates
@@ -165,6 +171,7 @@ fn body(item: &FileItem<BodyEntry>, log: &mut RigLog) -> RigBody {
         .map_or_else(Matrix3::zeros, |spanned| {
             let i = spanned.get_ref();
             let matrix = Matrix3::new(i.xx, i.xy, i.xz, i.xy, i.yy, i.yz, i.xz, i.yz, i.zz);
+            // Eigenvalues are computed for finite entries only.
             let moments = if matrix.iter().all(|x| x.is_finite()) {
                 matrix.symmetric_eigenvalues()
             } else {
@@ -184,6 +191,7 @@ fn body(item: &FileItem<BodyEntry>, log: &mut RigLog) -> RigBody {
             }
             matrix
         });
+    // Without `at` and `rpy` the body's frame is the base frame in the nominal configuration.
     RigBody {
         name: entry.name.get_ref().clone(),
         nominal: BodyPose::from_xyz_rpy(
@@ -275,6 +283,7 @@ fn lumped_mass(
         None => at,
         Some(name) => find_point(rig, file, name, log)?,
     };
+    // The moment of a lumped mass may act at another point, but only on the same body.
     if let Some(name) = entry
         .moment_at
         .as_ref()
@@ -306,6 +315,7 @@ fn joint(rig: &Rig, item: &FileItem<RigJointEntry>, log: &mut RigLog) -> RigJoin
         equations: Vec::new(),
         motion: None,
     };
+    // Each error returns the joint without equations, so that its name still exists.
     let Some(kind) = joint::RigJointKind::from_name(entry.kind.get_ref()) else {
         log.unknown_name(
             file,
@@ -320,6 +330,7 @@ fn joint(rig: &Rig, item: &FileItem<RigJointEntry>, log: &mut RigLog) -> RigJoin
         find_body(rig, file, one, log),
         find_body(rig, file, two, log),
     );
+    // Without `axis` the joint's axis is z of the base frame.
     let axis = entry
         .axis
         .as_ref()
@@ -350,6 +361,7 @@ fn joint(rig: &Rig, item: &FileItem<RigJointEntry>, log: &mut RigLog) -> RigJoin
     let Some([from, to]) = joint_anchors(rig, file, entry, [first, second], log) else {
         return joint;
     };
+    // Directions of the equations are those of the nominal configuration, in the frames of both bodies.
     let nominal =
         |body: Option<usize>| body.map_or_else(BodyPose::identity, |b| rig.bodies[b].nominal);
     let parts = joint::equations(
@@ -372,6 +384,7 @@ fn joint_anchors(
     bodies: [Option<usize>; 2],
     log: &mut RigLog,
 ) -> Option<[BodyAnchor; 2]> {
+    // A place in the base frame becomes a place in the frame of a body, both in the nominal configuration.
     let nominal =
         |body: Option<usize>| body.map_or_else(BodyPose::identity, |b| rig.bodies[b].nominal);
     let on = |body: Option<usize>, p_W: Vector3<f64>| {
@@ -383,10 +396,12 @@ fn joint_anchors(
     };
     let whole = source_span(file, &entry.name.span());
     match (&entry.at, &entry.points) {
+        // The joint has one place in the base frame.
         (Some(at), None) => {
             let at = vector(file, Some(at), log);
             Some(bodies.map(|body| on(body, at)))
         }
+        // The joint has a point of one body, which gives the place on the other, or a point of each body.
         (None, Some(points)) => {
             let names = points.get_ref();
             let anchors: Vec<BodyAnchor> = names
@@ -441,6 +456,7 @@ fn length(rig: &Rig, file: usize, entry: &LengthEntry, log: &mut RigLog) -> Opti
         to: to?,
         shape: PairQuantity::Distance,
     };
+    // Two points of one body never move relative to each other.
     if pair.from.body == pair.to.body {
         log.error(
             source_span(file, &entry.to.span()),
@@ -457,6 +473,7 @@ fn length(rig: &Rig, file: usize, entry: &LengthEntry, log: &mut RigLog) -> Opti
 fn coordinate(rig: &mut Rig, item: &FileItem<RigCoordinateEntry>, log: &mut RigLog) {
     let (file, entry) = (item.file, &item.entry);
     let nominal = entry.nominal.as_ref().map(|n| *n.get_ref());
+    // Only a joint has a nominal value of its own.
     if let Some(wrong) = entry
         .nominal
         .as_ref()
@@ -469,10 +486,12 @@ fn coordinate(rig: &mut Rig, item: &FileItem<RigCoordinateEntry>, log: &mut RigL
             "",
         );
     }
+    // A coordinate measures either a joint or the distance of two points.
     let measures = match (&entry.joint, &entry.length) {
         (Some(name), None) => find_joint(rig, file, name, log).and_then(|joint| {
             let poses: Vec<BodyPose> = rig.bodies.iter().map(|body| body.nominal).collect();
             let motion = rig.joints[joint].motion.as_mut()?;
+            // The reference of the joint is shifted so that its value in the nominal configuration is the stated one.
             if let Some(nominal) = nominal {
                 joint::set_nominal(motion, nominal, &poses);
             }
@@ -494,6 +513,7 @@ fn coordinate(rig: &mut Rig, item: &FileItem<RigCoordinateEntry>, log: &mut RigL
 /// Adds a drive.
 fn drive(rig: &mut Rig, item: &FileItem<RigDriveEntry>, log: &mut RigLog) {
     let (file, entry) = (item.file, &item.entry);
+    // A drive acts either in a joint or along the distance of two points.
     let measures = match (&entry.joint, &entry.linear) {
         (Some(name), None) => {
             find_joint(rig, file, name, log).and_then(|joint| rig.joints[joint].motion)
@@ -537,6 +557,7 @@ fn effect(rig: &Rig, item: &FileItem<RigEffectEntry>, log: &mut RigLog) -> Optio
         .iter()
         .map(|(name, value)| (name.get_ref().as_str(), *value.get_ref()))
         .collect();
+    // Programs construct effects through the same function; here its faults get their places in the file.
     let faults = match rig.effect(entry.kind.get_ref(), &at, &values) {
         Ok(effect) => return Some(effect),
         Err(faults) => faults,

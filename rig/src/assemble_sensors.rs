@@ -13,6 +13,7 @@ pub(crate) fn channels<'a>(
     log: &mut RigLog,
 ) -> Vec<SensorChannel> {
     let names: Vec<&str> = names.map(|name| name.get_ref().as_str()).collect();
+    // Without a sensor a channel is ideal: no noise, no quantisation, no delay.
     let mut channels = vec![SensorChannel::default(); names.len()];
     for item in items {
         let channel = channel(item, what, log);
@@ -30,6 +31,7 @@ pub(crate) fn channels<'a>(
 fn channel(item: &FileItem<SensorEntry>, what: &str, log: &mut RigLog) -> SensorChannel {
     let (file, entry) = (item.file, &item.entry);
     let mut resolution = not_negative(file, entry.resolution.as_ref(), "a resolution", log);
+    // A resolution is given directly, by the bits of an encoder, or by that of a current.
     let ways = usize::from(entry.resolution.is_some())
         + usize::from(entry.bits.is_some())
         + usize::from(entry.current.is_some());
@@ -50,6 +52,7 @@ fn channel(item: &FileItem<SensorEntry>, what: &str, log: &mut RigLog) -> Sensor
                 "an encoder with `bits = 20` resolves 2^20 angles per revolution",
             );
         } else {
+            // A full revolution, in rad, divided into 2^bits steps.
             resolution = 2.0 * std::f64::consts::PI / (1_u64 << bits.get_ref()) as f64;
         }
     }
@@ -62,6 +65,7 @@ fn channel(item: &FileItem<SensorEntry>, what: &str, log: &mut RigLog) -> Sensor
                 "`current` belongs to a `[[force_sensor]]`",
             );
         }
+        // Resolution of a current in A times the force per ampere, N/A or N m/A.
         resolution = above_zero(file, &current.force_per_ampere, "a force per ampere", log)
             * above_zero(file, &current.resolution, "a resolution", log);
     }

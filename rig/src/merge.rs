@@ -11,19 +11,33 @@ use crate::log::{FileItem, RigLog};
 pub(crate) struct MergedRig {
     /// Name of the last variant.
     pub(crate) name: String,
+    /// Description in one line; empty if no file has one.
     pub(crate) title: String,
+    /// Acceleration of gravity in the base frame, m/s^2.
     pub(crate) gravity: Option<FileItem<SpannedTriple>>,
+    /// Seed of the noise.
     pub(crate) seed: Option<u64>,
+    /// Samples per second, Hz.
     pub(crate) rate: Option<FileItem<toml::Spanned<f64>>>,
+    /// Whether a recording contains rates and accelerations.
     pub(crate) derivatives: Option<bool>,
+    /// Rigid bodies.
     pub(crate) bodies: Vec<FileItem<BodyEntry>>,
+    /// Named points of bodies.
     pub(crate) points: Vec<FileItem<RigPointEntry>>,
+    /// Masses at points of bodies.
     pub(crate) lumped_masses: Vec<FileItem<RigLumpedMassEntry>>,
+    /// Joints between bodies.
     pub(crate) joints: Vec<FileItem<RigJointEntry>>,
+    /// Coordinates that a trajectory prescribes.
     pub(crate) coordinates: Vec<FileItem<RigCoordinateEntry>>,
+    /// Drives, one per degree of freedom.
     pub(crate) drives: Vec<FileItem<RigDriveEntry>>,
+    /// Friction and other effects.
     pub(crate) effects: Vec<FileItem<RigEffectEntry>>,
+    /// Encoders of coordinates.
     pub(crate) encoders: Vec<FileItem<SensorEntry>>,
+    /// Force sensors of drives.
     pub(crate) force_sensors: Vec<FileItem<SensorEntry>>,
 }
 
@@ -68,6 +82,7 @@ impl MergedRig {
             ),
             drives: collect_items(file, entry.drive, "drive", |e| Some(&e.name), log),
             effects: collect_items(file, entry.effect, "effect", |e| e.name.as_ref(), log),
+            // Sensors have no names of their own: a later one replaces an earlier one when channels are assembled.
             encoders: collect_items(file, entry.encoder, "encoder", |_| None, log),
             force_sensors: collect_items(file, entry.force_sensor, "force sensor", |_| None, log),
         }
@@ -75,6 +90,7 @@ impl MergedRig {
 
     /// Adds the entries of a variant.
     pub(crate) fn extend(&mut self, variant: Self) {
+        // Single values of the variant replace those of the base where it states them.
         self.name = variant.name;
         if !variant.title.is_empty() {
             self.title = variant.title;
@@ -94,6 +110,7 @@ impl MergedRig {
         });
         merge_items(&mut self.drives, variant.drives, |e| Some(&e.name));
         merge_items(&mut self.effects, variant.effects, |e| e.name.as_ref());
+        // Sensors are appended; the last one for a coordinate or a drive counts.
         self.encoders.extend(variant.encoders);
         self.force_sensors.extend(variant.force_sensors);
     }
@@ -110,6 +127,7 @@ fn collect_items<T>(
     let mut seen: Vec<&str> = Vec::new();
     for found in entries.iter().filter_map(&name) {
         let text = found.get_ref().as_str();
+        // Names become column names and references, so they are words that do not start with a digit.
         let is_word = text.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
             && text.chars().next().is_some_and(|c| !c.is_ascii_digit());
         if !is_word || text == "base" {
@@ -146,6 +164,7 @@ fn merge_items<T>(
     name: impl Fn(&T) -> Option<&RigName>,
 ) {
     for item in variant {
+        // Entries without a name never replace another.
         let twin = base.iter().position(|other| {
             name(&item.entry).is_some_and(|mine| {
                 name(&other.entry).is_some_and(|its| its.get_ref() == mine.get_ref())

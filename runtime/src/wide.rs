@@ -30,6 +30,7 @@ use crate::{Numbers, OutputSink, PoseError, Real};
 /// The widest vectors of the machine. The environment variable `MODELMILL_VECTORS` reduces them to `256` bits or
 /// `none`, so that the timings of a smaller machine can be measured on this one.
 fn widest_vectors() -> Arch {
+    /// Selected at the first call.
     static CHOSEN: OnceLock<Arch> = OnceLock::new();
     *CHOSEN.get_or_init(|| match std::env::var("MODELMILL_VECTORS").as_deref() {
         Ok("none") => Arch::Scalar,
@@ -42,6 +43,9 @@ fn widest_vectors() -> Arch {
 /// Passes a job on to the vectors that `pulp` selected.
 struct DispatchedJob<J, T>(J, core::marker::PhantomData<T>);
 
+// Defines vectors, their arithmetic and the run over a line for one scalar type. Arguments: the scalar, the line, names
+// of
+// the types to define, then the names that `pulp` gives to types and instructions for this scalar.
 macro_rules! wide {
     (
         $float:ty, $line:ident, $value:ident, $numbers:ident, $put:ident, $vectors:ident,
@@ -52,10 +56,13 @@ macro_rules! wide {
         /// One vector register of numbers.
         #[derive(Clone, Copy)]
         struct $value<S: Simd> {
+            /// Token that proves that the instructions exist.
             simd: S,
+            /// The register.
             v: S::$floats,
         }
 
+        // Plain operators; products that are fused with sums are below.
         wide!(operator $value, Add, add, $add);
         wide!(operator $value, Sub, sub, $sub);
         wide!(operator $value, Mul, mul, $mul);
@@ -74,11 +81,14 @@ macro_rules! wide {
 
         /// Arithmetic of a vector, and which of its lanes are regular.
         struct $numbers<S: Simd> {
+            /// Token that proves that the instructions exist.
             simd: S,
+            /// Mask with true for each lane without an exception so far.
             regular: Cell<S::$mask>,
         }
 
         impl<S: Simd> $numbers<S> {
+            /// All lanes are regular at first: `pulp` has no constant mask, so 0 < 1 makes one.
             #[inline(always)]
             fn new(simd: S) -> Self {
                 let (zero, one) = (simd.$splat(0.0), simd.$splat(1.0));
@@ -88,16 +98,19 @@ macro_rules! wide {
                 }
             }
 
+            /// A vector as a value of the program.
             #[inline(always)]
             fn value(&self, v: S::$floats) -> $value<S> {
                 $value { simd: self.simd, v }
             }
 
+            /// Marks lanes as irregular where the mask is false.
             #[inline(always)]
             fn mask_lanes(&self, mask: S::$mask) {
                 self.regular.set(self.simd.$and(self.regular.get(), mask));
             }
 
+            /// Whether no lane is irregular.
             #[inline(always)]
             fn is_all_regular(&self) -> bool {
                 let irregular = self.simd.$not(self.regular.get());
@@ -106,6 +119,7 @@ macro_rules! wide {
         }
 
         impl<S: Simd> $value<S> {
+            /// Another vector with the same token.
             #[inline(always)]
             fn with_vector(self, v: S::$floats) -> Self {
                 Self { simd: self.simd, v }
@@ -114,6 +128,7 @@ macro_rules! wide {
             /// A function that has no vector form, lane by lane.
             #[inline(always)]
             fn map_lanes(self, f: impl Fn($float) -> $float) -> Self {
+                // Lanes go through an array; lanes that the vector does not have stay zero.
                 let mut line = [0.0; $line::LENGTH];
                 if let Some(to) = S::$of_slice_mut(&mut line).0.first_mut() {
                     *to = self.v;
@@ -155,6 +170,7 @@ macro_rules! wide {
             fn sign(self) -> Self {
                 let simd = self.simd;
                 let (zero, one) = (simd.$splat(0.0), simd.$splat(1.0));
+                // The first selection returns NaN and 0 unchanged.
                 let below = simd.$select(simd.$less(self.v, zero), simd.$splat(-1.0), self.v);
                 self.with_vector(simd.$select(simd.$greater(self.v, zero), one, below))
             }
@@ -168,6 +184,7 @@ macro_rules! wide {
             }
             #[inline(always)]
             fn atan2(self, x: Self) -> Self {
+                // The other argument is read from an array, lane after lane.
                 let mut line = [0.0; $line::LENGTH];
                 if let Some(to) = S::$of_slice_mut(&mut line).0.first_mut() {
                     *to = x.v;
@@ -192,6 +209,7 @@ macro_rules! wide {
             fn sin_cos(&self, angle: impl Term<$value<S>>) -> (Var<$value<S>>, Var<$value<S>>) {
                 let angle = angle.get();
                 let (simd, largest) = (self.simd, <$float as Real>::from_f64(LARGEST_ANGLE));
+                // Larger angles need another reduction than the kernel has, so their states are evaluated one by one.
                 self.mask_lanes(simd.$less(simd.$abs(angle.v), simd.$splat(largest)));
                 let (sin, cos) = angle.sin_cos();
                 (Var(sin), Var(cos))
@@ -238,8 +256,11 @@ macro_rules! wide {
 
         /// Writes one vector of each line.
         struct $put<'a, S, const OUTPUTS: usize> {
+            /// Lines of all outputs.
             lines: &'a mut [$line; OUTPUTS],
+            /// Index of the vector in a line.
             part: usize,
+            /// Token that proves that the instructions exist.
             simd: S,
         }
 
@@ -253,6 +274,7 @@ macro_rules! wide {
             }
         }
 
+        /// Vectors of the width of the token `S`.
         #[derive(Clone, Copy)]
         struct $vectors<S>(S);
 
@@ -270,6 +292,7 @@ macro_rules! wide {
             {
                 let simd = self.0;
                 let mut regular = true;
+                // A line consists of one or several vectors, each of which runs the program once.
                 for part in 0..$line::LENGTH / S::$lanes {
                     let numbers = $numbers::new(simd);
                     let zero = simd.$splat(0.0);
@@ -285,6 +308,7 @@ macro_rules! wide {
                             sum = simd.$add(sum, simd.$abs(*v));
                         }
                     }
+                    // Inputs that are NaN or too large make their lanes irregular.
                     numbers.mask_lanes(simd.$less(sum, simd.$splat(<$float as Real>::largest())));
                     let lines = &mut *outputs;
                     let mut put = $put { lines, part, simd };
@@ -388,6 +412,7 @@ wide!(
 );
 
 impl<S: Simd> Wide64<S> {
+    /// Sine and cosine of angles in rad below [`LARGEST_ANGLE`].
     #[inline(always)]
     fn sin_cos(self) -> (Self, Self) {
         reduced_sin_cos(self)
@@ -418,6 +443,7 @@ impl<S: Simd> Wide64<S> {
 impl<S: Simd> lanes::LaneAngle for Wide64<S> {
     #[inline(always)]
     fn rotate_by_quarters(shifted: Self, sin: Self, cos: Self) -> (Self, Self) {
+        // In odd quarters sine and cosine change places; the signs depend on the quarter, one later for the cosine.
         let simd = shifted.simd;
         let one = simd.splat_u64s(1);
         let quarter = simd.transmute_u64s_f64s(shifted.v);
@@ -441,6 +467,7 @@ impl<S: Simd> Wide32<S> {
         if let Some(to) = S::as_mut_simd_f32s(&mut line).0.first_mut() {
             *to = self.v;
         }
+        // One loop per step, so that each can be vectorised.
         for k in 0..S::F32_LANES.min(Line32::LENGTH) {
             angle[k] = f64::from(line[k]);
         }
