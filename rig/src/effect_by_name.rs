@@ -48,13 +48,21 @@ impl std::error::Error for EffectFault {}
 /// The places where a kind may act.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum AllowedPlaces {
+    /// Drives, coordinates of joints, and joints with one coordinate.
     DrivesAndJoints,
+    /// Drives only, because the effect needs the load.
     Drives,
+    /// Two of the places that [`Self::DrivesAndJoints`] allows.
     TwoDrivesOrJoints,
+    /// Drives along the distance of two points.
     LinearDrives,
+    /// Points of bodies other than the base.
     Points,
+    /// Two points of one body.
     TwoPointsOfABody,
+    /// The word `base`.
     Base,
+    /// The word `force`: the signals of all drives.
     Force,
 }
 
@@ -132,6 +140,7 @@ impl Rig {
                 help: format!("known are {}", name_list(&RigLaw::KINDS)),
             }]);
         };
+        // Values in the order of the kind; missing ones take their default, and all errors are collected.
         let mut faults = Vec::new();
         let mut numbers = Vec::new();
         for value in known {
@@ -171,6 +180,7 @@ impl Rig {
             }
             numbers.extend(number);
         }
+        // Symbols that the kind does not have.
         let symbols: Vec<&str> = known.iter().map(|value| value.symbol).collect();
         for (symbol, _) in values
             .iter()
@@ -183,6 +193,7 @@ impl Rig {
                 help: format!("known are {}", name_list(&symbols)),
             });
         }
+        // Places are checked even if values are wrong, so that one call reports all errors.
         let places = self.places(kind, at, &mut faults);
         match RigLaw::new(kind, &numbers) {
             Some(law) if faults.is_empty() => Ok(RigEffect { law, places }),
@@ -206,6 +217,7 @@ impl Rig {
             };
             places.push(place);
         }
+        // A kind with a fixed number of places needs exactly that many, any other at least one.
         let wanted = acts.n_places().unwrap_or(at.len().max(1));
         let mut wrong = at.len() != wanted;
         if let [RigPlace::Point(a), RigPlace::Point(b)] = places[..]
@@ -226,6 +238,7 @@ impl Rig {
 
     /// The place of a name among the allowed ones.
     fn place(&self, acts: AllowedPlaces, name: &str) -> Option<RigPlace> {
+        // The joint that a coordinate measures.
         let joint = |pair: &PairFunction| {
             self.joints
                 .iter()
@@ -244,6 +257,7 @@ impl Rig {
                         .iter()
                         .position(|j| j.name == name && j.motion.is_some())
                 };
+                // Drives come first, then the joints of coordinates, then joints by their own names.
                 drive()
                     .map(RigPlace::Drive)
                     .or_else(|| {
@@ -279,6 +293,7 @@ impl Rig {
             _ => drives.chain(coordinates).chain(joints).collect(),
         };
         all.into_iter()
+            // Candidates pass the same test as the name itself.
             .filter(|name| self.place(acts, name).is_some())
             .collect()
     }

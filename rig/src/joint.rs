@@ -11,11 +11,17 @@ use crate::pose::{BodyMotion, BodyPose};
 /// The motion that a joint allows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum RigJointKind {
+    /// No motion.
     Fixed,
+    /// Rotation about the axis.
     Revolute,
+    /// Displacement along the axis.
     Prismatic,
+    /// Rotation about the axis and displacement along it.
     Cylindrical,
+    /// Rotation about the place.
     Spherical,
+    /// Displacement in the plane perpendicular to the axis, and rotation about the axis.
     Planar,
     /// A point of the second body is on a line of the first.
     PointOnLine,
@@ -61,12 +67,17 @@ pub(crate) fn equations(
     poses: [BodyPose; 2],
 ) -> (Vec<(PairFunction, f64)>, Option<PairFunction>) {
     let (u, v) = perpendicular_axes(axis);
+    // `on` gives a direction of the base frame in the frame of either body.
     let on = |side: usize, direction: &Vector3<f64>| poses[side].q_WB.inverse() * direction;
     let pair = |shape| PairFunction { from, to, shape };
+    // The two places coincide.
     let coincident =
         || [Vector3::x(), Vector3::y(), Vector3::z()].map(|n| pair(PairQuantity::Component(n)));
+    // The place on the second body is on the axis of the first.
     let on_line = || [&u, &v].map(|n| pair(PairQuantity::Along(on(0, n))));
+    // The axes of both bodies are parallel.
     let parallel = || [&u, &v].map(|n| pair(PairQuantity::Cosine(on(0, n), on(1, axis))));
+    // The bodies do not rotate relative to each other: three pairs of perpendicular directions.
     let locked = || {
         [(&u, &v), (&v, axis), (axis, &u)]
             .map(|(a, b)| pair(PairQuantity::Cosine(on(0, a), on(1, b))))

@@ -31,6 +31,7 @@ pub(crate) fn gravity(rig: &Rig) -> Vector3<f64> {
 fn rotation_from_vector(by: Vector3<f64>) -> Matrix3<f64> {
     let angle = by.norm();
     if angle == 0.0 {
+        // R = 1 + K sin(angle) + K^2 (1 - cos(angle)), with K the cross-product matrix of the unit axis.
         return Matrix3::identity();
     }
     let k = (by / angle).cross_matrix();
@@ -46,6 +47,7 @@ pub(crate) fn inertial_forces(
     gravity: &Vector3<f64>,
     add: &mut impl FnMut(usize, Vector3<f64>, Vector3<f64>),
 ) {
+    // A force at a place of a body acts on the body with its moment about the body's origin; the base takes any force.
     let mut push = |anchor: &BodyAnchor, force: Vector3<f64>| {
         if let Some(body) = anchor.body {
             add(
@@ -58,6 +60,7 @@ pub(crate) fn inertial_forces(
     match effect.law {
         RigLaw::PointMass { m } => {
             for place in &effect.places {
+                // Newton: m (a - g) at each place.
                 if let Some(anchor) = point_anchor(rig, *place) {
                     let a = anchor_motion(motion, &anchor).point_acceleration(&anchor.at);
                     push(&anchor, m * (a - gravity));
@@ -68,6 +71,7 @@ pub(crate) fn inertial_forces(
             let [true_place, seen] = effect.places[..] else {
                 return;
             };
+            // The force stays the same; only its moment is that of the mass at the second point instead of the first.
             if let (Some(from), Some(to)) = (point_anchor(rig, true_place), point_anchor(rig, seen))
                 && let Some(body) = from.body
             {
@@ -84,6 +88,7 @@ pub(crate) fn inertial_forces(
         }
         RigLaw::RodInertia { m, c, I } => {
             for place in &effect.places {
+                // A rod goes from the first point of a drive to the second.
                 if let Some(pair) = place.pair(rig) {
                     let [pivot, slide] =
                         rod_forces(motion, [&pair.from, &pair.to], m, c, I, gravity);
@@ -113,6 +118,7 @@ fn rod_forces(
             moves.point_acceleration(&anchor.at),
         ]
     });
+    // Vector from the pivot to the guide, with its rate and acceleration.
     let [d, dd, ddd] = [0, 1, 2].map(|k| two[k] - one[k]);
     let length = d.norm();
     if length == 0.0 {
@@ -126,8 +132,10 @@ fn rod_forces(
     let udd = (ddd - acceleration * u - 2.0 * rate * ud) / length;
     // The rod does not rotate about itself, so its angular acceleration is u x u''.
     let alpha = u.cross(&udd);
+    // Newton's equation for the centre, at distance c from the pivot, and Euler's equation about the pivot.
     let force = m * (one[2] + c * udd - gravity);
     let moment = c * u.cross(&force) + inertia * alpha;
+    // The guide balances the moment by a force perpendicular to the rod; the pivot takes the rest of the force.
     let slide = moment.cross(&u) / length;
     [force - slide, slide]
 }
@@ -156,6 +164,7 @@ pub(crate) fn energy(rig: &Rig, motion: &RigMotion, gravity: &Vector3<f64>) -> f
                 RigLaw::PointMass { m } => {
                     if let Some(anchor) = point_anchor(rig, *place) {
                         let moves = anchor_motion(motion, &anchor);
+                        // Kinetic energy minus the potential of gravity.
                         sum += m
                             * (0.5 * moves.point_velocity(&anchor.at).norm_squared()
                                 - gravity.dot(&moves.point_position(&anchor.at)));
@@ -170,6 +179,7 @@ pub(crate) fn energy(rig: &Rig, motion: &RigMotion, gravity: &Vector3<f64>) -> f
                                 moves.point_velocity(&anchor.at),
                             ]
                         });
+                        // Direction of the rod and its rate.
                         let d = two[0] - one[0];
                         let u = d / d.norm();
                         let dd = two[1] - one[1];

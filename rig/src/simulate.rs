@@ -143,9 +143,11 @@ pub fn forces_along(
 /// Fails if the drives cannot balance a load.
 pub fn forces(rig: &Rig, motion: &RigMotion) -> Result<Vec<f64>, RigPoseError> {
     let mechanical = drive_forces(rig, motion, &[])?;
+    // Without effects the mechanics alone gives the forces.
     if rig.effects.is_empty() {
         return Ok(mechanical);
     }
+    // Motion at a place; a place without a coordinate has none.
     let measured = |place: RigPlace| {
         place
             .pair(rig)
@@ -154,6 +156,7 @@ pub fn forces(rig: &Rig, motion: &RigMotion) -> Result<Vec<f64>, RigPoseError> {
     // Programs may construct places directly: an index out of range has no effect.
     let load = |drive: usize| mechanical.get(drive).copied().unwrap_or(0.0);
     let mut at_drives = vec![0.0; rig.drives.len()];
+    // Effects at drives add to the result; those in joints become loads of a second solution.
     let mut in_joints: Vec<(&PairFunction, f64)> = Vec::new();
     for effect in &rig.effects {
         for (place, force) in effect.forces(measured, load) {
@@ -169,6 +172,7 @@ pub fn forces(rig: &Rig, motion: &RigMotion) -> Result<Vec<f64>, RigPoseError> {
     }
     let mut forces = if in_joints.is_empty() {
         mechanical
+    // With loads in joints the balance is solved once more.
     } else {
         drive_forces(rig, motion, &in_joints)?
     };
@@ -209,6 +213,7 @@ pub fn simulate(
             forces_along(rig, trajectory, &earlier, &mut progress)?,
         ));
     }
+    // Delays are compared bit by bit, since they come from the same numbers.
     let at = |delay: f64| {
         past.iter()
             .find(|(known, _)| known.to_bits() == delay.to_bits())
@@ -222,6 +227,7 @@ pub fn simulate(
         GaussianNoise::new(seed, channel)
     };
     let names = rig.coordinates.iter().map(|c| c.name.as_str());
+    // Columns: time, readings of the encoders, derivatives, readings of the force sensors.
     let mut columns = vec![("t".to_owned(), times)];
     for (k, (name, encoder)) in names.clone().zip(&rig.sensors.encoders).enumerate() {
         let mut noise = noise();
@@ -265,6 +271,7 @@ fn check_finite(rig: &Rig, columns: &[(String, Vec<f64>)]) -> Result<(), Simulat
         let at = values.iter().position(|value| !value.is_finite())?;
         Some((at, name))
     });
+    // The earliest fault of all columns is reported.
     let Some((at, column)) = first.min_by_key(|(at, _)| *at) else {
         return Ok(());
     };

@@ -17,13 +17,14 @@ pub(super) fn to_parent(
 ) -> SymbolicWrench {
     let mut moment = moment_before_axis_offset(graph, style, link, wrench);
     let mut force = wrench.force;
+    // On the moving side the wrench is in the axes after the joint's rotation.
     if side == JointSide::Moving {
         force = graph.rotate_out(&link.joint, &force);
         moment = graph.rotate_out(&link.joint, &moment);
     }
     let force = rotate_into_outer(graph, &link.pre, &force);
     let turned = rotate_into_outer(graph, &link.pre, &moment);
-    // Steiner's rule: the force acts at a distance from the parent's origin.
+    // The force also has a moment about the parent's origin.
     let (across, _) = style.split_position(link);
     let lever = graph.cross(&across, &force);
     let moment = graph.add_vectors(&[turned, lever]);
@@ -106,6 +107,7 @@ pub(crate) fn carry_wrench(
                 rows.add_free_body_wrench(graph, body, &wrench);
                 break;
             }
+            // Joints from the base to this one.
             let path = tree.path_to(Some(i));
             // All of a wrench is needed at a free body at the base, and the joints on the way cost little more.
             let hangs_free = tree.links[path[0]].free.is_some();

@@ -41,6 +41,7 @@ impl BodyInertia {
             mass: element(InertiaElement::Mass),
             force_moment: [0, 1, 2].map(|i| element(InertiaElement::ForceMoment(i))),
             moment_moment: [0, 1, 2].map(|i| element(InertiaElement::MomentMoment(i))),
+            // Elements are stored in the order xx, xy, xz, yy, yz, zz.
             spread: InertiaDiagonal::Moments([0, 3, 5].map(inertia)),
             products: [4, 2, 1].map(inertia),
         }
@@ -159,6 +160,7 @@ pub(crate) fn wrenches(
 ) -> Vec<(usize, JointSide, SymbolicWrench)> {
     let mut wrenches = Vec::new();
     for (i, body) in bodies {
+        // A link without children.
         let is_end = !tree.links.iter().any(|link| link.parent == Some(*i));
         let mut on_fixed_side = || {
             // Only the moments of flat bodies do not need the angular acceleration.

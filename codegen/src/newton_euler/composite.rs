@@ -43,6 +43,8 @@ impl CompositeInertia {
     fn from_body(graph: &mut Graph, body: &BodyInertia) -> Self {
         let square = match body.spread {
             InertiaDiagonal::Flat([x, y]) => [x, y, Graph::ZERO],
+            // The moment about an axis is the sum of the two other second moments, so each of those is half a
+            // combination of all.
             InertiaDiagonal::Moments(moments) => std::array::from_fn(|i| {
                 let half = Rational::new(1, 2);
                 let (j, k) = ((i + 1) % 3, (i + 2) % 3);
@@ -93,6 +95,7 @@ impl CompositeInertia {
 
     /// The inertia in the axes from which the present axes are rotated by `turn`.
     fn rotate(&self, graph: &mut Graph, turn: &AxisRotation) -> Self {
+        // The other two axes, in cyclic order.
         let axis = turn.axis as usize;
         let (i, j) = ((axis + 1) % 3, (axis + 2) % 3);
         let (c, s) = graph.cos_sin(&turn.sum, turn.pi12);
@@ -134,6 +137,7 @@ impl CompositeInertia {
     /// The inertia of a link about the origin and in the axes of its parent.
     fn to_parent(self, graph: &mut Graph, style: RecursionStyle, link: &TreeLink) -> Self {
         let (across, along) = style.split_position(link);
+        // The link's transformation backwards: offset along the joint's axis, rotations, offset before them.
         let mut moments = self.shift_origin(graph, &[Graph::ZERO, Graph::ZERO, along]);
         for turn in link.pre.iter().chain([&link.joint]).rev() {
             moments = moments.rotate(graph, turn);
@@ -143,6 +147,7 @@ impl CompositeInertia {
 
     /// The wrench that accelerates the body about z by 1 rad/s^2, at standstill.
     fn rotation_wrench(&self, graph: &mut Graph) -> SymbolicWrench {
+        // Force: z x first moment. Moment: the column z of the inertia matrix.
         let [x, y, _] = self.first;
         let [yz, xz, _] = self.mixed;
         SymbolicWrench {
@@ -226,6 +231,7 @@ pub(crate) fn mass_matrix(
         if coordinates.is_empty() {
             continue;
         }
+        // Motion m of link m / 2: rotation about z if m is even, translation along z if it is odd.
         let moments = composite[m / 2];
         let wrench = if m % 2 == 0 {
             moments.rotation_wrench(graph)
@@ -317,12 +323,13 @@ fn free_body_block(
         let mut along = vector::ZERO;
         along[k % 3] = Graph::ONE;
         let axes = if k < 3 { body.linear } else { body.angular };
+        // Axes of the twist are those of the body or of the world.
         let along = free::to_body(graph, body, axes, &along);
         let (force, moment) = if k < 3 {
             let force = graph.scale_vector(carried.mass, &along);
             (force, graph.cross(&carried.first, &along))
-        // Angular acceleration: the moment is the inertia matrix times the axis.
         } else {
+            // Angular acceleration: the moment is the inertia matrix times the axis.
             let moment = std::array::from_fn(|i| {
                 let (j, l) = ((i + 1) % 3, (i + 2) % 3);
                 let about = graph.add(carried.square[j], carried.square[l]);
@@ -337,6 +344,7 @@ fn free_body_block(
             (graph.cross(&along, &carried.first), moment)
         };
         let wrench = [force, moment].concat();
+        // Entries below the diagonal follow from symmetry.
         let column = free_body_forces(graph, body, &wrench);
         entries.extend(column.take(k + 1).map(|(c, entry)| (c, d, entry)));
     }

@@ -18,9 +18,11 @@ impl ForceRows {
 
     /// Adds a moment about a link's axis (N m) and a force along it (N) to the link's coordinates.
     pub(super) fn add_joint_force(&mut self, link: &TreeLink, moment: ExprId, force: ExprId) {
+        // Coordinates that rotate the link take the moment, each with its integer factor.
         for (coordinate, n) in &link.turns {
             self.0[*coordinate].push((moment, Rational::integer(i64::from(*n))));
         }
+        // Coordinates that displace it take the force, each with its rational factor.
         for (coordinate, k) in &link.slides {
             self.0[*coordinate].push((force, k.clone()));
         }
@@ -33,8 +35,10 @@ impl ForceRows {
         body: &FreeBody,
         wrench: &SymbolicWrench,
     ) {
+        // Force and moment are needed in the axes in which the body's rates are given.
         let force = free::from_body(graph, body, body.linear, &wrench.force);
         let moment = free::from_body(graph, body, body.angular, &wrench.moment);
+        // Rows of the position for the force, and three rows of the quaternion for the moment.
         let [_, qx, qy, qz] = body.quaternion;
         let rows = body.position.into_iter().chain([qx, qy, qz]);
         for (i, component) in rows.zip(force.into_iter().chain(moment)) {
@@ -71,6 +75,7 @@ pub(super) fn moment_before_axis_offset(
     wrench: &SymbolicWrench,
 ) -> SymbolicVector {
     let (_, along) = style.split_position(link);
+    // The offset is along z, so it changes the moments about x and y only.
     let [mx, my, mz] = wrench.moment;
     let (x, y) = (
         graph.mul(along, wrench.force[1]),
