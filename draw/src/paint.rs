@@ -105,7 +105,7 @@ fn describe_scene(scene: &MechanismScene) -> String {
         ("closed loop", count(|s| matches!(s, MarkShape::Closing(_)))),
         ("lumped mass", count(|s| matches!(s, MarkShape::Lump(..)))),
     ];
-    // Plural forms of the names of shapes.
+    // Several marks of a kind are counted in the plural.
     let counts = kinds.iter().filter(|(_, n)| *n > 0).map(|(what, n)| {
         let many = match (n, what.strip_suffix("between points")) {
             (1, _) => (*what).to_owned(),
@@ -202,8 +202,7 @@ impl<'a> DrawingSheet<'a> {
             let colour = body_colour(mark.body);
             let group = format!("<g class=\"{colour}\"><title>{title}</title>{drawing}</g>\n");
             // In a plane nothing is hidden, so the kinds of marks are drawn in a fixed order. In space, symbols are
-            // slightly in front of
-            // the bars on which they are.
+            // drawn slightly in front of the bars on which they are.
             let layer = drawing_layer(&mark.shape);
             if scene.plane.is_some() {
                 drawn.push((layer, 0.0, group));
@@ -292,6 +291,7 @@ impl<'a> DrawingSheet<'a> {
     /// A bar or thin line; empty if it points at the viewer.
     fn paint_segment(&self, class: &str, ends: &[Vector3<f64>; 2], is_ground: bool) -> String {
         let [a, b] = ends.each_ref().map(|at| self.project_point(at));
+        // Shorter than half a unit of the picture.
         if (a[0] - b[0]).hypot(a[1] - b[1]) < 0.5 {
             return String::new();
         }
@@ -319,6 +319,7 @@ impl<'a> DrawingSheet<'a> {
             28.0,
             ["x", "y", "z"],
         ));
+        // A round length of about a fifth of the width.
         let length = round_length(0.2 * width / self.scale);
         let (x, y) = (width - 14.0, height - 14.0);
         _ = writeln!(

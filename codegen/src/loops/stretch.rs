@@ -27,6 +27,7 @@ pub(crate) fn path_segments(
 ) -> Vec<PathSegment> {
     let mut turns = start.to_vec();
     let mut path = Vec::new();
+    // Each link adds its origin in the frame of its parent, then its own rotations.
     for &i in links {
         let link = &tree.links[i];
         path.push(PathSegment {
@@ -48,6 +49,7 @@ pub(crate) fn fixed_rotations(tree: &KinematicTree, links: &[usize]) -> Option<V
     let mut turns = Vec::new();
     for &i in links {
         let link = &tree.links[i];
+        // Rotations before a joint are fixed, and so is that of a joint that is not revolute.
         for turn in &link.pre {
             push_rotation(&mut turns, turn);
         }
@@ -114,6 +116,7 @@ impl PointPairPath<'_> {
         graph: &mut Graph,
         tree: &KinematicTree,
         start: &[AxisRotation],
+    // Both paths start in the common frame.
     ) -> Vec<PathSegment> {
         let [first, second] =
             [0, 1].map(|i| path_segments(tree, self.paths[i], start, &self.at[i]));
@@ -165,6 +168,7 @@ pub(crate) fn distance_squared(
     // The frame whose expression has the fewest nodes is kept.
     let mut best: Option<(usize, ExprId)> = None;
     let mut try_frame = |graph: &mut Graph, turns: &[AxisRotation]| {
+        // The vector between the points, in the frame that `turns` leads to.
         let path = between.segments(graph, tree, &inverse_rotations(turns));
         let along = sum_segments(graph, &path);
         let square = graph.dot(&along, &along);
@@ -173,6 +177,7 @@ pub(crate) fn distance_squared(
             best = Some((size, square));
         }
     };
+    // The common frame itself is tried first, then the frames after each rotation on the way to either point.
     try_frame(graph, &[]);
     for path in between.paths {
         let mut turns = Vec::new();

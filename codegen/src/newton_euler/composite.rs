@@ -344,7 +344,7 @@ fn free_body_block(
             (graph.cross(&along, &carried.first), moment)
         };
         let wrench = [force, moment].concat();
-        // Entries below the diagonal follow from symmetry.
+        // Entries below the diagonal are determined by symmetry.
         let column = free_body_forces(graph, body, &wrench);
         entries.extend(column.take(k + 1).map(|(c, entry)| (c, d, entry)));
     }

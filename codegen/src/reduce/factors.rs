@@ -68,6 +68,7 @@ pub(super) fn n_quotients(
         .iter()
         .filter(|r| r.has_retained_only());
     let direct: Vec<ColumnRelation> = direct.cloned().collect();
+    // Only relations to retained columns have factors on retained columns.
     let mut oracle = MotionFactorOracle {
         regressor,
         dependences,
@@ -98,6 +99,7 @@ fn factors_by_relations(
             budget: &mut *budget,
         };
         let mut survey = DependenceSurvey::new(&mut oracle, variables, roots, stream)?;
+        // A relation to retained columns is needed by all that use its column.
         let wanted: Vec<(usize, bool)> = (chosen.iter())
             .flat_map(|r| std::iter::repeat_n(r.has_retained_only(), r.len()))
             .enumerate()
@@ -142,6 +144,7 @@ fn factors_by_relations(
             written[k] = function;
         }
     }
+    // Every factor on a retained column becomes a line of its own.
     let pairs = dependences.wanted.iter().zip(written);
     let line = |((column, p), factor): (&(usize, usize), _)| DependentColumn {
         column: *column,
@@ -181,6 +184,7 @@ impl PrimeFieldOracle for MotionFactorOracle<'_> {
         let at_once = rank * rank * self.regressor.n_columns;
         let one_by_one: usize = self.relations.iter().map(|r| (r.len() + 1).pow(3)).sum();
         self.charge(at_once.min(one_by_one))?;
+        // One relation at a time: its columns at as many points as the survey of dependences used.
         if one_by_one < at_once {
             let mut rows = Vec::new();
             for _ in 0..self.dependences.n_points {
@@ -226,6 +230,7 @@ impl PrimeFieldOracle for RelationFactorOracle<'_> {
         &mut self,
         constants: &FieldPoint<FieldElement<P>>,
     ) -> Result<Vec<FieldElement<P>>, DeriveError> {
+        // An estimate: a thousand operations per factor.
         self.charge(1000 * self.wanted.len())?;
         let values = self.related.values(&self.wanted, constants);
         values.ok_or(DeriveError::RankChanged)

@@ -49,6 +49,7 @@ pub(super) struct DependenceSurvey<O> {
     shapes: Vec<FunctionShape>,
     /// Fields in which coefficients are computed, with their samples.
     fields: PrimeFields<O>,
+    /// Points with some of the constants at the origin, shared by all functions.
     partial: PartialSamples,
 }
 
@@ -93,6 +94,7 @@ impl<O: PrimeFieldOracle> DependenceSurvey<O> {
         wanted: &[(usize, bool)],
         stream: &mut RandomStream,
     ) -> Result<Vec<Option<RationalFunction>>, DeriveError> {
+        // Only the requested functions take part in the steps below.
         let (origin, shapes) = (&self.origin, &mut self.shapes);
         let indices: Vec<usize> = wanted.iter().map(|(k, _)| *k).collect();
         // Degrees in single constants, then in all lengths together, then coefficients.
@@ -118,6 +120,7 @@ impl<O: PrimeFieldOracle> DependenceSurvey<O> {
                 &self.roots,
                 stream,
             )?;
+            // Other functions are not used without a needed one, so no work is spent on them.
             let resists = function.is_none();
             found.push(function);
             if resists && *is_needed {
@@ -151,6 +154,7 @@ fn vary_constants<O: PrimeFieldOracle>(
 ) -> Result<Vec<VariedConstant>, DeriveError> {
     let mut all = Vec::with_capacity(constants.len());
     for &constant in constants {
+        // All constants stay at the origin except for this one.
         let mut point = origin.clone();
         let at = stream.next_element();
         set_constant(&mut point, constant, at);
@@ -183,6 +187,7 @@ fn independent_groups<'a>(
     let mut groups: Vec<Vec<&VariedConstant>> = Vec::new();
     for one in moved {
         let depends = |k: &usize| shapes[*k].degrees.contains_key(&one.constant);
+        // Constants without effect on the requested functions need no degrees.
         let own: Vec<usize> = functions.iter().copied().filter(depends).collect();
         if own.is_empty() {
             continue;
@@ -239,6 +244,7 @@ fn probe_degrees<O: PrimeFieldOracle>(
             let mut x = places[*i].clone();
             let mut y = vec![one.values[*k]];
             y.extend(sampled.iter().map(|row| row[*k]));
+            // The origin is one more point; an angle of half a turn has no tangent there.
             if let Some(start) = constant_value(origin, one.constant) {
                 x.push(start);
                 y.push(at_origin[*k]);
@@ -283,6 +289,7 @@ pub(super) fn n_quotients<O: PrimeFieldOracle>(
         let (mut x, mut y): (Vec<FieldElement>, Vec<Vec<FieldElement>>) = Default::default();
         let mut open: Vec<usize> = Vec::new();
         while x.len() < MOST_POINTS {
+            // The origin of this line with the chosen lengths multiplied by t.
             let (t, mut point) = (stream.next_element(), origin.clone());
             for atom in &growing {
                 point.values.insert(*atom, origin.values[atom] * t);
@@ -318,6 +325,7 @@ pub(super) fn n_quotients<O: PrimeFieldOracle>(
                 break;
             }
         }
+        // Functions without a degree below the limit count as quotients.
         for k in open {
             has_sum[k] = true;
         }
@@ -356,6 +364,7 @@ fn total_degrees<O: PrimeFieldOracle>(
         })
         .collect();
     while !open.is_empty() && x.len() < MOST_POINTS {
+        // All lengths move along a line at once; angles stay at the origin.
         let mut point = origin.clone();
         let t = stream.next_element();
         for (index, slope) in lengths.iter().zip(&direction) {
@@ -381,6 +390,7 @@ fn set_constant(point: &mut FieldPoint, (index, in_angle): ConstantOccurrence, t
     let atom = Atom::Constant(index);
     if !in_angle {
         point.values.insert(atom, t);
+    // An angle whose tangent t has 1 + t^2 = 0 in the field does not exist and leaves the point unchanged.
     } else if let Some(scale) = (FieldElement::ONE + t * t).inverse() {
         point
             .angles
@@ -398,5 +408,6 @@ fn constant_value(
         return point.values.get(&atom).copied();
     }
     let (cosine, sine) = point.angles.get(&atom)?;
+    // tan(a/2) = sin a / (1 + cos a).
     Some(*sine * (FieldElement::ONE + *cosine).inverse()?)
 }
