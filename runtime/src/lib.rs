@@ -1,4 +1,5 @@
-//! What emitted models need at run time: a trait for `f32` and `f64`, the errors of a pose, and Newton's method on loops.
+//! What emitted models need at run time: a trait for `f32` and `f64`, the errors of a pose, and Newton's method on
+//! loops.
 //!
 //! There is no allocation and no unsafe code here, and without the feature `std` no standard library either.
 //!

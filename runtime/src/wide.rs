@@ -44,8 +44,7 @@ fn widest_vectors() -> Arch {
 struct DispatchedJob<J, T>(J, core::marker::PhantomData<T>);
 
 // Defines vectors, their arithmetic and the run over a line for one scalar type. Arguments: the scalar, the line, names
-// of
-// the types to define, then the names that `pulp` gives to types and instructions for this scalar.
+// of the types to define, then the names that `pulp` gives to types and instructions for this scalar.
 macro_rules! wide {
     (
         $float:ty, $line:ident, $value:ident, $numbers:ident, $put:ident, $vectors:ident,

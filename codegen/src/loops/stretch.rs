@@ -116,8 +116,8 @@ impl PointPairPath<'_> {
         graph: &mut Graph,
         tree: &KinematicTree,
         start: &[AxisRotation],
-    // Both paths start in the common frame.
     ) -> Vec<PathSegment> {
+        // Both paths start in the common frame.
         let [first, second] =
             [0, 1].map(|i| path_segments(tree, self.paths[i], start, &self.at[i]));
         let mut path = first;

@@ -7,8 +7,8 @@ use num_bigint::BigInt;
 use super::simplify;
 use super::symbol::FormulaSymbol;
 
-/// Largest number of terms of a sum in which like terms are collected. The search is quadratic, so longer sums are printed
-/// without it.
+/// Largest number of terms of a sum in which like terms are collected. The search is quadratic, so longer sums are
+/// printed without it.
 const MOST_COMPARED: usize = 100;
 use crate::expr::Rational;
 

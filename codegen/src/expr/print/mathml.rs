@@ -1,6 +1,7 @@
 //! Formulas as presentation MathML, readable by any browser without scripts.
 //!
-//! A [`PrintedFormula`] goes in. The content of one `math` element comes out, or of several between which lines may end.
+//! A [`PrintedFormula`] goes in. The content of one `math` element comes out, or of several between which lines may
+//! end.
 
 use std::fmt::Write;
 
