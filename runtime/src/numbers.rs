@@ -1,7 +1,7 @@
 //! The arithmetic of an emitted program: one number at a time, or as many as a vector register of the machine takes.
 //!
-//! A program is written once, for [`Numbers`]. With [`One`] it is the function of one state; with the vectors of
-//! [`crate::blocks`] it runs over many states at once.
+//! A program is written once, for [`Numbers`]. With [`ScalarNumbers`] it is the function of one state; with the vectors
+//! of [`crate::blocks`] it runs over many states at once.
 //!
 //! Decision: an emitted program is generic over what computes, so that vectors cost no second copy to parse and
 //! check. They are instantiated where a user calls them; `modelmill-generated` compiles no vector code. The Panda's
