@@ -41,7 +41,7 @@ pub enum SimulationError {
         /// Those of the trajectory.
         trajectory: usize,
     },
-    /// The rig does not stand in its nominal configuration.
+    /// The rig cannot be assembled in its nominal configuration.
     Nominal(RigPoseError),
     /// It cannot reach a pose of the trajectory.
     Pose {
