@@ -205,7 +205,7 @@ impl Polynomial {
 ///
 /// The value must be finite.
 pub fn exact_decimal(value: f64) -> BigRational {
-    assert!(value.is_finite(), "{value} is no number");
+    assert!(value.is_finite(), "{value} is not finite");
     let text = format!("{value:e}");
     let (digits, exponent) = text.split_once('e').expect("an exponent is printed");
     let exponent: i32 = exponent.parse().expect("a small exponent");

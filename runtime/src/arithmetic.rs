@@ -154,7 +154,7 @@ macro_rules! terms {
             functions! {
                 sqrt "Square root."
                 abs "Absolute value."
-                sign "-1, 0 or 1; what is no number stays what it is."
+                sign "-1, 0 or 1; NaN stays NaN."
                 tanh "Hyperbolic tangent."
                 exp "Exponential."
             }
