@@ -19,7 +19,7 @@ impl GaussianNoise {
         self.0.above_zero()
     }
 
-    /// Normal with mean zero and deviation one (G. Box, M. Muller 1958).
+    /// Normal distribution with mean zero and standard deviation one (G. Box, M. Muller 1958).
     pub fn normal(&mut self) -> f64 {
         self.0.normal()
     }

@@ -1,8 +1,9 @@
-//! The prime fields in which the mill decides what depends on what.
+//! The prime fields in which linear dependence is decided: integers modulo a prime, with random elements.
 //!
-//! The moduli lie just below 2^61 and are 23 modulo 24, so that square roots are one power. The primes up to 13 have
-//! roots in all of them: the sines and cosines of all multiples of pi/12 exist there, and most roots that a model file
-//! writes down. One field finds everything but long coefficients; the others lend them more digits.
+//! The moduli are just below 2^61 and are 23 modulo 24, so a square root is a single power. The primes up to 13 have
+//! roots in all of them. So the sines and cosines of all multiples of pi/12 exist there, and most square roots in model
+//! files. One field is sufficient for everything except long coefficients, for which the other fields give additional
+//! digits.
 
 mod extension;
 mod number;
@@ -10,6 +11,7 @@ mod number;
 use std::ops::{Add, Mul, Neg, Sub};
 
 use modelmill_runtime::{RandomBits, scramble_bits};
+
 use num_bigint::BigInt;
 use num_traits::{Signed, ToPrimitive};
 
@@ -18,7 +20,7 @@ pub use number::FieldNumber;
 
 use crate::Rational;
 
-/// The moduli.
+/// The moduli, in the order in which they are used.
 pub const PRIMES: [u64; 8] = [
     (1 << 61) - 11_913,
     (1 << 61) - 14_241,
@@ -30,10 +32,10 @@ pub const PRIMES: [u64; 8] = [
     (1 << 61) - 30_873,
 ];
 
-/// The modulus that is used unless another one is named.
+/// The modulus that is used by default.
 pub const MODULUS: u64 = PRIMES[0];
 
-/// An element of the field with `P` elements, always below `P`.
+/// An element of the field with `P` elements, stored as a number below `P`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 pub struct FieldElement<const P: u64 = MODULUS>(u64);
 
@@ -49,7 +51,7 @@ impl<const P: u64> FieldElement<P> {
         if value < 0 { -magnitude } else { magnitude }
     }
 
-    /// The smallest representative that is not negative.
+    /// The smallest non-negative representative.
     pub fn representative(self) -> u64 {
         self.0
     }
@@ -82,6 +84,7 @@ impl<const P: u64> FieldElement<P> {
     #[must_use]
     pub fn power(self, mut exponent: u64) -> Self {
         let (mut base, mut result) = (self, Self::ONE);
+        // Repeated squaring.
         while exponent > 0 {
             if exponent & 1 == 1 {
                 result = result * base;
@@ -97,7 +100,7 @@ impl<const P: u64> FieldElement<P> {
         if self.0 == 0 {
             return None;
         }
-        // Extended Euclid: far fewer steps than a power of 61 bits. The cofactors stay below the modulus.
+        // Extended Euclid: far fewer steps than a power with 61 bits. The cofactors stay below the modulus.
         let (mut r0, mut r1) = (P, self.0);
         let (mut t0, mut t1) = (0_i64, 1_i64);
         while r1 != 0 {
@@ -106,13 +109,14 @@ impl<const P: u64> FieldElement<P> {
             let q = i64::try_from(q).expect("a quotient below 2^61");
             (t0, t1) = (t1, t0 - q * t1);
         }
-        // Two folds of a number between -P and P.
+        // The cofactor lies between -P and P.
         let inverse = Self(t0.unsigned_abs() % P);
         Some(if t0 < 0 { -inverse } else { inverse })
     }
 
-    /// A square root if there is one.
+    /// A square root, if there is one; one of two for all elements but zero.
     pub fn square_root(self) -> Option<Self> {
+        // For P = 3 modulo 4 this power is a root of every square.
         let root = self.power(P.div_ceil(4));
         (root * root == self).then_some(root)
     }
@@ -120,7 +124,9 @@ impl<const P: u64> FieldElement<P> {
 
 /// The element congruent to a number below 2^124.
 #[inline]
+/// A product of two elements modulo `P`. As `P` is just below 2^61, the upper bits are folded onto the lower ones.
 fn reduce<const P: u64>(x: u128) -> FieldElement<P> {
+    // The lower 61 bits.
     const MASK: u64 = (1 << 61) - 1;
     let excess = (1 << 61) - P;
     #[expect(
@@ -201,7 +207,8 @@ impl<const P: u64> Mul for FieldElement<P> {
     }
 }
 
-/// A reproducible stream of elements: the same seed gives the same model text on any machine.
+/// A reproducible stream of random elements (SplitMix64, Steele 2014): the same seed gives the same model text on every
+/// machine.
 #[derive(Clone, Debug)]
 pub struct RandomStream(RandomBits);
 
@@ -232,7 +239,7 @@ impl RandomStream {
     }
 }
 
-/// A value that depends on `key` and `seed` alone and otherwise looks random.
+/// A pseudorandom element that depends on `key` and `seed` alone.
 pub fn hash_element<const P: u64>(seed: u64, key: FieldElement<P>) -> FieldElement<P> {
     let mut stream = RandomStream::new(scramble_bits(seed ^ scramble_bits(key.0)));
     stream.next_element()

@@ -43,6 +43,7 @@ pub trait EvaluationDomain {
 /// The nodes that some roots need, in the order of evaluation.
 #[derive(Clone, Debug)]
 pub struct EvaluationTape {
+    /// Nodes, operands before the nodes that use them.
     steps: Vec<TapeStep>,
     /// Operands of sums and products, one step after the other.
     operands: Vec<TapeOperand>,
@@ -89,7 +90,9 @@ enum OperandKind {
 impl EvaluationTape {
     /// Collects what `roots` need.
     pub fn new(graph: &Graph, roots: &[ExprId]) -> Self {
+        // The position of nodes that are not on the tape.
         const NOWHERE: u32 = u32::MAX;
+        // Position on the tape of every node of the graph.
         let mut positions = vec![NOWHERE; graph.len()];
         let (mut places, mut divisors) = (FxHashMap::default(), FxHashMap::default());
         let mut tape = Self {
@@ -106,6 +109,7 @@ impl EvaluationTape {
             }
             positions[i] = index(tape.steps.len());
             let start = index(tape.operands.len());
+            // Operands precede their nodes, so their positions are known.
             let mut place = |rationals: &mut Vec<Rational>, value: &Rational| {
                 *places.entry(value.clone()).or_insert_with(|| {
                     rationals.push(value.clone());
@@ -179,6 +183,7 @@ impl EvaluationTape {
         let operands =
             |range: &Range<u32>| &self.operands[range.start as usize..range.end as usize];
         for step in &self.steps {
+            // Values of operands are known, since the tape has them before their nodes.
             let value = match step {
                 TapeStep::Rational(place) => rationals[*place as usize].clone(),
                 TapeStep::Atom(atom) => domain.atom(*atom)?,
@@ -187,6 +192,7 @@ impl EvaluationTape {
                 TapeStep::Sum(terms) => {
                     let mut total: Option<D::Value> = None;
                     for operand in operands(terms) {
+                        // Products with 1 are skipped: they are the most frequent ones.
                         let value = &values[operand.step as usize];
                         let scaled = match operand.kind {
                             OperandKind::Scaled(k) => {
@@ -238,6 +244,7 @@ fn index(position: usize) -> u32 {
     u32::try_from(position).expect("tape below 4G nodes")
 }
 
+/// Double-precision evaluation; the values of atoms come from a function.
 /// Floating-point evaluation; atoms come from a function.
 pub struct FloatDomain<F: Fn(Atom) -> f64>(
     /// Value of an atom.
@@ -255,6 +262,7 @@ impl<F: Fn(Atom) -> f64> EvaluationDomain for FloatDomain<F> {
     fn mul(&self, a: &f64, b: &f64) -> f64 {
         a * b
     }
+    // Zero to a power of zero or below has no value.
     fn power(&self, a: &f64, n: i32) -> Option<f64> {
         (*a != 0.0 || n > 0).then(|| a.powi(n))
     }
@@ -312,7 +320,9 @@ impl<N: FieldNumber> FieldPoint<N> {
         }
     }
 
+    /// An opaque sign of a field number: 1 or -1 drawn from the number itself, odd in it, and zero for zero.
     fn sign(&self, a: N) -> N {
+        // The value is drawn for the smaller of a and -a, so that sign(-a) = -sign(a).
         let (key, odd) = canonical_sign(a);
         let value = if key.hash_bits(self.seed) & 1 == 0 {
             N::ONE
@@ -337,13 +347,14 @@ impl<N: FieldNumber> FieldPoint<N> {
     }
 }
 
-/// The smaller of `a` and `-a`, and whether it was `-a`.
+/// The smaller of `a` and `-a` in the order of the field, and whether that is `-a`.
 fn canonical_sign<N: FieldNumber>(a: N) -> (N, bool) {
     if (-a) < a { (-a, true) } else { (a, false) }
 }
 
 impl<N: FieldNumber> EvaluationDomain for FieldPoint<N> {
     type Value = N;
+    // The number 1 is the most frequent factor, so it skips the general conversion.
     fn rational(&self, value: &Rational) -> Option<N> {
         if value.is_one() {
             return Some(N::ONE);
@@ -368,6 +379,7 @@ impl<N: FieldNumber> EvaluationDomain for FieldPoint<N> {
     }
     fn unary(&self, function: Unary, a: &N) -> Option<N> {
         match function {
+            // A prime field has no positive root: a drawn bit decides between the two.
             // One fixed choice per radicand: equal radicands must have equal roots.
             Unary::Sqrt => a.square_root().map(|root| {
                 let flip = a.hash_bits(self.root_seed) & 1 == 1;
@@ -379,6 +391,7 @@ impl<N: FieldNumber> EvaluationDomain for FieldPoint<N> {
             }),
             Unary::Sign => Some(self.sign(*a)),
             Unary::Abs => Some(*a * self.sign(*a)),
+            // tanh is an opaque odd function.
             Unary::Tanh => {
                 let (key, odd) = canonical_sign(*a);
                 let value = key.hash_with_seed(self.seed ^ 0x7461_6E68);
@@ -393,6 +406,7 @@ impl<N: FieldNumber> EvaluationDomain for FieldPoint<N> {
         self.values.get(&atom).copied()
     }
     fn cos_sin(&self, angle: &AtomAngleSum) -> Option<(N, N)> {
+        // Angles are added one unit at a time by the addition theorems.
         let mut total = (N::ONE, N::ZERO);
         for (atom, n) in angle.terms() {
             let (c, s) = *self.angles.get(atom)?;
@@ -430,6 +444,7 @@ impl EvaluationDomain for RationalPoint {
     }
     fn unary(&self, function: Unary, a: &Rational) -> Option<Rational> {
         match function {
+            // The sign of zero is zero.
             Unary::Sign if a.is_zero() => Some(Rational::ZERO),
             Unary::Sign => Some(if a.is_negative() {
                 Rational::MINUS_ONE
@@ -437,12 +452,14 @@ impl EvaluationDomain for RationalPoint {
                 Rational::ONE
             }),
             Unary::Abs => Some(a.abs()),
+            // Rational only where numerator and denominator of the reduced fraction are squares.
             Unary::Sqrt => {
                 let big = a.to_big();
                 let (n, d) = (big.numer().sqrt(), big.denom().sqrt());
                 let root = num_rational::BigRational::new(n, d);
                 (&root * &root == big).then(|| Rational::from(root))
             }
+            // These functions have no rational values except at single points.
             Unary::Tanh | Unary::Exp | Unary::Sin | Unary::Cos => None,
         }
     }
@@ -450,6 +467,7 @@ impl EvaluationDomain for RationalPoint {
         self.values.get(&atom).cloned()
     }
     fn cos_sin(&self, angle: &AtomAngleSum) -> Option<(Rational, Rational)> {
+        // Addition theorems, as in the prime field.
         let mut total = (Rational::ONE, Rational::ZERO);
         for (atom, n) in angle.terms() {
             let (c, s) = self.angles.get(atom)?;

@@ -1,4 +1,4 @@
-//! Models and rigs of the paper's robot, which are part of the crate so that it needs no files.
+//! Models and rigs of the paper's robot. They are part of the crate, so that it needs no files.
 
 use std::path::Path;
 
@@ -6,7 +6,7 @@ use modelmill::files::{FileSource, MemoryFiles};
 use modelmill::{Error, Host, Model, Outcome};
 use modelmill_spec::bundled::{MODELS, RIGS};
 
-/// Files that are part of the program.
+/// Bundled files as a source of files.
 fn files(bundled: &[(&str, &str)]) -> MemoryFiles {
     let all = bundled.iter();
     all.fold(MemoryFiles::default(), |files, (name, text)| {
@@ -14,7 +14,7 @@ fn files(bundled: &[(&str, &str)]) -> MemoryFiles {
     })
 }
 
-/// The text of one of them.
+/// The text of one bundled file.
 fn text(bundled: &[(&str, &str)], wanted: &str) -> Outcome<String> {
     let found = files(bundled).read_text(Path::new(wanted), u64::MAX);
     found.map_err(Error::input)
@@ -25,7 +25,8 @@ pub(crate) fn model(host: &Host, name: &str) -> Outcome<Model> {
     variant(host, name, name, &text(&MODELS, name)?)
 }
 
-/// Reads the text of a model file, called `file`, that may extend bundled ones; `name` is what the model is called.
+/// Derives a model from the text of a file, called `file`, that may extend bundled ones. `name` is its name in
+/// messages.
 pub(crate) fn variant(host: &Host, name: &str, file: &str, own: &str) -> Outcome<Model> {
     let loaded = modelmill_spec::load(file, own, &files(&MODELS))?;
     host.derive(name, loaded)

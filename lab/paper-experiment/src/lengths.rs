@@ -1,7 +1,7 @@
-//! The same test motion for other distances of the base joints, a length that the paper does not print: how large the
-//! error of the paper's treatment is beside the forces depends on it.
+//! The same test motion for other distances of the base joints, a length that the paper does not print. The size of the
+//! error of the paper's treatment relative to the forces depends on it.
 //!
-//! The consistent treatment stands for the rig here, with which it agrees to rounding.
+//! The consistent treatment represents the rig here, since both agree up to rounding.
 
 use modelmill_identify::excite::{ExcitationMotion, FourierSeries};
 use modelmill_identify::{PreparationRecord, PreparedRun};
@@ -12,24 +12,24 @@ use modelmill::along;
 use modelmill::stretch::RecordingSegment;
 use modelmill::{Host, Outcome};
 
-/// Samples of the period.
+/// Number of samples of the period.
 const SAMPLES: usize = 1000;
 /// Distances of the base joints, cm.
 const DISTANCES: [i32; 10] = [10, 20, 30, 40, 50, 60, 70, 80, 90, 100];
 
-/// Errors for one distance of the base joints.
+/// Errors of the paper's treatment for one distance of the base joints.
 pub(crate) struct DistanceErrors {
-    /// b, m.
+    /// The distance b, m.
     pub(crate) distance: f64,
-    /// Of each drive.
+    /// Errors of each drive.
     pub(crate) errors: Vec<DriveErrors>,
 }
 
-/// The errors for every distance at which the loops close all along.
+/// The errors for every distance at which the loops close along the complete motion.
 ///
-/// Fails only when whoever watches stops it.
+/// Fails only if the user cancels it.
 pub(crate) fn scan(host: &Host, series: &[FourierSeries]) -> Outcome<Vec<DistanceErrors>> {
-    host.run_job("trying other lengths", DISTANCES.len(), |job| {
+    host.run_job("comparing other distances", DISTANCES.len(), |job| {
         let distances = DISTANCES.iter().map(|cm| f64::from(*cm) / 100.0);
         distances
             .filter_map(|distance| {
@@ -40,13 +40,16 @@ pub(crate) fn scan(host: &Host, series: &[FourierSeries]) -> Outcome<Vec<Distanc
     })
 }
 
+/// The errors at one distance; fails if the loops do not close.
 fn errors_at(host: &Host, series: &[FourierSeries], distance: f64) -> Outcome<DistanceErrors> {
+    // A variant of a bundled model with another constant b.
     let variant = |of: &str| {
         let text = format!(
             "schema = 1\nname = \"other_length\"\nextends = \"{of}\"\n[constants]\nb = {{ value = {distance}, unit = \"m\" }}\n"
         );
         bundled::variant(host, of, "other-length.toml", &text)
     };
+    // One period of the motion as a recording without forces.
     let motion = ExcitationMotion::sample(series, SAMPLES);
     let period = series.first().map_or(0.0, FourierSeries::period);
     let time: Vec<f64> = (0..SAMPLES)

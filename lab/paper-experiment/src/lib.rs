@@ -1,5 +1,5 @@
-//! `experiment`: the paper's experiment, its Section 5, on the bundled rig: excitation, runs, both treatments of m4,
-//! Tables 1 and 2 beside the paper's, and where the errors come from, as one page.
+//! `experiment`: the paper's experiment, its Section 5, on the bundled rig. One page has the excitation, the runs, both
+//! treatments of m4, Tables 1 and 2 compared with the paper's, and the cause of the errors.
 //!
 //! Decision: every number and figure of `docs/experiment.html` comes from a run of the command. Coefficients of
 //! trajectories are rounded to four decimals before the simulation, so that the page can print what was used.
@@ -26,12 +26,12 @@ use serde_json::json;
 use runs::PeriodicTrajectory;
 use study::TreatmentStudy;
 
-/// How the experiment is made.
+/// Options of the experiment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ExperimentRequest {
     /// Random trajectories within the limits that the search for the excitation tries first.
     pub random: usize,
-    /// How many of the best random trajectories the search starts from.
+    /// Number of the best random trajectories from which the search starts.
     pub starts: usize,
     /// Seed of the search and of the test trajectory.
     pub seed: u64,
@@ -39,8 +39,9 @@ pub struct ExperimentRequest {
     pub rate: f64,
 }
 
-/// Everything that the page tells.
+/// All results that the page shows.
 pub struct PaperExperiment {
+    /// The model with the paper's treatment of m4.
     paper: Model,
     /// Excitation for identification, and the test trajectory for verification.
     trajectories: [PeriodicTrajectory; 2],
@@ -50,18 +51,20 @@ pub struct PaperExperiment {
     base: [Vec<f64>; 3],
     /// The error for other distances of the base joints.
     lengths: Vec<lengths::DistanceErrors>,
-    /// Samples per second.
+    /// Samples per second, Hz.
     rate: f64,
 }
 
 impl PaperExperiment {
-    /// Makes the experiment.
+    /// Runs the experiment.
     ///
-    /// Fails only when whoever watches stops it, or a search within the limits finds nothing.
+    /// Fails only if the user cancels it, or if no trajectory within the limits is found.
     pub fn new(host: &Host, args: &ExperimentRequest) -> Outcome<Self> {
+        // Both models come from the bundled files.
         let load = |name: &str| bundled::model(host, name);
         let paper = load("spidermill-paper.toml")?;
         let consistent = load("spidermill.toml")?;
+        // The excitation has as many harmonics and the same period as the paper's.
         let (harmonics, period) = printed::EXCITATION;
         let excitation = Options {
             harmonics,
@@ -71,7 +74,7 @@ impl PaperExperiment {
             seed: args.seed,
             ..Options::default()
         };
-        // A test is any lively motion; the best of a few random ones will do.
+        // Any motion with several harmonics is a test; the best of a few random ones is sufficient.
         let test = Options {
             harmonics: 5,
             period: 5.0,
@@ -80,10 +83,12 @@ impl PaperExperiment {
             seed: args.seed.wrapping_add(1),
             ..Options::default()
         };
+        // Both trajectories are within the limits of the paper's model.
         let trajectories = [
             runs::search(&paper, &excitation, "searching for the excitation")?,
             runs::search(&paper, &test, "drawing the test trajectory")?,
         ];
+        // Both treatments on one rig: identified on one run and verified on the other.
         let bench = |name: &str| -> Outcome<TreatmentStudy> {
             let rig = bundled::rig(name)?;
             let [identification, verification] = &trajectories;
@@ -97,6 +102,7 @@ impl PaperExperiment {
             bench("spidermill-full.toml")?,
             bench("spidermill-with-rods.toml")?,
         ];
+        // The consistent parameters of the paper's model are determined along the identification run.
         let rig = bundled::rig("spidermill-full.toml")?;
         let data = runs::run(&rig, &paper, &trajectories[0], args.rate)?;
         let base = [
@@ -104,6 +110,7 @@ impl PaperExperiment {
             study::consistent_values(&paper, &consistent, &data)?,
             study::values_with(&paper, &printed::ESTIMATED),
         ];
+        // The test motion once more, with other distances of the base joints.
         let lengths = lengths::scan(host, &trajectories[1].series)?;
         Ok(Self {
             lengths,
@@ -127,6 +134,7 @@ impl PaperExperiment {
             number(self.trajectories[0].condition_number),
             printed::CONDITION_NUMBER
         ))];
+        // One row per rig, run and treatment.
         let mut rows = Vec::new();
         for (bench, rig) in self.benches.iter().zip(["rig", "rig with rods"]) {
             for (along, run) in bench.runs.iter().zip(["identification", "verification"]) {
@@ -152,7 +160,7 @@ impl PaperExperiment {
             ("fe10", ColumnAlignment::Right),
             ("estimated fe1", ColumnAlignment::Right),
             ("fe10", ColumnAlignment::Right),
-            ("left without m4's shift", ColumnAlignment::Right),
+            ("residual without m4's shift", ColumnAlignment::Right),
         ];
         lines.extend(table(2, &columns, &rows));
         lines.join("\n")
@@ -160,6 +168,7 @@ impl PaperExperiment {
 
     /// All figures as one JSON object.
     pub fn json(&self) -> serde_json::Value {
+        // The same numbers for scripts.
         let bench = |bench: &TreatmentStudy| {
             let run = |k: usize| {
                 let along = &bench.runs[k];

@@ -1,4 +1,4 @@
-//! The page: words, tables and figures in the order in which they are told; one file without links to others.
+//! The page: text, tables and figures in their order, as one file without links to other files.
 
 use std::fmt::Write as _;
 
@@ -6,7 +6,7 @@ use crate::PaperExperiment;
 use modelmill::report;
 use modelmill::text::svg::escape;
 
-/// The page's text.
+/// The HTML of the page.
 pub(crate) fn render(experiment: &PaperExperiment) -> String {
     let mut page = ExperimentPage(report::begin_page(
         "The paper's experiment, reproduced and explained",
@@ -24,18 +24,21 @@ pub(crate) fn render(experiment: &PaperExperiment) -> String {
     page.0
 }
 
-/// The text so far.
+/// The HTML written so far.
 pub(crate) struct ExperimentPage(pub(crate) String);
 
 impl ExperimentPage {
+    /// Appends a heading of a chapter.
     pub(crate) fn heading(&mut self, text: &str) {
         let _ = writeln!(self.0, "<h2>{}</h2>", escape(text));
     }
 
+    /// Appends a paragraph.
     pub(crate) fn paragraph(&mut self, text: &str) {
         let _ = writeln!(self.0, "<p>{}</p>", escape(text));
     }
 
+    /// Appends a figure with its caption.
     pub(crate) fn figure(&mut self, svg: &str, caption: &str) {
         let _ = writeln!(
             self.0,
@@ -44,6 +47,7 @@ impl ExperimentPage {
         );
     }
 
+    /// Appends a table. Columns whose heading starts with `*` have the paper's own numbers.
     pub(crate) fn table(&mut self, head: &[&str], rows: &[Vec<String>]) {
         let is_number = |cell: &String| cell.starts_with(|c: char| c.is_ascii_digit() || c == '-');
         let class = |k: usize, cell: Option<&String>| {
@@ -59,7 +63,7 @@ impl ExperimentPage {
                 classes => format!(" class=\"{}\"", classes.join(" ")),
             }
         };
-        // A column is what its first row is.
+        // The first row decides whether a column has numbers.
         let first = |k: usize| rows.first().and_then(|row| row.get(k));
         self.0.push_str("<div class=\"wide\"><table>\n<thead><tr>");
         for (k, name) in head.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! Chapters 1 to 4 of the page: what is simulated, the errors of the forces, and what they are made of.
+//! Chapters 1 to 4 of the page: the simulated runs, the errors of the forces, and the cause of these errors.
 
 use crate::page::ExperimentPage;
 use crate::study::DriveColumns;
@@ -10,50 +10,58 @@ use modelmill::text::table::significant;
 const NEAR_ZERO: f64 = 0.1;
 
 impl ExperimentPage {
+    /// The summary at the top of the page.
     pub(crate) fn summary(&mut self, experiment: &PaperExperiment) {
         let plain = &experiment.benches[0].runs;
         let rods = &experiment.benches[1].runs;
         let [calculated, consistent, estimated] = &experiment.base;
         self.0.push_str("<div class=\"short\">\n");
+        // The result of the page: the reduction is exact, and the paper's error has one cause.
         self.paragraph(&format!(
-            "In short. The paper's reduced model misses the forces of its multibody model by 8 to 10 % before identification, \
-             and the paper blames the places of the lumped masses in general. Here the whole robot, 11 groups with true parallel \
-             cranks, is simulated by a program that shares no mechanics with the model. A reduced model that lets the platform's \
-             mass m4 act at one place agrees with it to {} without any identification: nothing is lost by the reduction. The \
-             paper's treatment, with the same masses, misses it by {} to {} (nrms), and {} of that error is the force of the one \
-             mass that the balance of moments sees elsewhere than the balance of forces. The size is not the paper's, for it depends on \
-             lengths and motions that the paper does not print (section 7); the cause is.",
+            "Summary. Before identification, the forces of the paper's reduced model differ from those of its \
+             multibody model by 8 to 10 %. The paper names the places of the lumped masses in general as the cause. \
+             Here the complete robot, 11 groups with true parallel cranks, is simulated by a program that shares no \
+             mechanics with the model. A reduced model in which the platform's mass m4 acts at one place agrees with \
+             it to {} without any identification: the reduction loses nothing. The paper's treatment, with the same \
+             masses, has an error of {} to {} (nrms). Of that error, {} is the force of one mass, m4, which the \
+             balance of moments places elsewhere than the balance of forces. The cause is that of the paper's error. \
+             The size differs, because it depends on lengths and motions that the paper does not print (section 7).",
             rounding(largest(plain, |along, d| along.errors(d, &along.calculated[1]).nrms)),
             percent(least(plain, |along, d| along.errors(d, &along.calculated[0]).nrms)),
             percent(largest(plain, |along, d| along.errors(d, &along.calculated[0]).nrms)),
             explained_text(plain),
         ));
+        // The same conclusion from the paper's own numbers.
         self.paragraph(&format!(
-            "The paper's own Table 1 says the same: p4,min = m4 (1 - dc3/d3), which is zero for a mass in one place, falls from \
-             {} kg to {} kg by identification (with d3 = 1.03 m; whatever d3 is, by more than {}), and p3,min and p5,min arrive \
-             within {} and {} of the consistent values.",
+            "The paper's own Table 1 agrees: p4,min = m4 (1 - dc3/d3), which is zero for a mass in one place, falls \
+             from {} kg to {} kg by identification (with d3 = 1.03 m; for any d3, by more than {}). p3,min and p5,min \
+             come within {} and {} of the consistent values.",
             significant(calculated[3], 3),
             significant(estimated[3], 3),
             percent(1.0 - printed::ESTIMATED[1].1 / nominal(experiment, "m4")),
             percent((estimated[2] / consistent[2] - 1.0).abs()),
             percent((estimated[4] / consistent[4] - 1.0).abs()),
         ));
+        // The part of the error that has another cause.
         self.paragraph(&format!(
-            "With spindles that have mass (rods of 8 kg), {} of the error of the paper's treatment (2-norm, verification run) is \
-             not m4, and that is the rods.",
+            "With spindles that have mass (rods of 8 kg), {} of the error of the paper's treatment (2-norm, \
+             verification run) is not caused by m4. This part comes from the rods.",
             percent(rods[1].explained_error().remains)
         ));
         self.0.push_str("</div>\n");
     }
 
+    /// Chapter 1: excitation, rigs and models.
     pub(crate) fn method(&mut self, experiment: &PaperExperiment) {
         let [excitation, test] = &experiment.trajectories;
-        self.heading("1  What was done");
+        self.heading("1  Method");
+        // The trajectories, so that the experiment can be repeated.
         self.paragraph(&format!(
-            "Excitation, eq. (14), (15) and (17): {} harmonics and a period of {} s, as in the paper, within the limits of \
-             spidermill.toml. The best of {} random trajectories has condition number {}, the one found {} (paper: {}). The test \
-             run is another, random series of {} harmonics and {} s. Coefficients are rounded to four decimals and printed at the \
-             end, so that the runs can be repeated without the search.",
+            "Excitation, eq. (14), (15) and (17): {} harmonics and a period of {} s, as in the paper, within the \
+             limits of spidermill.toml. The best of {} random trajectories has condition number {}, the optimised one \
+             {} (paper: {}). The test run is another random series, with {} harmonics and a period of {} s. \
+             Coefficients are rounded to four decimals and printed at the end, so that the runs can be repeated \
+             without the search.",
             excitation.series.first().map_or(0, |s| s.mu.len()),
             excitation.period,
             excitation.random,
@@ -63,18 +71,23 @@ impl ExperimentPage {
             test.series.first().map_or(0, |s| s.mu.len()),
             test.period,
         ));
+        // The rigs in the place of the paper's multibody model, and the two reduced models.
         self.paragraph(&format!(
-            "Both are run at {} Hz on two rigs: spidermill-full.toml, whose 11 groups sum up to Table 1, and \
-             spidermill-with-rods.toml, the same with a rod of 8 kg and 0.9 m in each spindle. The sensors are perfect, so \
-             whatever separates rig and model is the model's doing. Two reduced models are held against them: \
-             spidermill-paper.toml, which is eq. (5) and eq. (16) to the letter, and spidermill.toml, the consistent one.",
+            "Both are simulated at {} Hz on two rigs: spidermill-full.toml, whose 11 groups sum up to Table 1, and \
+             spidermill-with-rods.toml, the same with a rod of 8 kg and 0.9 m in each spindle. The sensors are \
+             perfect, so every difference between rig and model is a model error. Two reduced models are compared \
+             with them: spidermill-paper.toml, which is exactly eq. (5) and eq. (16), and spidermill.toml, the \
+             consistent one.",
             experiment.rate
         ));
+        // The difference between the two models.
         self.paragraph(
-            "What the paper does: half of m4 goes to each coupler. The coupler's balance of forces sees it at the joint R3m. The \
-             balance of moments about the elbow sees it at the coupler's centre of mass, as if it sat there. That is where the \
-             products m4 dc3 and m4 dc3^2 of eq. (5) come from; a mass at one place gives four base parameters instead of five.",
+            "The paper assigns half of m4 to each coupler. In the coupler's balance of forces it acts at the joint \
+             R3m. In the balance of moments about the elbow it acts at the coupler's centre of mass. This is the \
+             origin of the products m4 dc3 and m4 dc3^2 of eq. (5). A mass at one place gives four base parameters \
+             instead of five.",
         );
+        // Motion and forces of both runs.
         let drives = experiment.paper.drives();
         let runs = &experiment.benches[0].runs;
         for (k, title) in ["Identification run", "Verification run"]
@@ -89,23 +102,28 @@ impl ExperimentPage {
         }
     }
 
+    /// Chapter 2: errors of both treatments, compared with Table 2 of the paper.
     pub(crate) fn table_2(&mut self, experiment: &PaperExperiment) {
-        self.heading("2  Table 2, beside the paper's");
+        self.heading("2  Table 2, compared with the paper's");
+        // The measures of error: the paper's, and two without its peaks.
         self.paragraph(
-            "The paper's measure is the mean of |error| / |force|. It is dominated by the moments at which a force passes through \
-             zero (section 4), so the median of the same quotient and the nrms (2-norm of the error by that of the force) stand \
-             beside it.",
+            "The paper's measure is the mean of |error| / |force|. It is dominated by the times at which a force \
+             passes through zero (section 4). The tables therefore also show the median of the same quotient and the \
+             nrms (2-norm of the error divided by that of the force).",
         );
         let names = ["fe1, left", "fe10, right"];
+        // One table per treatment; only the first one has numbers of the paper.
         for (t, title) in ["The paper's treatment", "The consistent treatment"]
             .into_iter()
             .enumerate()
         {
             self.paragraph(&format!("{title}:"));
+            // One row per run, stage of identification, and drive.
             let mut rows = Vec::new();
             for (k, run) in ["identification", "verification"].into_iter().enumerate() {
                 for (s, stage) in ["calculated", "estimated"].into_iter().enumerate() {
                     for (d, name) in names.into_iter().enumerate() {
+                        // The paper's number first, then the errors on both rigs.
                         let mut row = vec![format!("{run}, {stage}, {name}")];
                         if t == 0 {
                             row.push(format!("{:.2} %", printed::TABLE_2[s][d][k]));
@@ -123,6 +141,7 @@ impl ExperimentPage {
                     }
                 }
             }
+            // Three measures of error for each of the two rigs.
             let columns = [
                 "rig: mean",
                 "median",
@@ -138,6 +157,7 @@ impl ExperimentPage {
             head.extend(columns);
             self.table(&head, &rows);
         }
+        // Errors over time on both rigs.
         let drives = experiment.paper.drives();
         self.figure(
             &figures::errors(
@@ -145,8 +165,8 @@ impl ExperimentPage {
                 &experiment.benches[0].runs[1],
                 &drives,
             ),
-            "All errors have one scale. Calculated: parameters of Table 1, left column; estimated: by least squares from the \
-             identification run. The consistent treatment has no error that could be seen.",
+            "All errors have one scale. Calculated: parameters of Table 1, left column; estimated: by least squares \
+             from the identification run. The consistent treatment has no visible error.",
         );
         self.figure(
             &figures::errors(
@@ -154,18 +174,22 @@ impl ExperimentPage {
                 &experiment.benches[1].runs[1],
                 &drives,
             ),
-            "What the spindles add: an error that the consistent treatment has too, and that identification lowers but cannot \
-             remove, for no base parameter is a rod.",
+            "The spindles add an error that the consistent treatment has as well. Identification lowers it but cannot \
+             remove it, because no base parameter represents a rod.",
         );
     }
 
+    /// Chapter 3: the error of the paper's treatment compared with the force of the misplaced mass.
     pub(crate) fn placement(&mut self, experiment: &PaperExperiment) {
         self.heading("3  The error of the paper's treatment is the force of the misplaced m4");
+        // Two independent ways to the same curve.
         self.paragraph(
-            "Take the forces of both reduced models with the parameters of Table 1 and subtract: what remains is what m4 makes at \
-             R3m and does not make where the paper's balance of moments has it. This needs no rig. The error of the paper's \
-             treatment needs the rig, which knows nothing of either model. Both are the same curve:",
+            "Subtract the forces of the two reduced models with the parameters of Table 1: the difference is the \
+             force of m4 at R3m minus its force where the paper's balance of moments places it. This needs no rig. \
+             The error of the paper's treatment needs the rig, which is independent of both models. Both are the same \
+             curve:",
         );
+        // Correlation and residual for each rig and run.
         let mut rows = Vec::new();
         for (bench, name) in experiment.benches.iter().zip(["rig", "rig with rods"]) {
             for (along, run) in bench.runs.iter().zip(["identification", "verification"]) {
@@ -182,11 +206,12 @@ impl ExperimentPage {
             &[
                 "run",
                 "correlation",
-                "left of the error (2-norm)",
+                "residual error (2-norm)",
                 "explained (squares)",
             ],
             &rows,
         );
+        // Error, explanation and residual over time.
         let drives = experiment.paper.drives();
         for (bench, title) in experiment.benches.iter().zip([
             "Verification run, rig as in Table 1",
@@ -199,18 +224,21 @@ impl ExperimentPage {
         }
     }
 
+    /// Chapter 4: the relative error where a force passes through zero.
     pub(crate) fn peaks(&mut self, experiment: &PaperExperiment) {
         self.heading("4  The peaks of the relative error");
+        // The left spindle in the verification run, since its force often passes through zero.
         let along = &experiment.benches[0].runs[1];
         let drives = experiment.paper.drives();
         let modelled = &along.calculated[0];
+        // Samples near zero, and their contribution to the mean relative error.
         let [samples, part] = along.near_zero(0, modelled, NEAR_ZERO);
         let errors = along.errors(0, modelled);
         self.paragraph(&format!(
-            "The paper remarks that peaks of the relative error arise where the force is close to zero. So it is: the force of the \
-             left spindle passes through zero {} times in this run, the error does not, and their quotient has no bound there. The \
-             {} of the samples with a force below {} of its root mean square make {} of the mean relative error. Without peaks, \
-             the typical error is the median, {}, against a mean of {}.",
+            "The paper remarks that peaks of the relative error arise where the force is close to zero. This is \
+             confirmed: the force of the left spindle passes through zero {} times in this run. The error does not, \
+             so their quotient is unbounded there. The {} of the samples with a force below {} of its root mean \
+             square cause {} of the mean relative error. The median, {}, is not affected by peaks; the mean is {}.",
             along.zeros(0).len(),
             percent(samples),
             percent(NEAR_ZERO),

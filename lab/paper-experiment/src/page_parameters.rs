@@ -1,5 +1,5 @@
-//! Chapters 5 to 7 of the page: what becomes of the parameters, where our numbers differ from the paper's, and the coefficients of
-//! the motions.
+//! Chapters 5 to 7 of the page: changes of the parameters, differences to the paper's numbers with their reasons, and
+//! the coefficients of the trajectories.
 
 use std::fmt::Write as _;
 
@@ -8,20 +8,24 @@ use crate::study::{self, UNKNOWN};
 use crate::wording::{decimals, largest, least, percent, share};
 use crate::{PaperExperiment, figures, printed};
 
-/// Least and largest of the paper's errors with calculated parameters, Table 2.
+/// Least and largest of the paper's errors with calculated parameters, from Table 2, as shares.
 const PAPER_ERRORS: [f64; 2] = [0.0782, 0.1020];
 
 impl ExperimentPage {
+    /// Chapter 5: base parameters before and after identification.
     pub(crate) fn base_parameters(&mut self, experiment: &PaperExperiment) {
-        self.heading("5  Base parameters: identification takes the mass back");
+        self.heading("5  Base parameters: identification corrects the place of the mass");
         let [calculated, consistent, estimated] = &experiment.base;
+        // Where the paper's estimate and ours move, compared with the consistent values.
         self.paragraph(
-            "The consistent treatment is a special case of eq. (16): the five values in column two make exactly its forces, with \
-             p4,min = 0. Identification under the paper's treatment finds them on the rig. The paper's own estimate, computed from \
-             the right column of its Table 1 with the lengths assumed here, goes the same way with all five. It overshoots in \
-             p1,min and p2,min, as ours does when the spindles are rods, which add to the inertia of the cranks; whether the paper's \
-             multibody model has such spindles it does not say.",
+            "The consistent treatment is a special case of eq. (16): the five values in column two give exactly its \
+             forces, with p4,min = 0. Identification with the paper's treatment arrives at these values on the rig. \
+             The paper's own estimate, computed from the right column of its Table 1 with the lengths assumed here, \
+             moves in the same direction for all five. It overshoots in p1,min and p2,min. So does ours when the \
+             spindles are rods, which add to the inertia of the cranks. The paper does not state whether its \
+             multibody model has such spindles.",
         );
+        // Estimates with the paper's treatment, without and with rods.
         let ours = [0, 1].map(|k| experiment.benches[k].fits[0].values());
         let units: Vec<&str> = experiment
             .paper
@@ -29,6 +33,7 @@ impl ExperimentPage {
             .iter()
             .map(|b| b.unit.as_str())
             .collect();
+        // Values that are zero up to rounding are printed as zero.
         let value = |x: f64| {
             if x.abs() < 1e-6 {
                 "0.000".to_owned()
@@ -36,6 +41,7 @@ impl ExperimentPage {
                 format!("{x:.3}")
             }
         };
+        // One row per base parameter.
         let rows: Vec<Vec<String>> = (0..calculated.len())
             .map(|k| {
                 vec![
@@ -59,19 +65,21 @@ impl ExperimentPage {
             ],
             &rows,
         );
+        // The change by the paper's own identification, explained by the misplaced mass along both runs.
         let runs = &experiment.benches[0].runs;
         let changes =
             [0, 1].map(|k| study::explain_error(&runs[k].printed_change(), &runs[k].placement()));
         self.figure(
             &figures::base_parameter_positions(experiment),
-            "0 is what the paper calculates from Table 1, 1 what the same masses give in one place. Values beyond 3 or below -0.1 \
-             stand at the edge.",
+            "0 is the value that the paper calculates from Table 1; 1 is the value of the same masses at one place. \
+             Values above 3 or below -0.1 are drawn at the edge.",
         );
+        // The same comparison in forces, which needs neither rig.
         self.paragraph(&format!(
-            "In forces: the difference that the paper's identification makes, its estimated against its calculated parameters put \
-             into eq. (16) along our runs, is for {} (identification run) and {} (verification run) the force of the misplaced m4, \
-             nothing fitted (squares; correlation {:.2} and {:.2}). No rig of ours takes part in this. The rest is that the paper's values do not \
-             stop at the consistent ones.",
+            "In forces: take the paper's estimated and calculated parameters, put both into eq. (16) along our runs, \
+             and subtract. Of this change, {} (identification run) and {} (verification run) is the force of the \
+             misplaced m4, without any fit (squares; correlation {:.2} and {:.2}). This does not use our rigs. The \
+             remainder is the amount by which the paper's values go beyond the consistent ones.",
             share(1.0 - changes[0].remains.powi(2)),
             share(1.0 - changes[1].remains.powi(2)),
             changes[0].correlation,
@@ -83,12 +91,15 @@ impl ExperimentPage {
                 &runs[1],
                 &experiment.paper.drives(),
             ),
-            "Estimated less calculated parameters of the paper's Table 1, in its own treatment.",
+            "Forces with the estimated parameters of the paper's Table 1 minus forces with its calculated ones, in \
+             its own treatment.",
         );
     }
 
+    /// Chapter 6: physical parameters, compared with Table 1 of the paper.
     pub(crate) fn table_1(&mut self, experiment: &PaperExperiment) {
-        self.heading("6  Table 1, beside the paper's");
+        self.heading("6  Table 1, compared with the paper's");
+        // The parameters that are assumed to be known, as in the paper.
         self.paragraph(
             "As in the paper, m1, m3 and dc1 are known and the others are solved from the five estimated base parameters; all real \
              solutions are given.",
@@ -100,6 +111,7 @@ impl ExperimentPage {
             "*paper's estimate".to_owned(),
         ];
         let names = ["rig", "with rods"];
+        // One column per rig and real solution.
         let mut columns: Vec<&[f64]> = Vec::new();
         for (bench, name) in experiment.benches.iter().zip(names) {
             for (k, one) in bench.physical.iter().enumerate() {
@@ -107,6 +119,7 @@ impl ExperimentPage {
                 columns.push(&one.values);
             }
         }
+        // One row per parameter that Table 1 determines.
         let rows: Vec<Vec<String>> = UNKNOWN
             .iter()
             .enumerate()
@@ -124,42 +137,50 @@ impl ExperimentPage {
             .collect();
         let head: Vec<&str> = head.iter().map(String::as_str).collect();
         self.table(&head, &rows);
+        // A rig without a real solution is explained in the text.
         for (bench, name) in experiment.benches.iter().zip(names) {
             if bench.physical.is_empty() {
                 let p4 = bench.fits[0].values()[3];
                 self.paragraph(&format!(
-                    "{name}: no real values of these five give the estimated base parameters. p4,min comes out as {p4:.2} kg; a \
-                     reduced model that lacks the rods puts what they do where it can.",
+                    "{name}: no real values of these five give the estimated base parameters. The estimate of p4,min \
+                     is {p4:.2} kg: the reduced model has no rods, so their effect goes into other parameters.",
                 ));
             }
         }
+        // Why no solution is the robot.
         self.paragraph(
-            "With p4,min = 0 the printed treatment allows m4 = 0 or dc3 = d3 only: the two solutions for the rig. Neither is the \
-             robot, whose m4 is 12.456 kg and dc3 0.515 m, and negative values show it. The equations are solved rightly; it is the \
-             treatment that has no place for the true masses. That fits the paper's remark that its \
-             estimates are not the real physical parameters (its dc3 moves from 0.515 m to 0.833 m, towards d3).",
+            "With p4,min = 0 the printed treatment allows only m4 = 0 or dc3 = d3: the two solutions for the rig. \
+             Neither is the robot, which has m4 = 12.456 kg and dc3 = 0.515 m; the negative values show this. The \
+             equations are solved correctly, but the treatment cannot represent the true masses. This agrees with the \
+             paper's remark that its estimates are not the real physical parameters (its dc3 moves from 0.515 m to \
+             0.833 m, towards d3).",
         );
     }
 
+    /// Chapter 7: reasons for other numbers than the paper's, and the influence of one length.
     pub(crate) fn differences(&mut self, experiment: &PaperExperiment) {
         self.heading("7  Where our numbers differ from the paper's, and why");
         let plain = &experiment.benches[0].runs;
+        // The size of the errors depends on lengths that the paper does not print.
         self.paragraph(&format!(
-            "The paper prints masses but no lengths, limits or coefficients. The lengths of spidermill.toml (d1, d3, b, dA, Bx, By) \
-             and both trajectories are assumptions, and they decide how large the errors are in per cent: before identification \
-             ours are {} to {} (nrms), and the mean relative error is {} to {}, far above the paper's 8 to 10 %: with these \
-             lengths the misplaced m4 is a larger part of the spindle forces, and these pass through zero often. So the size of the paper's errors is not reproduced here; \
-             what is reproduced is their cause.",
+            "The paper prints masses but no lengths, limits or coefficients. The lengths of spidermill.toml (d1, d3, \
+             b, dA, Bx, By) and both trajectories are assumptions, and they determine how large the errors are in per \
+             cent. Before identification ours are {} to {} (nrms), and the mean relative error is {} to {}, far above \
+             the paper's 8 to 10 %. With these lengths the misplaced m4 is a larger part of the spindle forces, and \
+             these pass through zero often. So this page reproduces the cause of the paper's errors, but not their \
+             size.",
             percent(least(plain, |a, d| a.errors(d, &a.calculated[0]).nrms)),
             percent(largest(plain, |a, d| a.errors(d, &a.calculated[0]).nrms)),
             percent(least(plain, |a, d| a.errors(d, &a.calculated[0]).mean_relative)),
             percent(largest(plain, |a, d| a.errors(d, &a.calculated[0]).mean_relative)),
         ));
+        // The influence of one of these lengths.
         self.paragraph(
-            "How much one unprinted length changes: the same test motion with other distances b of the base joints (all else \
-             as it is), held against the consistent treatment, which stands for the rig. The error is the same force of the \
-             misplaced m4 at every b; what changes is how large it is beside the others.",
+            "The influence of one unprinted length: the same test motion with other distances b of the base joints \
+             (all else unchanged), compared with the consistent treatment, which represents the rig. The error is the \
+             force of the misplaced m4 at every b. Its size relative to the other forces changes.",
         );
+        // Distances at which the errors of both spindles are within the paper's band.
         let reached: Vec<_> = experiment
             .lengths
             .iter()
@@ -171,13 +192,13 @@ impl ExperimentPage {
             .collect();
         self.figure(
             &figures::lengths(&experiment.lengths, PAPER_ERRORS),
-            "The paper's band is a mean relative error, ours the nrms, which has no peaks. At every instant the spindle \
-             mounts (dA, Bx, By) scale error and force alike.",
+            "The paper's band is a mean relative error; ours is the nrms, which has no peaks. At every instant the \
+             spindle mounts (dA, Bx, By) scale error and force by the same factor.",
         );
         if !reached.is_empty() {
             self.paragraph(&format!(
-                "At b = {} the nrms of both spindles is within the paper's band (the mean relative error still is not: {}). Which \
-                 b the real robot has we do not know.",
+                "At b = {} the nrms of both spindles is within the paper's band (the mean relative error is not: {}). \
+                 The b of the real robot is not known.",
                 reached
                     .iter()
                     .map(|length| format!("{} m", length.distance))
@@ -190,17 +211,20 @@ impl ExperimentPage {
                     .join(", "),
             ));
         }
+        // The errors after identification have no counterpart on the rig without rods.
         self.paragraph(
-            "The paper's errors after identification, 3.3 to 3.6 %, have no counterpart on the rig without rods, where nothing is \
-             left: they must come from something that its multibody model has beyond a planar rigid M structure, perhaps spindles \
-             with mass and their offset at the cranks. The rig with rods shows that kind of remainder; its size depends on the rods, whose mass is made \
-             up.",
+            "The paper's errors after identification, 3.3 to 3.6 %, have no counterpart on the rig without rods, \
+             where the residual is zero. They must come from something that its multibody model has in addition to a \
+             planar rigid M structure, perhaps spindles with mass and their offset at the cranks. The rig with rods \
+             shows such a residual. Its size depends on the rods, whose mass is an assumption.",
         );
     }
 
+    /// Coefficients of both trajectories, so that the runs can be repeated.
     pub(crate) fn coefficients(&mut self, experiment: &PaperExperiment) {
         self.paragraph("Coefficients of the trajectories, eq. (15), rad and rad/s:");
         let names = experiment.paper.active_coordinates();
+        // One table per trajectory, with the coefficients as they were used.
         for (periodic, run) in experiment
             .trajectories
             .iter()
@@ -217,6 +241,7 @@ impl ExperimentPage {
                 periodic.period,
                 means.join(", ")
             ));
+            // Two columns per coordinate: the coefficients mu and nu of every harmonic.
             let mut head = vec!["k".to_owned()];
             for name in &names {
                 head.extend([format!("mu, {name}"), format!("nu, {name}")]);

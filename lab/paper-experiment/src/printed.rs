@@ -1,11 +1,11 @@
-//! What the paper prints: Tables 1 and 2, and the condition number of its excitation.
+//! Numbers that the paper prints: Tables 1 and 2, and the condition number of its excitation.
 
 /// Condition number of the paper's excitation.
 pub(crate) const CONDITION_NUMBER: f64 = 21.06;
 /// Harmonics and period (s) of the paper's excitation.
 pub(crate) const EXCITATION: (usize, f64) = (7, 7.29);
 
-/// Table 1, the estimated column, for what it takes as unknown; the rest is known.
+/// Estimated column of Table 1, for the parameters that the paper determines; the others are known.
 pub(crate) const ESTIMATED: [(&str, f64); 5] = [
     ("m2", 15.9794),
     ("m4", 5.9203),

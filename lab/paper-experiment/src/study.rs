@@ -1,5 +1,5 @@
-//! The comparison itself: both treatments of m4 on runs of a rig, and how much of the error of the paper's treatment
-//! is the force of the misplaced mass.
+//! The comparison: both treatments of m4 on runs of a rig, and the share of the paper's error that is the force of the
+//! misplaced mass.
 
 use modelmill_identify::interpret::{PhysicalInterpretation, PhysicalSolution, interpret};
 use modelmill_identify::{FitFile, PreparedRun};
@@ -12,10 +12,10 @@ use modelmill::interpret as table_1;
 use modelmill::stretch::RecordingSegment;
 use modelmill::{Error, Outcome};
 
-/// `[drive][sample]`
+/// Forces as `[drive][sample]`, N.
 pub(crate) type DriveColumns = Vec<Vec<f64>>;
 
-/// What Table 1 takes as unknown.
+/// The parameters that Table 1 determines.
 pub(crate) const UNKNOWN: [&str; 5] = ["m2", "m4", "dc3", "Ic12", "Ic32"];
 
 /// One rig with both treatments.
@@ -30,21 +30,22 @@ pub(crate) struct TreatmentStudy {
 
 /// A run of the rig with the forces of both treatments.
 pub(crate) struct TreatmentRun {
-    /// s
+    /// Times, s.
     pub(crate) time: Vec<f64>,
-    /// What the rig needs.
+    /// Forces of the rig, N.
     pub(crate) measured: DriveColumns,
-    /// `[treatment]`, the paper's first; with calculated and with estimated parameters.
+    /// Forces with calculated parameters, `[treatment]`, the paper's first.
     pub(crate) calculated: [DriveColumns; 2],
+    /// Forces with estimated parameters, `[treatment]`.
     pub(crate) estimated: [DriveColumns; 2],
     /// The paper's treatment with the parameters that the paper estimated on its own robot.
     pub(crate) printed: DriveColumns,
 }
 
-/// How much of an error one known force explains.
+/// The part of an error that one known force explains.
 #[derive(Clone, Copy)]
 pub(crate) struct ExplainedError {
-    /// 2-norm of the error that is left without that force, as a share of the error.
+    /// 2-norm of the error minus that force, relative to the error.
     pub(crate) remains: f64,
     /// Correlation of the error with that force.
     pub(crate) correlation: f64,
@@ -57,12 +58,12 @@ pub(crate) struct DriveErrors {
     pub(crate) mean_relative: f64,
     /// Median of the same.
     pub(crate) median_relative: f64,
-    /// 2-norm of the error by that of the measured force.
+    /// 2-norm of the error divided by that of the measured force.
     pub(crate) nrms: f64,
 }
 
 impl TreatmentStudy {
-    /// Identifies both models on the first run and holds them against both.
+    /// Identifies both models on the first run and compares them with both runs.
     pub(crate) fn new(
         models: [&Model; 2],
         identification: RecordingSegment,
@@ -71,14 +72,17 @@ impl TreatmentStudy {
         let data = [identification];
         let check = [verification];
         let [paper, consistent] = models;
+        // Ordinary least squares, since the rig has no noise.
         let plain = EstimatorOptions::default();
         let fits = [
             identify(paper, &data, &[], &check, &plain)?,
             identify(consistent, &data, &[], &check, &plain)?,
         ];
+        // Table 1 is computed from the fit of the paper's treatment.
         let physical = physical(paper, &fits[0].fit)?;
         let [identification] = &data;
         let [verification] = &check;
+        // Forces of both treatments along a run.
         let along = |one: &RecordingSegment| -> Outcome<TreatmentRun> {
             let forces = |values: [&[f64]; 2]| -> Outcome<[DriveColumns; 2]> {
                 Ok([
@@ -103,23 +107,23 @@ impl TreatmentStudy {
 }
 
 impl TreatmentRun {
-    /// Measured less modelled.
+    /// Measured minus modelled forces, N.
     pub(crate) fn error(&self, modelled: &DriveColumns) -> DriveColumns {
         difference(&self.measured, modelled)
     }
 
-    /// What the platform's mass makes at its place and does not make where the paper puts it: the difference of both
-    /// treatments, of models alone.
+    /// The force of the platform's mass at its place minus that at the place where the paper assumes it: the difference
+    /// of both treatments, from the models alone, N.
     pub(crate) fn placement(&self) -> DriveColumns {
         difference(&self.calculated[1], &self.calculated[0])
     }
 
-    /// What the paper's own identification changed in the forces of its treatment, along this run.
+    /// The change of the forces by the paper's own identification, in its treatment and along this run, N.
     pub(crate) fn printed_change(&self) -> DriveColumns {
         difference(&self.printed, &self.calculated[0])
     }
 
-    /// How much of the error of the paper's treatment the placement is, over all drives.
+    /// The part of the error of the paper's treatment that the placement explains, over all drives.
     pub(crate) fn explained_error(&self) -> ExplainedError {
         explain_error(&self.error(&self.calculated[0]), &self.placement())
     }
@@ -127,6 +131,7 @@ impl TreatmentRun {
     /// Error figures of a drive for modelled forces.
     pub(crate) fn errors(&self, drive: usize, modelled: &DriveColumns) -> DriveErrors {
         let pairs = || self.measured[drive].iter().zip(&modelled[drive]);
+        // Samples with a force of zero have no relative error.
         let mut relative: Vec<f64> = pairs()
             .filter(|(y, _)| **y != 0.0)
             .map(|(y, m)| ((y - m) / y).abs())
@@ -146,6 +151,7 @@ impl TreatmentRun {
         let force = &self.measured[drive];
         (1..force.len())
             .filter(|i| (force[i - 1] < 0.0) != (force[*i] < 0.0))
+            // Linear interpolation between the two samples.
             .map(|i| {
                 let share = force[i - 1] / (force[i - 1] - force[i]);
                 self.time[i - 1] + share * (self.time[i] - self.time[i - 1])
@@ -154,12 +160,13 @@ impl TreatmentRun {
     }
 
     /// Share of the samples of a drive whose force is below a share of its root mean square, and the share of the
-    /// mean relative error that they make.
+    /// mean relative error that these samples cause.
     pub(crate) fn near_zero(&self, drive: usize, modelled: &DriveColumns, below: f64) -> [f64; 2] {
         let force = &self.measured[drive];
         let n = force.len() as f64;
         let rms = (force.iter().map(|y| y * y).sum::<f64>() / n).sqrt();
         let (mut count, mut part, mut all) = (0.0, 0.0, 0.0);
+        // Counts samples near zero, and sums relative errors near zero and in total.
         for (y, m) in force
             .iter()
             .zip(&modelled[drive])
@@ -176,9 +183,10 @@ impl TreatmentRun {
     }
 }
 
-/// How much of some forces others are, over all drives.
+/// The part of some forces that others explain, over all drives.
 pub(crate) fn explain_error(forces: &DriveColumns, by: &DriveColumns) -> ExplainedError {
     let (forces, by) = (forces.concat(), by.concat());
+    // Nothing is fitted: the factor of the known force is 1.
     let rest: Vec<f64> = forces.iter().zip(&by).map(|(e, d)| e - d).collect();
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let norm = |a: &[f64]| dot(a, a).sqrt();
@@ -188,6 +196,7 @@ pub(crate) fn explain_error(forces: &DriveColumns, by: &DriveColumns) -> Explain
     }
 }
 
+/// `a - b`, sample by sample.
 fn difference(a: &DriveColumns, b: &DriveColumns) -> DriveColumns {
     let columns = a.iter().zip(b);
     columns
@@ -195,13 +204,14 @@ fn difference(a: &DriveColumns, b: &DriveColumns) -> DriveColumns {
         .collect()
 }
 
-/// The paper's base parameters that make the forces of the consistent treatment: it is the special case in which the
-/// half masses sit at the couplers' ends, so least squares finds them without error.
+/// The paper's base parameters that give the forces of the consistent treatment. It is the special case in which the
+/// half masses are at the ends of the couplers, so least squares determines them without error.
 pub(crate) fn consistent_values(
     paper: &Model,
     consistent: &Model,
     data: &RecordingSegment,
 ) -> Outcome<Vec<f64>> {
+    // The forces of the consistent model take the place of measured ones.
     let run = PreparedRun {
         force: Some(along::forces(consistent, data, &consistent.nominal)?),
         ..data.run.clone()
@@ -216,7 +226,7 @@ pub(crate) fn consistent_values(
     .values)
 }
 
-/// The paper's base parameters for other values of some parameters.
+/// The paper's base parameters for other values of some parameters, in the order of `p_min`.
 pub(crate) fn values_with(model: &Model, changed: &[(&str, f64)]) -> Vec<f64> {
     let mechanism = &model.derivation.mechanism;
     let parameters: Vec<f64> = mechanism
@@ -231,11 +241,12 @@ pub(crate) fn values_with(model: &Model, changed: &[(&str, f64)]) -> Vec<f64> {
     model.derivation.base_values(&parameters, &constants)
 }
 
-/// Table 1: all real solutions for the parameters that the paper takes as unknown.
+/// Table 1: all real solutions for the parameters that the paper determines; empty if they are undetermined.
 fn physical(model: &Model, fit: &FitFile) -> Outcome<Vec<PhysicalSolution>> {
     let names = UNKNOWN.map(str::to_owned);
     let unknown = table_1::unknown_indices(model, &names)?;
     let values: Vec<f64> = fit.parameters.iter().map(|p| p.value).collect();
+    // The equations of the base parameters, solved for the unknown physical parameters.
     let (system, _) = table_1::system(model, &unknown, &values, fit);
     match interpret(&system) {
         Ok(

@@ -1,10 +1,11 @@
-//! Numbers as the page says them: largest and least over runs, shares, and errors with rounding shown as such.
+//! Numbers as the page prints them: largest and least values over runs, shares, and errors with rounding marked as
+//! such.
 
 use crate::PaperExperiment;
 use crate::study::TreatmentRun;
 use modelmill::text::table::significant;
 
-/// Below this, an error is rounding; its digits differ from machine to machine and say nothing.
+/// A smaller error is rounding: its digits differ between machines and are meaningless.
 const ROUNDING: f64 = 1e-8;
 
 /// A parameter's value in the left column of Table 1.
@@ -14,16 +15,17 @@ pub(crate) fn nominal(experiment: &PaperExperiment, name: &str) -> f64 {
     found.map_or(f64::NAN, |p| p.nominal)
 }
 
-/// The largest of a figure over runs and drives.
+/// The largest value of `of` over runs and drives.
 pub(crate) fn largest(runs: &[TreatmentRun], of: impl Fn(&TreatmentRun, usize) -> f64) -> f64 {
     run_values(runs, of).fold(f64::NEG_INFINITY, f64::max)
 }
 
-/// The least.
+/// The least value of `of` over runs and drives.
 pub(crate) fn least(runs: &[TreatmentRun], of: impl Fn(&TreatmentRun, usize) -> f64) -> f64 {
     run_values(runs, of).fold(f64::INFINITY, f64::min)
 }
 
+/// Values of `of` for all runs and drives.
 fn run_values<'a>(
     runs: &'a [TreatmentRun],
     of: impl Fn(&TreatmentRun, usize) -> f64 + 'a,
@@ -34,7 +36,7 @@ fn run_values<'a>(
     pairs.map(move |(along, d)| of(along, d))
 }
 
-/// How much of the error the placement explains, in squares, at least over all runs.
+/// The share of the error that the placement explains, in squares: the least of all runs.
 pub(crate) fn explained_text(runs: &[TreatmentRun]) -> String {
     let most = runs
         .iter()
@@ -43,7 +45,7 @@ pub(crate) fn explained_text(runs: &[TreatmentRun]) -> String {
     share(1.0 - most * most)
 }
 
-/// A share near one.
+/// A share near one as per cent.
 pub(crate) fn share(value: f64) -> String {
     if 1.0 - value < 1e-6 {
         return "more than 99.9999 %".to_owned();
@@ -51,7 +53,7 @@ pub(crate) fn share(value: f64) -> String {
     format!("{:.2} %", 100.0 * value)
 }
 
-/// An error that is nothing but rounding, or its size.
+/// An error as per cent, or a statement that it is rounding.
 pub(crate) fn rounding(value: f64) -> String {
     if value < ROUNDING {
         "better than a part in 10^8".to_owned()
@@ -60,6 +62,7 @@ pub(crate) fn rounding(value: f64) -> String {
     }
 }
 
+/// A number as per cent with three digits; rounding errors are printed as zero.
 pub(crate) fn percent(value: f64) -> String {
     if value < ROUNDING {
         return "0.0000 %".to_owned();
