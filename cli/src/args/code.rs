@@ -1,4 +1,4 @@
-//! Arguments of what is made of a model: equations and code.
+//! Arguments of `equations`, `generate` and `atlas`: what is written out of a model.
 
 use std::path::PathBuf;
 
@@ -52,18 +52,18 @@ pub(crate) struct GenerateArgs {
     /// With the equation of motion: mass matrix, velocity terms, gravity, forward dynamics
     #[arg(long)]
     pub(crate) dynamics: bool,
-    /// With what the joints transmit: forces and moments in all joints, and the forces that close loops
+    /// With reactions: forces and moments in all joints, and the forces that close loops
     #[arg(long)]
     pub(crate) reactions: bool,
-    /// With a function `self_test` that holds base parameters against all parameters, for a test of your own
+    /// With a function `self_test` that compares the model in base parameters with the model in all parameters, for your own tests
     #[arg(long)]
     pub(crate) self_test: bool,
-    /// What to make: a Rust module, sources of plain C99, or a crate that builds a C library with its header or a Python module
+    /// What to write: a Rust module, sources in plain C99, or a crate that builds a C library with its header or a Python module
     #[arg(long, value_parser = languages(), default_value = CodeLanguage::default().name())]
     pub(crate) language: CodeLanguage,
 }
 
-/// The languages by their names.
+/// Parser of `--language`: names of the languages, with their descriptions for the help.
 fn languages() -> impl TypedValueParser<Value = CodeLanguage> {
     let all = CodeLanguage::all();
     let values = all.map(|language| PossibleValue::new(language.name()).help(language.about()));
@@ -71,7 +71,7 @@ fn languages() -> impl TypedValueParser<Value = CodeLanguage> {
     parser.map(|name| CodeLanguage::from_name(&name).expect("the parser knows these names alone"))
 }
 
-/// Languages whose files need a folder.
+/// Languages that write several files, as pairs of option and value. With these `--out` is required.
 fn languages_in_folders() -> Vec<(&'static str, &'static str)> {
     let others = CodeLanguage::all().filter(|language| language.form() != LanguageForm::Module);
     others
@@ -82,7 +82,7 @@ fn languages_in_folders() -> Vec<(&'static str, &'static str)> {
 /// `atlas`.
 #[derive(Debug, Args)]
 pub(crate) struct AtlasArgs {
-    /// Model files, and robot descriptions (URDF, MJCF, SDF), which get a line and a picture
+    /// Model files, and robot descriptions (URDF, MJCF, SDF). A robot description gets a line and a picture, but no page
     #[arg(required = true)]
     pub(crate) models: Vec<PathBuf>,
     /// Write `atlas.md`, `atlas.html` and the folder `atlas` into this folder

@@ -1,4 +1,4 @@
-//! The part of the command line of `check` and `diff` that asks for a picture.
+//! Options of `check` and `diff` for a picture of the mechanism.
 
 use std::path::{Path, PathBuf};
 
@@ -9,18 +9,18 @@ use modelmill::picture::{DrawingStyle, PictureOptions};
 use crate::failure::CommandOutcome;
 use crate::output::OutputFile;
 
-/// What is drawn, and where to.
+/// Options for the picture: target file, pose and view.
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Picture")]
 pub(crate) struct DrawingArgs {
     /// Draw the mechanism as SVG: links, joints (filled where driven), loops, drives, centres of mass
     #[arg(long, value_name = "FILE.svg")]
     pub(crate) picture: Option<PathBuf>,
-    /// Values of active coordinates, rad or m; the others are nominal, and loops are closed
+    /// Values of active coordinates, rad or m; the others are nominal. Passive coordinates are determined by loop closure
     #[arg(long, value_name = "NAME=VALUE,...", value_parser = parse_value, value_delimiter = ',', requires = "picture",
           allow_hyphen_values = true)]
     at: Vec<(String, f64)>,
-    /// Look from this azimuth and elevation, degrees, e.g. 30,20; else planar mechanisms are seen flat
+    /// Look from this azimuth and elevation, degrees, e.g. 30,20; without it planar mechanisms are drawn in their plane
     #[arg(long, value_name = "AZIMUTH,ELEVATION", value_parser = parse_view, requires = "picture",
           allow_hyphen_values = true)]
     view: Option<[f64; 2]>,
@@ -30,7 +30,7 @@ pub(crate) struct DrawingArgs {
 }
 
 impl DrawingArgs {
-    /// Where the picture goes, if one is asked for; it must be none of the files that are read.
+    /// The target of `--picture`, if given. Refuses a path that is one of `inputs`, the files that the command reads.
     pub(crate) fn target<'a>(
         &self,
         inputs: impl IntoIterator<Item = &'a Path>,
@@ -40,7 +40,7 @@ impl DrawingArgs {
             .transpose()
     }
 
-    /// Draws a model, over another one if there is one.
+    /// Draws a model and writes the SVG; with `before`, this other model is drawn as well.
     pub(crate) fn draw(
         &self,
         target: &OutputFile,
@@ -62,7 +62,7 @@ impl DrawingArgs {
     }
 }
 
-/// Reads `NAME=VALUE`.
+/// Reads `NAME=VALUE`, with a finite value in rad or m.
 pub(super) fn parse_value(text: &str) -> Result<(String, f64), String> {
     let expected = "expected a coordinate and its value, such as theta1=1.7";
     let (name, value) = text.split_once('=').ok_or(expected)?;
@@ -73,7 +73,7 @@ pub(super) fn parse_value(text: &str) -> Result<(String, f64), String> {
     Ok((name.trim().to_owned(), value))
 }
 
-/// Reads two angles.
+/// Reads `AZIMUTH,ELEVATION`, two angles in degrees.
 fn parse_view(text: &str) -> Result<[f64; 2], String> {
     let expected = || "expected two angles in degrees, such as 30,20".to_owned();
     let (azimuth, elevation) = text.split_once(',').ok_or_else(expected)?;
