@@ -1,4 +1,4 @@
-//! How the command line asks for what the library advises: options as flags, commands of the program, whole command lines.
+//! Spelling of the library's advice for the command line: options as flags, commands of the program, complete command lines.
 
 use std::borrow::Cow;
 use std::fmt::Write as _;
@@ -16,16 +16,16 @@ use crate::args::DiagnosisArgs;
 /// Significant digits of values on the command line.
 const DIGITS: usize = 5;
 
-/// The command line that asked, for texts that advise another one.
+/// Spells command lines that read the same recordings as the current one, for texts that advise a next step.
 pub(crate) struct CommandLineSpelling {
-    /// The recordings, as the command line has them.
+    /// Flags `--data` and `--check` of the current command.
     recordings: String,
-    /// The recordings of the fit with other names for their columns, where they need nothing else; what `excite` compares with.
+    /// Flags `--data` and `--map` for `excite`. Empty if the recordings need options that `excite` does not have.
     compared: String,
 }
 
 impl CommandLineSpelling {
-    /// Recordings for fit and check, read as `reading` says.
+    /// Recordings for fit and validation, read with the options `reading`.
     pub(crate) fn new(fit: &[PathBuf], check: &[PathBuf], reading: &RecordingOptions) -> Self {
         let named = |option: &str, paths: &[PathBuf]| -> Vec<String> {
             let path = |p: &PathBuf| format!("{option} {}", quote_word(&p.display().to_string()));
@@ -37,6 +37,7 @@ impl CommandLineSpelling {
             columns: reading.columns.clone(),
             ..RecordingOptions::default()
         };
+        // `excite` has `--map` but no other option for reading. Other options would give other states.
         if *reading == plain {
             for data in &all {
                 let _ = write!(compared, " {data}");
@@ -56,7 +57,7 @@ impl CommandLineSpelling {
         }
     }
 
-    /// What a command asked.
+    /// The spelling for the arguments of `diagnose` and `report`.
     pub(crate) fn from_args(args: &DiagnosisArgs) -> Self {
         Self::new(&args.data, &args.check, &args.preparation.reading())
     }
@@ -126,7 +127,7 @@ impl RemedySpelling for CommandLineSpelling {
 pub(crate) struct FlagSpelling;
 
 impl RemedySpelling for FlagSpelling {
-    /// Flags side by side are one piece of a command line.
+    /// Several flags become one piece of a command line in backticks.
     fn spell_options(&self, settings: &[OptionSetting]) -> String {
         let one = |setting: &OptionSetting| match &setting.value {
             None => flag(setting.name),
@@ -141,7 +142,7 @@ impl RemedySpelling for FlagSpelling {
     }
 }
 
-/// The flag of an option.
+/// The flag of an option: its name with hyphens, with a few exceptions.
 fn flag(option: OptionName) -> String {
     match option {
         OptionName::Columns => "--map".to_owned(),
@@ -152,7 +153,7 @@ fn flag(option: OptionName) -> String {
     }
 }
 
-/// A value as a shell takes it, in the quotes that the help shows unless a shell would look into them.
+/// A value quoted for a shell: in double quotes as in the help, or in single quotes if a shell would expand its characters.
 fn quote_value(value: &str) -> Cow<'_, str> {
     if value.contains(['"', '$', '\\', '!', '\'']) {
         Cow::Owned(quote_word(value))
@@ -181,12 +182,12 @@ fn add_command(model: &str, effect: &NewEffect) -> String {
     command
 }
 
-/// How models are read, as the command line has it: libraries of kinds of one's own, and whether constants stand as numbers.
+/// Flags for reading a model: `--library` and `--at-values`, each with a space before it.
 fn library_flags_of_model(model: &Model) -> String {
     library_flags(model.host())
 }
 
-/// The same of a host.
+/// The same for a host.
 pub(crate) fn library_flags(host: &Host) -> String {
     let option = |path: &PathBuf| format!(" --library {}", quote_word(&path.display().to_string()));
     let mut options: String = host.libraries().iter().map(option).collect();
@@ -196,7 +197,7 @@ pub(crate) fn library_flags(host: &Host) -> String {
     options
 }
 
-/// `KIND@PLACE,PLACE:NAME=VALUE`.
+/// An effect as an argument of `excite`: `KIND@PLACE,PLACE:NAME=VALUE`.
 fn effect_argument(named: &NamedEffect) -> String {
     let mut text = format!("{}@{}", named.effect.kind, named.effect.at.join(","));
     for (symbol, value) in &named.values {
@@ -205,12 +206,13 @@ fn effect_argument(named: &NamedEffect) -> String {
     text
 }
 
+/// A value rounded to [`DIGITS`] significant digits.
 fn round_significant(value: f64) -> f64 {
     let text = format!("{value:.*e}", DIGITS - 1);
     text.parse().unwrap_or(value)
 }
 
-/// A word as a shell takes it.
+/// A word quoted for a POSIX shell; plain words stay as they are.
 pub(crate) fn quote_word(word: &str) -> String {
     let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./,=+:@".contains(c);
     if !word.is_empty() && word.chars().all(is_plain) {

@@ -23,7 +23,7 @@ fn main() -> ExitCode {
     let cli = match CommandLine::try_parse() {
         Ok(cli) => cli,
         Err(error) => {
-            // Help is no error; a reader that goes away is none either.
+            // Help and version have status 0. A closed standard output is not reported.
             let status = u8::try_from(error.exit_code()).unwrap_or(2);
             let _ = error.print();
             return ExitCode::from(status);
@@ -53,6 +53,7 @@ fn main() -> ExitCode {
     }
 }
 
+/// Runs one command.
 fn run(host: &Host, command: &ProgramCommand) -> CommandOutcome {
     match command {
         ProgramCommand::Check(args) => commands::check::run(host, args),

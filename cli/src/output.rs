@@ -1,4 +1,5 @@
-//! Files that commands write: never over an input, with the reason when it fails.
+//! Files that commands write. A path and a text go in; the file, or a message with the reason and a remedy, comes out.
+//! A command never writes over a file that it reads, unless the user requests it.
 
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
@@ -7,7 +8,7 @@ use modelmill_boundary::files::{DiskFiles, FileError, FileFault};
 
 use crate::failure::{CommandFailure, CommandOutcome};
 
-/// The disk of this run, which remembers what was read so that it is not written over.
+/// The disk of this run. It remembers which files were read, so that they are not written over.
 pub(crate) fn disk() -> &'static DiskFiles {
     static DISK: LazyLock<DiskFiles> = LazyLock::new(DiskFiles::default);
     &DISK
@@ -61,67 +62,68 @@ impl OutputFile {
     }
 }
 
-/// Makes the folder that a command writes into.
+/// Creates the folder of `--out` with its parents. A folder that exists is no error.
 pub(crate) fn make_folder(folder: &Path) -> CommandOutcome {
     refuse_dash("--out", folder)?;
     if folder.exists() && !folder.is_dir() {
         return Err(CommandFailure::Input(format!(
-            "--out {}: the folder cannot be made, since this is a file; give the name of a folder, which is made if it is not \
-             there",
+            "--out {}: this is a file, but a folder is expected; give the name of a folder, which is created if it does not \
+             exist",
             folder.display()
         )));
     }
     std::fs::create_dir_all(folder).map_err(|error| {
         CommandFailure::Input(format!(
-            "the folder {} cannot be made: {error}; give another one with --out",
+            "the folder {} cannot be created: {error}; give another one with --out",
             folder.display()
         ))
     })
 }
 
-/// Many programs take `-` for standard output; here a file of that name would surprise who asks for it.
+/// Refuses `-` as a path: many programs use it for standard output, and nobody expects a file of this name.
 pub(crate) fn refuse_dash(flag: &str, path: &Path) -> CommandOutcome {
     if path.as_os_str() != "-" {
         return Ok(());
     }
     Err(CommandFailure::Usage(format!(
-        "{flag} -: the name of a file is expected; what can go to standard output does so without {flag} (a file of this very \
-         name is `./-`)"
+        "{flag} -: the name of a file is expected; commands that can print to standard output do so without {flag} (a file with \
+         this name is `./-`)"
     )))
 }
 
-/// Writes a file as a whole, but not over one that was read; the reason and what to do if it cannot be.
+/// Writes a file atomically, but not over one that was read. Fails with the reason and a remedy.
 pub(crate) fn write(path: &Path, text: &str) -> CommandOutcome {
     disk()
         .write(path, text.as_bytes())
         .map_err(|error| write_failure(&error))
 }
 
-/// Writes a file as a whole over one that was read, as the user asks for.
+/// Writes a file atomically over one that was read, as the user requested.
 pub(crate) fn replace(path: &Path, text: &str) -> CommandOutcome {
     disk()
         .replace(path, text.as_bytes())
         .map_err(|error| write_failure(&error))
 }
 
+/// The message for a file that could not be written: path, reason, remedy.
 fn write_failure(error: &FileError) -> CommandFailure {
     let path = error.path.display();
     CommandFailure::Input(match &error.fault {
         // Some systems have folders in which no file can be made.
         FileFault::Missing if error.path.parent().is_some_and(Path::is_dir) => format!(
-            "{path} cannot be written: its folder takes no such file; choose another folder"
+            "{path} cannot be written: its folder does not accept this file; choose another folder"
         ),
         FileFault::Missing => format!(
             "{path} cannot be written: there is no such folder; check that the folder exists and may be written to"
         ),
         FileFault::Input => {
-            format!("{path} would be overwritten, which this command reads; choose another name")
+            format!("{path} would be overwritten, but this command reads it; choose another name")
         }
         fault => format!("{path} cannot be written: {fault}; {}", fault.remedy()),
     })
 }
 
-/// Whether two paths lead to one file, be it through links.
+/// Whether two paths lead to the same file, also through symbolic or hard links.
 fn is_same_file(a: &Path, b: &Path) -> bool {
     #[cfg(unix)]
     {
@@ -133,6 +135,7 @@ fn is_same_file(a: &Path, b: &Path) -> bool {
             return true;
         }
     }
+    // Symbolic links and `..` disappear in canonical paths. A file that does not exist yet has none.
     match (a.canonicalize(), b.canonicalize()) {
         (Ok(a), Ok(b)) => a == b,
         _ => false,

@@ -1,4 +1,5 @@
-//! `add`: an effect goes into a model file; the difference is shown, and the result must be sound before it is written.
+//! `add`: adds an effect to a model file. A kind with its places and values goes in; the difference of the text comes out.
+//! The new model must be valid and derivable before it is written.
 
 use modelmill::Host;
 use modelmill::add::new_effect;
@@ -12,7 +13,7 @@ use crate::flags::FlagSpelling;
 use crate::output::{self, OutputFile};
 use crate::{commands, terminal};
 
-/// Edits the model file, prints the difference, and writes the result where the user asks for it.
+/// Edits the model file, prints the difference, and writes the result to `--out` or, with `--in-place`, to the model file.
 pub(crate) fn run(host: &Host, args: &AddArgs) -> CommandOutcome {
     let before = commands::load_quietly(host, &args.model)?;
     let target = args
@@ -33,7 +34,7 @@ pub(crate) fn run(host: &Host, args: &AddArgs) -> CommandOutcome {
             .render_spelled(terminal::is_stderr_coloured(), &FlagSpelling);
         terminal::print_to_stderr(warnings.trim_end());
     }
-    // What `check` would say beyond the file itself: whether the model can be derived.
+    // As in `check`: a valid file can still fail in the derivation.
     let derived = commands::derive_model(host, &path, edited.loaded)?;
     let written = match (&target, args.in_place) {
         (Some(target), _) => {
@@ -59,7 +60,7 @@ pub(crate) fn run(host: &Host, args: &AddArgs) -> CommandOutcome {
     terminal::print(&edit::colour_diff(&difference, terminal::style()))?;
     match written {
         Some(name) => terminal::note(&format!(
-            "{name} is written; `modelmill diff` says what the effect changes"
+            "{name} is written; `modelmill diff` reports what the effect changes"
         )),
         None => terminal::note(
             "nothing is written; add --in-place to change the model file, or --out FILE to write another one",
@@ -68,7 +69,7 @@ pub(crate) fn run(host: &Host, args: &AddArgs) -> CommandOutcome {
     Ok(())
 }
 
-/// The model as it would be read from where it is written: paths in it start from its folder.
+/// Reads the new text as a file at the target, since relative paths in it start from the folder of the file.
 fn reload_at_target(
     host: &Host,
     edited: EditedModel,

@@ -1,4 +1,4 @@
-//! `adopt`: a fit goes into a model file; the difference is shown.
+//! `adopt`: replaces nominal values of a model file by those of a fit. The difference of the text comes out.
 
 use std::path::Path;
 
@@ -11,7 +11,7 @@ use crate::failure::CommandOutcome;
 use crate::output::{self, OutputFile};
 use crate::{commands, terminal};
 
-/// Edits the model file, prints the difference, and writes the result where the user asks for it.
+/// Edits the model file, prints the difference, and writes the result to `--out` or, with `--in-place`, to the model file.
 pub(crate) fn run(host: &Host, args: &AdoptArgs) -> CommandOutcome {
     let model = commands::model(host, &args.model)?;
     let inputs = model
@@ -28,7 +28,7 @@ pub(crate) fn run(host: &Host, args: &AdoptArgs) -> CommandOutcome {
         terminal::remark(note);
     }
     let path = args.model.display().to_string();
-    // What is written must be sound where it is written: paths in it start from its folder.
+    // The new text must be valid at its target, since relative paths in it start from the folder of the file.
     let loaded = match &target {
         Some(target) => host.load_text(target.path(), &adoption.text)?,
         None => adoption.loaded,
@@ -58,7 +58,7 @@ pub(crate) fn run(host: &Host, args: &AdoptArgs) -> CommandOutcome {
     }
     terminal::print(&edit::colour_diff(&difference, terminal::style()))?;
     terminal::note(&match written {
-        Some(name) => format!("{name} is written; its nominal values are those of the fit now"),
+        Some(name) => format!("{name} is written; its nominal values are now those of the fit"),
         None => "nothing is written; add --in-place to change the model file, or --out FILE to write another one".to_owned(),
     });
     Ok(())

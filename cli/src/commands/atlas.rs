@@ -17,9 +17,11 @@ use crate::failure::{CommandFailure, CommandOutcome};
 use crate::output::{self, OutputFile};
 use crate::terminal;
 
-/// Name of the table in its folder, of all in one page, and of the folder of what the table links to.
+/// Name of the table in the folder of `--out`.
 const TABLE: &str = "atlas.md";
+/// Name of the page with all mechanisms.
 const PAGE: &str = "atlas.html";
+/// Name of the folder of pictures and pages to which the table links.
 const PAGES: &str = "atlas";
 
 /// Derives all models and writes the atlas.
@@ -41,7 +43,7 @@ pub(crate) fn run(host: &Host, args: &AtlasArgs) -> CommandOutcome {
         let seconds = start.elapsed().as_secs_f64();
         if !names.insert(model.name.clone()) {
             return Err(CommandFailure::Input(format!(
-                "{}: another model of the atlas is called `{}` too; give one of the files another name",
+                "{}: another model of the atlas is also called `{}`; give one of the files another name",
                 path.display(),
                 model.name
             )));
@@ -66,6 +68,7 @@ pub(crate) fn run(host: &Host, args: &AtlasArgs) -> CommandOutcome {
             picture: picture.replacen(" xmlns=\"http://www.w3.org/2000/svg\"", "", 1),
         });
     }
+    // Table and page go into the folder itself, next to the folder of pictures.
     let write = |name: &str, text: &str| {
         let target = OutputFile::new(
             &args.out.join(name),
@@ -77,14 +80,14 @@ pub(crate) fn run(host: &Host, args: &AtlasArgs) -> CommandOutcome {
     write(PAGE, &report::atlas(&mechanisms))?;
     let table = args.out.join(TABLE);
     terminal::print(&format!(
-        "{} holds {}; {} shows them in one page.",
+        "{} lists {}; {} shows them on one page.",
         table.display(),
         modelmill::text::table::count(entries.len(), "mechanism", "mechanisms"),
         args.out.join(PAGE).display()
     ))
 }
 
-/// The model of a robot description, as `import` makes it of the file alone.
+/// The model of a robot description, as `import` converts it without options.
 fn load_description(host: &Host, path: &Path) -> CommandOutcome<LoadedModel> {
     let closures = import::closures_of(path, None);
     let imported = import::import_description(host, path, closures.as_deref(), Options::default())?;

@@ -1,4 +1,4 @@
-//! `check`: validates a model file and says what is in it.
+//! `check`: validates a model file and prints a summary of its contents.
 
 use modelmill::{Error, Host, print};
 
@@ -11,7 +11,7 @@ use crate::{commands, terminal};
 pub(crate) fn run(host: &Host, args: &CheckArgs) -> CommandOutcome {
     let model = match commands::model(host, &args.model) {
         Err(CommandFailure::Library(fault)) if args.json && !matches!(fault, Error::Cancelled) => {
-            // What is wrong goes to standard output as well, for editors.
+            // Editors read faults as JSON from standard output, in addition to the text on standard error.
             let told = match &fault {
                 Error::Model(faults) => print::faults(faults, &FlagSpelling),
                 fault => print::refusal(

@@ -1,4 +1,4 @@
-//! `compare`: how far the model is off along recordings, and where.
+//! `compare`: errors of the model along recordings, and the regions of the motion where they are largest.
 
 use modelmill::Host;
 
@@ -7,7 +7,7 @@ use crate::failure::CommandOutcome;
 use crate::flags::FlagSpelling;
 use crate::{commands, terminal};
 
-/// Prints error figures and the regions where the error lives.
+/// Prints error figures and the regions where the error is largest.
 pub(crate) fn run(host: &Host, args: &CompareArgs) -> CommandOutcome {
     let model = commands::model(host, &args.model)?;
     let values = args.parameters.values(host, &model)?;

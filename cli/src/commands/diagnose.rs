@@ -1,4 +1,4 @@
-//! `diagnose`: which effect is missing, and what speaks for it.
+//! `diagnose`: which effect the model lacks, and the evidence for it.
 
 use modelmill::Host;
 use modelmill::diagnose::DiagnosisOptions;
@@ -9,7 +9,7 @@ use crate::failure::CommandOutcome;
 use crate::flags::CommandLineSpelling;
 use crate::terminal;
 
-/// Prints what is missing, or that nothing is, or that nothing known explains it.
+/// Prints the missing effects, or that none is missing, or that no known effect explains the error.
 pub(crate) fn run(host: &Host, args: &DiagnoseArgs) -> CommandOutcome {
     let flags = CommandLineSpelling::from_args(&args.diagnosis);
     let question = DiagnosisOptions {

@@ -1,4 +1,4 @@
-//! `diff`: what a variant changes, for people who review it; along recordings, what it costs.
+//! `diff`: reports what a variant of a model changes; along recordings also changes of forces, power, work and error.
 
 use std::sync::Arc;
 
@@ -13,9 +13,10 @@ use crate::flags::FlagSpelling;
 use crate::terminal::progress::ProgressWithoutRemarks;
 use crate::{commands, terminal};
 
-/// Prints what changed between two models.
+/// Prints the changes between two models, and draws both into one picture if requested.
 pub(crate) fn run(host: &Host, args: &DiffArgs) -> CommandOutcome {
     let before = commands::model(host, &args.before)?;
+    // Remarks on the second model would repeat those on the first; the listener drops them.
     let quiet = host
         .clone()
         .with_progress(Arc::new(ProgressWithoutRemarks::new()));
@@ -41,7 +42,7 @@ pub(crate) fn run(host: &Host, args: &DiffArgs) -> CommandOutcome {
     terminal::print(&text)
 }
 
-/// Both models along the recordings, if there are any.
+/// Compares both models along the recordings; none without `--data`.
 fn variants(
     args: &DiffArgs,
     before: &Model,
@@ -54,7 +55,7 @@ fn variants(
     let reading = args.preparation.reading();
     let first = commands::recordings(before, &args.data, &reading)?;
     let second = commands::recordings(after, &args.data, &reading)?;
-    // What both models find odd about a recording is told once.
+    // A remark on a recording that both models produce is printed once.
     let told: Vec<&RecordingNote> = first.iter().flat_map(PreparedRecording::notes).collect();
     for note in second.iter().flat_map(PreparedRecording::notes) {
         if !told.contains(&note) {

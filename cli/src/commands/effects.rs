@@ -1,4 +1,4 @@
-//! `effects`: the library of effects, as a list or one kind in words.
+//! `effects`: the library of effects, as a list, or the description of one kind.
 
 use modelmill::Host;
 use modelmill::print::effects;
@@ -7,7 +7,7 @@ use crate::args::effects::EffectsArgs;
 use crate::failure::CommandOutcome;
 use crate::{commands, terminal};
 
-/// Prints the kinds, or one of them.
+/// Prints all kinds as a table, or one kind with its equation and parameters.
 pub(crate) fn run(host: &Host, args: &EffectsArgs) -> CommandOutcome {
     let mut kinds = match &args.model {
         Some(path) => commands::load(host, path)?.kinds,

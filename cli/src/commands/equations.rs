@@ -1,4 +1,4 @@
-//! `equations`: the reduced model for people and programs.
+//! `equations`: the equations of the reduced model as text, Markdown, LaTeX, HTML or JSON.
 
 use modelmill::Host;
 use modelmill::model::PageFormat;

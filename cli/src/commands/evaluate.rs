@@ -12,10 +12,12 @@ use crate::{commands, terminal};
 
 /// Writes `t` and one column per drive, or per component of a reaction.
 pub(crate) fn run(host: &Host, args: &EvaluateArgs) -> CommandOutcome {
+    // A fit cannot give reactions, so this combination of options is refused before anything is read.
     if args.reactions && args.parameters != ParameterSource::Nominal {
         return Err(CommandFailure::Usage(
-            "--reactions takes the model file's parameters: a fit holds base parameters, and joints are loaded by what no \
-             drive feels; write identified masses and inertias into the model file (`interpret`, `identify --physical`)"
+            "--reactions needs all parameters of the model file: a fit has base parameters only, and reactions also depend on \
+             parameters without effect on the drives. Write identified masses and inertias into the model file (`interpret`, \
+             `identify --physical`)"
                 .to_owned(),
         ));
     }
@@ -37,7 +39,7 @@ pub(crate) fn run(host: &Host, args: &EvaluateArgs) -> CommandOutcome {
     };
     if !found.left_out.is_empty() {
         terminal::note(&format!(
-            "not determined by equations of motion, since the mechanism is held there more often than once: {}",
+            "left out, since the equations of motion do not determine them (statically indeterminate reactions): {}",
             found.left_out.join(", ")
         ));
     }

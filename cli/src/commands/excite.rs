@@ -1,5 +1,5 @@
-//! `excite`: the periodic trajectory that tells the base parameters apart best, eq. (14), (15) and (17), or that tells an
-//! effect from what it may be taken for.
+//! `excite`: searches for the periodic trajectory that determines the base parameters best, eq. (14), (15) and (17), or that
+//! distinguishes an effect from its alternatives.
 
 use std::path::PathBuf;
 
@@ -13,7 +13,7 @@ use crate::flags::FlagSpelling;
 use crate::output::OutputFile;
 use crate::{commands, terminal};
 
-/// Searches, and writes the trajectory and its picture.
+/// Searches for the trajectory, and writes it (CSV) and its picture (SVG).
 pub(crate) fn run(host: &Host, args: &ExciteArgs) -> CommandOutcome {
     let model = args
         .parameters
@@ -44,7 +44,7 @@ pub(crate) fn run(host: &Host, args: &ExciteArgs) -> CommandOutcome {
     Ok(())
 }
 
-/// Where the picture goes: beside the trajectory if nothing is said.
+/// Path of the picture: `--figure`, or the path of the trajectory with the ending `.svg`.
 fn figure_path(args: &ExciteArgs) -> PathBuf {
     args.figure
         .clone()
@@ -52,6 +52,7 @@ fn figure_path(args: &ExciteArgs) -> PathBuf {
 }
 
 impl ExciteArgs {
+    /// The same as a request of the library.
     fn request(&self) -> ExcitationRequest {
         ExcitationRequest {
             options: Options {

@@ -1,4 +1,4 @@
-//! `experiment`: the paper's experiment on the bundled rig, as one page.
+//! `experiment`: reproduces the paper's experiment on the bundled rig and writes one page.
 
 use modelmill::Host;
 use modelmill_paper_experiment::{ExperimentRequest, PaperExperiment};

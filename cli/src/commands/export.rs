@@ -1,4 +1,4 @@
-//! `export`: a model as a robot description of other programs.
+//! `export`: writes a model as a robot description (URDF, MJCF) for other programs.
 
 use std::path::{Path, PathBuf};
 
@@ -10,7 +10,7 @@ use crate::failure::{CommandFailure, CommandOutcome};
 use crate::output::OutputFile;
 use crate::{commands, terminal};
 
-/// Writes the description and says what it does not hold.
+/// Writes the description and prints notes on what the format cannot express.
 pub(crate) fn run(host: &Host, args: &ExportArgs) -> CommandOutcome {
     let ending = args.out.extension().and_then(|ending| ending.to_str());
     let format = args
@@ -18,7 +18,7 @@ pub(crate) fn run(host: &Host, args: &ExportArgs) -> CommandOutcome {
         .or_else(|| DescriptionFormat::from_extension(&ending?.to_lowercase()));
     let Some(format) = format else {
         return Err(CommandFailure::Input(format!(
-            "{}: its ending says no format; end it in .urdf or .xml (MJCF), or give --format",
+            "{}: the ending does not determine the format; end the name in .urdf or .xml (MJCF), or give --format",
             args.out.display()
         )));
     };
@@ -27,6 +27,7 @@ pub(crate) fn run(host: &Host, args: &ExportArgs) -> CommandOutcome {
     let inputs = loaded.sources.paths().chain(fits);
     let target = OutputFile::new(&args.out, inputs.collect::<Vec<&Path>>())?;
     let path = args.model.display().to_string();
+    // A fit refers to the derived model; without one the loaded file is sufficient.
     let exported = match &args.parameters {
         None => description(&path, &loaded, format)?,
         Some(file) => {

@@ -1,4 +1,4 @@
-//! `generate`: the model as Rust source, or as a crate that brings it to C or Python.
+//! `generate`: writes the model as Rust source, as C99 sources, or as a crate that builds a C library or a Python module.
 
 use std::path::Path;
 
@@ -12,7 +12,7 @@ use crate::failure::{CommandFailure, CommandOutcome};
 use crate::output::{OutputFile, refuse_dash, write};
 use crate::{commands, terminal};
 
-/// Writes the source that `cargo build` makes of the model, or the folder of a crate.
+/// Writes the source that `cargo build` generates from the model, or a folder of sources, or a crate.
 pub(crate) fn run(host: &Host, args: &GenerateArgs) -> CommandOutcome {
     let more = [
         ("--reactions", args.reactions),
@@ -24,7 +24,7 @@ pub(crate) fn run(host: &Host, args: &GenerateArgs) -> CommandOutcome {
         let able = CodeLanguage::all().filter(|language| language.has_all());
         let able: Vec<&str> = able.map(CodeLanguage::name).collect();
         return Err(CommandFailure::Usage(format!(
-            "{flag} goes with --language {} only; leave it out, or leave --language out",
+            "{flag} is available with --language {} only; remove it, or remove --language",
             able.join(" and ")
         )));
     }
@@ -49,15 +49,18 @@ pub(crate) fn run(host: &Host, args: &GenerateArgs) -> CommandOutcome {
     };
     let Some(folder) = &args.out else {
         return Err(CommandFailure::Usage(
-            "--out names the folder of the crate".to_owned(),
+            "--out is missing; give the folder of the crate".to_owned(),
         ));
     };
     write_crate(folder, &files)?;
-    terminal::note(&format!("{}: a crate that makes {makes}", folder.display()));
+    terminal::note(&format!(
+        "{}: a crate that builds {makes}",
+        folder.display()
+    ));
     Ok(())
 }
 
-/// Writes or prints the one module.
+/// Writes the module to the target, or prints it.
 fn write_module(target: Option<&OutputFile>, files: &[EmittedFile]) -> CommandOutcome {
     for file in files {
         let Some(target) = target else {
@@ -74,17 +77,17 @@ fn write_module(target: Option<&OutputFile>, files: &[EmittedFile]) -> CommandOu
     Ok(())
 }
 
-/// Writes source files into a folder.
+/// Writes source files into the folder of `--out`; refuses to write over `inputs`.
 fn write_sources(args: &GenerateArgs, inputs: &[&Path], files: &[EmittedFile]) -> CommandOutcome {
     let Some(folder) = &args.out else {
         return Err(CommandFailure::Usage(
-            "--out names the folder of the sources".to_owned(),
+            "--out is missing; give the folder of the sources".to_owned(),
         ));
     };
     refuse_dash("--out", folder)?;
     std::fs::create_dir_all(folder).map_err(|error| {
         CommandFailure::Input(format!(
-            "folder {} cannot be made: {error}",
+            "folder {} cannot be created: {error}",
             folder.display()
         ))
     })?;
@@ -100,10 +103,10 @@ fn write_sources(args: &GenerateArgs, inputs: &[&Path], files: &[EmittedFile]) -
     Ok(())
 }
 
-/// The first line of a manifest that this program wrote.
+/// The first line of each manifest that this program writes; it marks a folder that may be written over.
 const MANIFEST_HEADER: &str = "# Written by modelmill.";
 
-/// Writes a crate; only over a crate of the same kind.
+/// Writes a crate. A folder with other contents than an earlier crate of this program is refused.
 fn write_crate(folder: &Path, files: &[EmittedFile]) -> CommandOutcome {
     refuse_dash("--out", folder)?;
     let manifest = folder.join("Cargo.toml");
@@ -114,7 +117,7 @@ fn write_crate(folder: &Path, files: &[EmittedFile]) -> CommandOutcome {
         || std::fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some());
     if occupied && !ours {
         return Err(CommandFailure::Usage(format!(
-            "--out {}: something else is there; give the name of a new folder",
+            "--out {}: the folder has files that modelmill did not write; give the name of a new folder",
             folder.display()
         )));
     }
@@ -123,7 +126,7 @@ fn write_crate(folder: &Path, files: &[EmittedFile]) -> CommandOutcome {
         let parent = path.parent().unwrap_or(folder);
         std::fs::create_dir_all(parent).map_err(|error| {
             CommandFailure::Input(format!(
-                "folder {} cannot be made: {error}",
+                "folder {} cannot be created: {error}",
                 parent.display()
             ))
         })?;

@@ -1,4 +1,4 @@
-//! `identify`: base parameters from recordings by least squares.
+//! `identify`: estimates base parameters from recordings by least squares.
 
 use std::path::{Path, PathBuf};
 
@@ -12,9 +12,10 @@ use crate::flags::FlagSpelling;
 use crate::output::OutputFile;
 use crate::{commands, terminal};
 
-/// Identifies, prints and perhaps writes the fit.
+/// Estimates the parameters, prints the fit, and writes it to `--out` if given.
 pub(crate) fn run(host: &Host, args: &IdentifyArgs) -> CommandOutcome {
     let model = commands::model(host, &args.model)?;
+    // Instruments are files or `period=SECONDS`; only files are inputs that must not be written over.
     let files = args.estimators.instruments.iter().map(PathBuf::from);
     let instruments: Vec<PathBuf> = files.filter(|file| file.exists()).collect();
     let inputs = model.files().chain(
@@ -33,6 +34,7 @@ pub(crate) fn run(host: &Host, args: &IdentifyArgs) -> CommandOutcome {
         columns: args.estimators.instrument_map.clone(),
         ..reading
     };
+    // Instruments from recordings are read like the data, but with columns of their own.
     let period = period(&args.estimators.instruments)?;
     let recorded = match period {
         Some(_) => Vec::new(),
@@ -71,7 +73,7 @@ pub(crate) fn run(host: &Host, args: &IdentifyArgs) -> CommandOutcome {
     Ok(())
 }
 
-/// The period of `period=SECONDS`, if that is what instruments are.
+/// The period in s of `--instruments period=SECONDS`; none if the instruments are recordings.
 fn period(instruments: &[String]) -> CommandOutcome<Option<f64>> {
     let [one] = instruments else {
         return Ok(None);

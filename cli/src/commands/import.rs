@@ -1,4 +1,4 @@
-//! `import`: a robot description of other programs as the start of a model file.
+//! `import`: converts a robot description of other programs into a model file, as a starting point.
 
 use std::path::{Path, PathBuf};
 
@@ -11,10 +11,10 @@ use crate::failure::{CommandFailure, CommandOutcome};
 use crate::output::OutputFile;
 use crate::terminal;
 
-/// No robot description is longer, bytes.
+/// Largest robot description that is read, bytes.
 const LARGEST_DESCRIPTION: u64 = 16 << 20;
 
-/// Writes the model file and says what was left out or rounded.
+/// Writes the model file. Notes on what was left out or rounded go to standard error.
 pub(crate) fn run(host: &Host, args: &ImportArgs) -> CommandOutcome {
     let file = args.description.as_path();
     let closures = closures_of(file, args.closures.as_deref());
@@ -28,27 +28,27 @@ pub(crate) fn run(host: &Host, args: &ImportArgs) -> CommandOutcome {
     let imported = import_description(host, file, closures.as_deref(), options)?;
     if let (None, Some(path)) = (&args.closures, closures) {
         terminal::note(&format!(
-            "closures and drives are those of {}, which lies beside the description",
+            "loop closures and drives are read from {}, which is in the folder of the description",
             path.display()
         ));
     }
     target.write(&imported.model)?;
     terminal::note(&format!(
-        "{}: {}, with the ten linear parameters of every body; read and mend it",
+        "{}: {}, with the ten linear parameters of every body; check and correct it",
         target.path().display(),
         count(imported.joints.len(), "joint", "joints"),
     ));
     Ok(())
 }
 
-/// Whether a file is called as robot descriptions are.
+/// Whether a file name ends like those of robot descriptions.
 pub(crate) fn is_description(file: &Path) -> bool {
     let endings = ["urdf", "xml", "mjcf", "sdf"];
     file.extension()
         .is_some_and(|ending| endings.iter().any(|known| ending == *known))
 }
 
-/// The file of closures that is given, or the one that lies beside a URDF.
+/// The file of loop closures: the one given, or a `robot.yaml` in the folder of a URDF.
 pub(crate) fn closures_of(file: &Path, given: Option<&Path>) -> Option<PathBuf> {
     let beside = file.with_file_name("robot.yaml");
     let is_urdf = file.extension().is_some_and(|ending| ending == "urdf");
@@ -58,7 +58,7 @@ pub(crate) fn closures_of(file: &Path, given: Option<&Path>) -> Option<PathBuf> 
     }
 }
 
-/// The model file of a robot description.
+/// Reads and converts a robot description; fails if a file cannot be read or is not a robot description.
 pub(crate) fn import_description(
     host: &Host,
     file: &Path,
@@ -80,6 +80,7 @@ pub(crate) fn import_description(
     Ok(host.import(&file.display().to_string(), &text, &options)?)
 }
 
+/// The text of a file; `expected` states in the error which kind of file is needed.
 fn read(host: &Host, path: &Path, expected: &str) -> Result<String, CommandFailure> {
     host.files()
         .read_text(path, LARGEST_DESCRIPTION)

@@ -1,4 +1,4 @@
-//! One file per command; what they share: reading models and recordings, and asking for a diagnosis.
+//! One file per command, and the functions that they share: reading models and recordings, and running a diagnosis.
 
 pub(crate) mod add;
 pub(crate) mod adopt;
@@ -63,7 +63,7 @@ pub(crate) fn load(host: &Host, path: &Path) -> CommandOutcome<LoadedModel> {
     Ok(loaded)
 }
 
-/// Reads a model file and keeps its warnings.
+/// Reads a model file without printing its warnings. If the path is no file, the error lists model files nearby.
 pub(crate) fn load_quietly(host: &Host, path: &Path) -> CommandOutcome<LoadedModel> {
     if path.is_dir() {
         return Err(CommandFailure::Input(format!(
@@ -107,6 +107,7 @@ pub(crate) fn recordings(
     each.map(|path| recording(model, path, reading)).collect()
 }
 
+/// Reads one run and prepares it: positions, rates, accelerations and forces.
 fn recording(
     model: &Model,
     path: &Path,
@@ -117,7 +118,7 @@ fn recording(
     Ok(model.recording_of(&files, reading)?)
 }
 
-/// Diagnoses what the command line names.
+/// Runs the diagnosis of the command line: reads model and recordings, then searches for missing effects.
 pub(crate) fn diagnose(
     host: &Host,
     args: &DiagnosisArgs,
@@ -140,7 +141,8 @@ pub(crate) fn diagnose(
 }
 
 impl DiagnosisArgs {
-    /// Which parameters are held: with those of a fit, what is different from then is asked for, and free ones would take it up.
+    /// Which parameters are fixed. With the values of a fit all are: the question is what changed since the fit, and estimated
+    /// parameters would absorb the change.
     pub(crate) fn fixed_parameters(&self) -> FixedParameters {
         let is_fit = matches!(self.parameters, ParameterSource::Fit(_));
         if self.held || is_fit {
@@ -151,7 +153,7 @@ impl DiagnosisArgs {
     }
 }
 
-/// Model files around a path that led nowhere, as a sentence for the end of a message.
+/// Model files near a path that is no model file, as a clause for the end of a message.
 fn nearby_models_hint(path: &Path) -> String {
     let own = if path.is_dir() {
         path
@@ -191,10 +193,10 @@ fn nearby_models_hint(path: &Path) -> String {
         };
         return format!("; model files nearby:\n  {}{more}", found.join("\n  "));
     }
-    "; `modelmill tour` shows what a model file gives".to_owned()
+    "; `modelmill tour` shows an example".to_owned()
 }
 
-/// Whether a file looks like a model: TOML with a line that gives the version of the schema.
+/// Whether a file looks like a model: TOML with a line `schema = ...`.
 fn is_model(path: &Path) -> bool {
     let disk = DiskFiles::default();
     path.extension().is_some_and(|e| e == "toml")

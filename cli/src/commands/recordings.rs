@@ -1,4 +1,4 @@
-//! `recordings`: what files hold.
+//! `recordings`: lists the contents of recordings.
 
 use modelmill::Host;
 use modelmill::recording::RecordingContents;

@@ -1,4 +1,4 @@
-//! `reduce`: a full-body rig to a planar model, with the size of every approximation.
+//! `reduce`: reduces a full-body rig to a planar model and reports the size of every approximation.
 
 use std::path::Path;
 

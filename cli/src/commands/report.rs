@@ -1,4 +1,4 @@
-//! `report`: what a model lacks, as one self-contained page.
+//! `report`: writes a diagnosis as one self-contained page.
 
 use std::path::PathBuf;
 
@@ -16,7 +16,7 @@ use crate::terminal;
 /// Name of the page in its folder.
 pub(crate) const PAGE: &str = "report.html";
 
-/// Diagnoses and writes the page.
+/// Runs the diagnosis, writes the page and prints the verdict.
 pub(crate) fn run(host: &Host, args: &ReportArgs) -> CommandOutcome {
     output::make_folder(&args.out)?;
     let path = args.out.join(PAGE);

@@ -1,4 +1,4 @@
-//! `runs`: what changed between recordings of one machine.
+//! `runs`: reports what changed between recordings of one machine.
 
 use std::path::{Path, PathBuf};
 
@@ -16,13 +16,15 @@ use crate::{commands, terminal};
 /// Name of the page in its folder.
 const PAGE: &str = "runs.html";
 
-/// What is written to a file.
+/// Format of the file of `--out`.
 enum RunsFileFormat {
+    /// The page `runs.html` in a folder.
     Page,
+    /// All results as one JSON object.
     Json,
 }
 
-/// Prints what changed against the first run, and over all of them.
+/// Prints the changes relative to the first run and over all runs, and writes page or JSON if requested.
 pub(crate) fn run(host: &Host, args: &RunsArgs) -> CommandOutcome {
     let data = expand_paths(&args.data)?;
     let inputs = || [&args.model].into_iter().chain(&data).map(PathBuf::as_path);
@@ -45,6 +47,7 @@ pub(crate) fn run(host: &Host, args: &RunsArgs) -> CommandOutcome {
     };
     let model = commands::model(host, &args.model)?;
     let reading = args.preparation.reading();
+    // A run that cannot be read is passed on with its error; the library decides whether the others are sufficient.
     let recordings = data.iter().map(|path| {
         let files = commands::files_of(path);
         let files: Vec<&Path> = files.iter().map(PathBuf::as_path).collect();
@@ -73,7 +76,8 @@ pub(crate) fn run(host: &Host, args: &RunsArgs) -> CommandOutcome {
     }
 }
 
-/// Folders and patterns become the recordings in them, in the order of their names, in which numbers count as such.
+/// Replaces folders and patterns by the recordings in them, in the order of [`natural_sort_key`].
+/// Fails if a folder or a pattern has no recording.
 fn expand_paths(paths: &[PathBuf]) -> CommandOutcome<Vec<PathBuf>> {
     let mut all = Vec::new();
     for path in paths {
@@ -96,8 +100,8 @@ fn expand_paths(paths: &[PathBuf]) -> CommandOutcome<Vec<PathBuf>> {
         };
         if found.is_empty() {
             return Err(CommandFailure::Input(format!(
-                "--data {text}: there is no recording; a folder is searched for files whose names end as those of recordings do \
-                 (.csv, .parquet, .mat, .h5, .mcap, .db3, .gz, .zst), a pattern for files of any name"
+                "--data {text}: no recording was found; from a folder, files that end in .csv, .parquet, .mat, .h5, .mcap, .db3, \
+                 .gz or .zst are read; a pattern with * or ? matches files of any name"
             )));
         }
         found.sort_by_cached_key(|file| natural_sort_key(&file.to_string_lossy()));

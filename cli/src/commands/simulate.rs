@@ -1,4 +1,4 @@
-//! `simulate`: a rig driven along a trajectory, as a recording.
+//! `simulate`: simulates a rig along a trajectory and writes the recording of its sensors.
 
 use std::path::Path;
 

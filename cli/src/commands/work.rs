@@ -21,12 +21,13 @@ use crate::terminal;
 /// Serves the page until the program is stopped.
 pub(crate) fn run(host: &Host, args: &WorkArgs) -> CommandOutcome {
     if !args.model.is_file() {
-        // This says what is wrong with the path, and which models are near.
+        // The error of this call has the reason and lists model files nearby.
         commands::load_quietly(host, &args.model)?;
     }
     if let Some(beside) = &args.beside {
         commands::load_quietly(host, beside)?;
     }
+    // Each run is a list of files to join on time; all must exist before the server starts.
     let files = |paths: &[PathBuf]| -> CommandOutcome<Vec<Vec<PathBuf>>> {
         let runs = paths.iter().map(|path| commands::files_of(path));
         let is_there = |file: &PathBuf| {
@@ -34,7 +35,7 @@ pub(crate) fn run(host: &Host, args: &WorkArgs) -> CommandOutcome {
                 PathKind::File | PathKind::Folder => return Ok(()),
                 PathKind::Missing => "there is no such file; the path of a recording is expected",
                 PathKind::Stream | PathKind::Device => {
-                    "this is no file on a disk; recordings are read again after each edit, so write it to a file first"
+                    "this is not a file on a disk; recordings are read again after each edit, so write it to a file first"
                 }
             };
             Err(CommandFailure::Input(format!("{}: {says}", file.display())))
@@ -53,33 +54,38 @@ pub(crate) fn run(host: &Host, args: &WorkArgs) -> CommandOutcome {
     };
     let spelled = WorkbenchAdvice::new(host, args);
     serve(host, options, Arc::new(spelled), |link| {
-        // Who does not read standard output has the link from nowhere else, but may still ask for it by port and token.
+        // If standard output is closed, the server continues: a browser that has the link can still use it.
         let _ = if args.json {
             terminal::print_json(&json!({ "url": link }))
         } else {
             terminal::print(&format!(
-                "The workbench is open:\n  {link}\nCtrl+C ends it."
+                "The workbench is open:\n  {link}\nPress Ctrl+C to stop it."
             ))
         };
     })?;
     Ok(())
 }
 
-/// The workbench's steps as command lines.
+/// Spells the steps of the workbench as command lines. All fields are quoted for a shell; flags begin with a space.
 struct WorkbenchAdvice {
+    /// Spelling of the advice of a diagnosis.
     flags: CommandLineSpelling,
+    /// Path of the model file.
     model: String,
+    /// Flags `--data`.
     data: String,
+    /// Flags `--check`.
     check: String,
-    /// The recordings of both as data, where all count alike.
+    /// Recordings of `--data` and `--check`, all as `--data`.
     all: String,
-    /// How recordings are read.
+    /// Flags for reading and preparing recordings.
     reading: String,
-    /// How models are read.
+    /// Flags for reading models.
     libraries: String,
 }
 
 impl WorkbenchAdvice {
+    /// Takes the flags from the arguments of `work`, so that each command reads the same recordings in the same way.
     fn new(host: &Host, args: &WorkArgs) -> Self {
         let named = |option: &str, paths: &[PathBuf]| -> String {
             let path = |path: &PathBuf| format!(" --{option} {}", quoted_path(path));
@@ -97,6 +103,7 @@ impl WorkbenchAdvice {
     }
 }
 
+/// A path, quoted for a shell.
 fn quoted_path(path: &Path) -> String {
     quote_word(&path.display().to_string())
 }
@@ -159,6 +166,7 @@ impl WorkbenchCommands for WorkbenchAdvice {
             ("seed", asked.seed.to_string(), usual.seed.to_string()),
             ("rate", asked.rate.to_string(), usual.rate.to_string()),
         ];
+        // Only settings that differ from their defaults become flags.
         for (name, value, usual) in options {
             if value != usual {
                 let _ = write!(words, " --{name} {value}");
@@ -172,7 +180,7 @@ impl WorkbenchCommands for WorkbenchAdvice {
     }
 }
 
-/// Where the commands of the page let a trajectory go.
+/// File of the trajectory in the commands that the page shows.
 const TRAJECTORY: &str = "excitation.csv";
 
 impl RemedySpelling for WorkbenchAdvice {

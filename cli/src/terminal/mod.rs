@@ -1,5 +1,5 @@
-//! Standard output and standard error: colours only on a terminal, warnings beside the result,
-//! quiet when the reader goes away.
+//! Standard output and standard error. Results go to standard output, warnings and notes to standard error.
+//! Colours are used on a terminal only. A closed output is not an error.
 
 pub(crate) mod plot;
 pub(crate) mod progress;
@@ -24,6 +24,7 @@ pub(crate) fn style() -> TerminalStyle {
     style_for(is_colour_allowed() && io::stdout().is_terminal())
 }
 
+/// The style with or without colours.
 fn style_for(in_colour: bool) -> TerminalStyle {
     if in_colour {
         TerminalStyle::COLOURED
@@ -39,6 +40,7 @@ pub(crate) fn is_stderr_coloured() -> bool {
 
 /// Writes the result of a command to standard output, with one line feed at its end.
 pub(crate) fn print(text: &str) -> CommandOutcome {
+    // Names from files may contain control characters; these must not reach the terminal.
     let text = text::terminal(text, is_colour_allowed() && io::stdout().is_terminal());
     let mut out = io::stdout().lock();
     let end = if text.ends_with('\n') { "" } else { "\n" };
@@ -56,7 +58,7 @@ pub(crate) fn print_json(value: &serde_json::Value) -> CommandOutcome {
     print(&text::json(&format!("{value:#}")))
 }
 
-/// Writes to standard error; who does not read it is not bothered.
+/// Writes to standard error; a closed standard error is ignored.
 pub(crate) fn print_to_stderr(text: &str) {
     let text = text::terminal(text, is_stderr_coloured());
     let _ = writeln!(io::stderr(), "{text}");

@@ -1,12 +1,12 @@
 //! Figures in the terminal: curves in Braille dots (two by four to a character) and bars.
 
-/// One curve with a scale at its left and a range of its own or given.
+/// One curve with a scale on its left.
 pub(crate) struct TerminalCurve<'a> {
     /// Values over the common axis.
     pub(crate) values: &'a [f64],
     /// Height in lines of text.
     pub(crate) height: usize,
-    /// Largest magnitude that is shown; the curve's own if absent.
+    /// Largest magnitude on the scale; that of the values if absent.
     pub(crate) limit: Option<f64>,
 }
 
@@ -19,15 +19,14 @@ const SCALE: usize = 9;
 const DOTS: [[u8; 4]; 2] = [[0x01, 0x02, 0x04, 0x40], [0x08, 0x10, 0x20, 0x80]];
 
 impl TerminalCurve<'_> {
-    /// The curve with its scale, line by line: each column of dots spans the least and the
-    /// largest value that fall into it.
+    /// The curve with its scale, line by line. Each column of dots spans the least and the largest of its values.
     pub(crate) fn lines(&self) -> Vec<String> {
         let own = self.values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
         let limit = self.limit.unwrap_or(own).max(f64::MIN_POSITIVE);
         let (dots_x, dots_y) = (2 * WIDTH, 4 * self.height);
         let mut cells = vec![vec![0_u8; WIDTH]; self.height];
         let n = self.values.len();
-        // Zero has a row of dots of its own, so that a curve around zero does not flicker.
+        // Zero has a separate row of dots, so that a curve around zero does not jump between two rows.
         let half = (dots_y / 2).max(1);
         let row_of = |value: f64| {
             let share = 1.0 - (value / limit).clamp(-1.0, 1.0);
@@ -41,7 +40,7 @@ impl TerminalCurve<'_> {
         };
         for x in 0..dots_x {
             let (from, to) = (x * n / dots_x, (x + 1) * n / dots_x);
-            // One more value on the left keeps a steep curve together.
+            // One more value on the left connects a steep curve to the column before.
             let Some(span) = self
                 .values
                 .get(from.saturating_sub(1)..to.max(from + 1).min(n))
@@ -83,7 +82,7 @@ impl TerminalCurve<'_> {
     }
 }
 
-/// The axis below curves, with the times at its ends.
+/// The time axis below curves, with the first and the last time in s.
 pub(crate) fn time_axis(time: &[f64]) -> String {
     let first = format!("{:.1} s", time.first().copied().unwrap_or(0.0));
     let last = format!("{:.1} s", time.last().copied().unwrap_or(0.0));

@@ -1,4 +1,4 @@
-//! Progress on standard error for whatever takes longer than a second, on a terminal only; remarks as they come up.
+//! Progress on standard error for jobs that take longer than a second, on a terminal only. Remarks are printed as they occur.
 
 use std::io::IsTerminal;
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
@@ -13,27 +13,32 @@ use modelmill_boundary::text;
 
 use crate::terminal;
 
-/// How long the program may be silent before anything is shown.
+/// Time after the start of the program before the first progress line.
 const PATIENCE: Duration = Duration::from_secs(1);
-/// How long a single job may be silent once the program's patience is over.
+/// Time after the start of a job before its line, once [`PATIENCE`] is over.
 const SHORT_PATIENCE: Duration = Duration::from_millis(300);
+/// Interval between updates of the line.
 const TICK: Duration = Duration::from_millis(100);
 
-/// Watches the library's jobs: once the program has been busy for a second on a terminal, a line says what is going on, with
-/// a bar if the job counts its steps and a spinner if it does not.
+/// Shows the library's jobs on a terminal once the program has run for a second: a line with the name of the job and a bar, or a
+/// spinner if the job does not count its steps.
 pub(crate) struct TerminalProgress {
+    /// Start of the program.
     start: Instant,
+    /// One entry per running job, outer jobs first; `None` for jobs without a line.
     watchers: Mutex<Vec<Option<JobWatcher>>>,
 }
 
-/// A thread that looks at a job until it is told to stop.
+/// A thread that shows a job until it ends.
 struct JobWatcher {
-    /// Dropped when the job ends.
+    /// Dropped when the job ends, which stops the thread.
     keep_alive: Sender<()>,
+    /// The thread, joined when the job ends.
     thread: JoinHandle<()>,
 }
 
 impl TerminalProgress {
+    /// Starts the clock of the program.
     pub(crate) fn new() -> Self {
         Self {
             start: Instant::now(),
@@ -45,7 +50,7 @@ impl TerminalProgress {
 impl ProgressListener for TerminalProgress {
     fn on_job_start(&self, what: &str, total: usize, job: &Arc<JobHandle>) {
         let mut watchers = self.watchers.lock().unwrap_or_else(PoisonError::into_inner);
-        // Of jobs within jobs the outer one has its line.
+        // If jobs are nested, only the outer one has a line.
         let is_watched = watchers.iter().any(Option::is_some);
         if is_watched || !std::io::stderr().is_terminal() {
             watchers.push(None);
@@ -87,7 +92,7 @@ impl ProgressListener for TerminalProgress {
         })) = watchers.pop()
         {
             drop(going_on);
-            // A watcher that panicked has shown nothing that is missed.
+            // A panic of the watcher concerns the line only, not the result.
             let _ = thread.join();
         }
     }
@@ -97,10 +102,11 @@ impl ProgressListener for TerminalProgress {
     }
 }
 
-/// As [`Terminal`], for whoever tells remarks at another time.
+/// As [`TerminalProgress`], but drops remarks; for callers that print them later.
 pub(crate) struct ProgressWithoutRemarks(TerminalProgress);
 
 impl ProgressWithoutRemarks {
+    /// Starts a clock, as [`TerminalProgress::new`].
     pub(crate) fn new() -> Self {
         Self(TerminalProgress::new())
     }
@@ -116,6 +122,7 @@ impl ProgressListener for ProgressWithoutRemarks {
     }
 }
 
+/// A bar if the number of steps is known, else a spinner.
 fn new_bar(message: &str, total: usize) -> ProgressBar {
     let target = ProgressDrawTarget::stderr();
     let (bar, template) = if total > 0 {

@@ -431,7 +431,7 @@ fn a_folder_that_holds_something_else_is_left_alone() {
     let output = command(&out);
     assert_eq!(output.status.code(), Some(2));
     let says = String::from_utf8_lossy(&output.stderr);
-    assert!(says.contains("something else is there"), "{says}");
+    assert!(says.contains("the folder has files that modelmill did not write"), "{says}");
     assert_eq!(
         std::fs::read_to_string(out.join("Cargo.toml")).unwrap(),
         "[package]\n"

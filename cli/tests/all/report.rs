@@ -308,7 +308,7 @@ fn the_tour_tells_the_story_and_writes_its_files() {
         "Compare: where does the model fail?",
         "rod inertia (spindle_left, spindle_right)",
         "+kind = \"rod_inertia\"",
-        "Identify again, and watch the error fall",
+        "Identify again: the error falls",
         "lumped mass placement (R3m, R3m_right)",
         "32.1 %",
         "report-paper.html",

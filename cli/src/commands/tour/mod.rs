@@ -104,6 +104,7 @@ impl TourFolder {
         Ok(place)
     }
 
+    /// Writes a file of the folder.
     fn write(&self, name: &str, text: &str) -> CommandOutcome {
         output::write(&self.folder.join(name), text)
     }
@@ -122,14 +123,17 @@ impl TourFolder {
         )
     }
 
+    /// Path of a file of the folder.
     fn path(&self, name: &str) -> PathBuf {
         self.folder.join(file_name(name))
     }
 
+    /// Reads and derives a model of the folder.
     fn model(&self, host: &Host, name: &str) -> CommandOutcome<Model> {
         Ok(host.model(self.path(name))?)
     }
 
+    /// Reads the fit run and the validation run, in this order.
     fn read(&self, model: &Model, runs: &BundledRuns) -> CommandOutcome<[PreparedRecording; 2]> {
         let read = |name: &str| model.recording(self.path(name), &RecordingOptions::default());
         Ok([read(runs.fit.0)?, read(runs.check.0)?])
@@ -171,6 +175,7 @@ fn file_name(name: &str) -> &str {
 
 /// The model with nominal parameters compared with a recording.
 struct TourComparison {
+    /// Error figures, and where the error is largest.
     compared: ModelComparison,
     /// Times of the samples, s.
     time: Vec<f64>,
@@ -181,6 +186,7 @@ struct TourComparison {
 }
 
 impl TourComparison {
+    /// Computes forces and errors along the first segment. Fails if the recording has no samples.
     fn new(model: &Model, recording: &PreparedRecording) -> CommandOutcome<Self> {
         let one = recording.segments.first().ok_or_else(|| {
             CommandFailure::Input("the bundled recording has no samples".to_owned())
