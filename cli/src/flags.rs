@@ -1,4 +1,5 @@
-//! Spelling of the library's advice for the command line: options as flags, commands of the program, complete command lines.
+//! Spelling of the library's advice for the command line: options as flags, commands of the program, complete command
+//! lines.
 
 use std::borrow::Cow;
 use std::fmt::Write as _;
@@ -153,7 +154,8 @@ fn flag(option: OptionName) -> String {
     }
 }
 
-/// A value quoted for a shell: in double quotes as in the help, or in single quotes if a shell would expand its characters.
+/// A value quoted for a shell: in double quotes as in the help, or in single quotes if a shell would expand its
+/// characters.
 fn quote_value(value: &str) -> Cow<'_, str> {
     if value.contains(['"', '$', '\\', '!', '\'']) {
         Cow::Owned(quote_word(value))

@@ -1,5 +1,5 @@
-//! The program: arguments become options of the library, its answers become text, JSON and files. Exit status 0 done, 1 the
-//! input is at fault, 2 wrong usage.
+//! The program: arguments become options of the library, its answers become text, JSON and files. Exit status 0 done, 1
+//! the input is at fault, 2 wrong usage.
 
 mod args;
 mod commands;

@@ -1,7 +1,7 @@
-//! What a page may ask of a sitting, by name and with a body of JSON, wherever the sitting takes place.
+//! The requests of a page to a session. A name and a JSON body go in; JSON, SVG, HTML or a refusal comes out.
 //!
 //! Decision: the page sends a name and a JSON body and does not know whether a server or a worker answers. So there
-//! is one page, and what is tested on a server holds for both.
+//! is one page, and tests with a server are valid for both.
 
 use std::sync::Arc;
 
@@ -11,28 +11,31 @@ use serde_json::Value;
 
 use crate::sitting::{KeepTrajectoryRequest, PictureRequest, WorkbenchSession};
 
-/// What a page gets.
+/// A response to a page.
 pub(crate) enum PageResponse {
+    /// Data for the scripts of the page.
     Json(Value),
+    /// A picture.
     Svg(String),
+    /// A part of a page.
     Html(String),
 }
 
-/// Why it gets none.
+/// Kind of a refusal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum RequestFault {
-    /// Nothing of that name can be asked.
+    /// There is no request with this name.
     Unknown,
-    /// The body is none of this question.
+    /// The body does not fit the request.
     Malformed,
-    /// The text was changed meanwhile.
+    /// The text was changed since the revision that the request refers to.
     Conflict,
-    /// It cannot be done.
+    /// The request is valid but cannot be fulfilled.
     Refused,
 }
 
 impl RequestFault {
-    /// As HTTP counts it.
+    /// The HTTP status code.
     pub(crate) fn status(self) -> u16 {
         match self {
             Self::Unknown => 404,
@@ -43,7 +46,7 @@ impl RequestFault {
     }
 }
 
-/// No answer, with a sentence that says why.
+/// A refusal: its kind, and a sentence with the reason.
 pub(crate) struct RequestRefusal(pub(crate) RequestFault, pub(crate) String);
 
 impl From<String> for RequestRefusal {
@@ -52,47 +55,56 @@ impl From<String> for RequestRefusal {
     }
 }
 
+/// Body of `edit`.
 #[derive(Deserialize)]
 struct EditRequest {
-    /// The revision that the text was made of.
+    /// The revision that was edited.
     base: u64,
+    /// The complete new text.
     text: String,
-    /// What it does, in words.
+    /// Name of the step for the pane *Ladder*, if the edit is a step.
     #[serde(default)]
     did: Option<String>,
 }
 
+/// Body of `choose`, which resolves a conflict between two texts.
 #[derive(Deserialize)]
 struct ConflictRequest {
+    /// Whether the text of the other program replaces that of the page.
     theirs: bool,
 }
 
+/// Body of `compare`.
 #[derive(Deserialize)]
 struct CompareRequest {
-    /// Whether to look where the error lives.
+    /// Whether to search for the regions with the largest error.
     places: bool,
     /// Whether to read the recordings again.
     afresh: bool,
 }
 
+/// Body of `curves`.
 #[derive(Deserialize)]
 struct CurvesRequest {
-    /// With identified values rather than those of the file.
+    /// Whether to use identified values instead of those of the file.
     identified: bool,
 }
 
+/// Body of `variant`.
 #[derive(Deserialize)]
 struct VariantRequest {
-    /// The model that is held beside the text, as `models` names it; the text as it was saved if there is none.
+    /// The model to compare with, by its name in `models`; none for the saved text.
     beside: Option<String>,
 }
 
+/// Body of `add`.
 #[derive(Deserialize)]
 struct AddEffectRequest {
+    /// Index of the effect among the findings of the last diagnosis.
     entry: usize,
 }
 
-/// Answers a question about a sitting.
+/// Answers a request to a session.
 pub(crate) fn answer_request(
     sitting: &Arc<WorkbenchSession>,
     question: &str,
@@ -104,7 +116,7 @@ pub(crate) fn answer_request(
             let EditRequest { base, text, did } = parse_body(body)?;
             let told = sitting.edit(base, &text, did.as_deref());
             told.ok_or_else(|| {
-                let says = "the text was changed elsewhere meanwhile";
+                let says = "the text was changed in another window";
                 RequestRefusal(RequestFault::Conflict, says.to_owned())
             })?
         }
@@ -141,13 +153,13 @@ pub(crate) fn answer_request(
             sitting.keep_trajectory(&parse_body::<KeepTrajectoryRequest>(body)?)?
         }
         other => {
-            let says = format!("nothing called `{other}` can be asked");
+            let says = format!("there is no request `{other}`");
             return Err(RequestRefusal(RequestFault::Unknown, says));
         }
     }))
 }
 
-/// A body of JSON.
+/// Reads a JSON body; refuses one that does not fit the request.
 pub(crate) fn parse_body<T: DeserializeOwned>(body: &[u8]) -> Result<T, RequestRefusal> {
     serde_json::from_slice(body)
         .map_err(|error| RequestRefusal(RequestFault::Malformed, error.to_string()))

@@ -1,4 +1,5 @@
-//! A desk: a sitting in memory, for a page that has the mill in itself. Files are put on it, then it is asked as the server is.
+//! The request handler of a session in memory, for a page that contains the program as WebAssembly. Files are added
+//! first; then it answers the same requests as the server.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -15,27 +16,33 @@ use crate::options::{ExcitationSettings, Options, WorkbenchCommands, WorkbenchSt
 use crate::shelf::MemoryStore;
 use crate::sitting::WorkbenchSession;
 
-/// A sitting in memory, and the files for the next one.
+/// A session in memory, and the files for the next one.
 pub struct RequestHandler {
+    /// Files, clock and progress.
     shelf: MemoryStore,
+    /// The open session, if any.
     sitting: Option<Arc<WorkbenchSession>>,
 }
 
-/// What a page opens.
+/// Body of the request `open`: names of files that were added before.
 #[derive(Deserialize)]
 struct OpenRequest {
+    /// Model file.
     model: PathBuf,
+    /// Recordings for the fit.
     #[serde(default)]
     data: Vec<PathBuf>,
+    /// Recordings for validation.
     #[serde(default)]
     check: Vec<PathBuf>,
-    /// What counts begin with.
+    /// First value of revisions and versions, see [`Options::first`].
     #[serde(default)]
     first: u64,
 }
 
 impl RequestHandler {
-    /// An empty desk. `seconds` is its clock, and `goes_on` gets JSON that says how far long work is (`what`, `done`, `total`).
+    /// A handler without files. `seconds` is its clock, and `goes_on` gets the progress of long work as JSON (`what`,
+    /// `done`, `total`).
     pub fn new(seconds: fn() -> f64, goes_on: fn(&serde_json::Value)) -> Self {
         Self {
             shelf: MemoryStore::new(seconds, goes_on),
@@ -43,13 +50,13 @@ impl RequestHandler {
         }
     }
 
-    /// Puts a file there, in the place of one of that name.
+    /// Adds a file, or replaces the file with this name.
     pub fn add_file(&mut self, name: &str, bytes: &[u8]) {
         self.shelf.insert_file(Path::new(name), bytes);
     }
 
-    /// Answers a question: JSON with the `status` that a server would give, and what is `told`. `open` (`model`, `data`,
-    /// `check`: names of files) begins a sitting, all other questions are the server's.
+    /// Answers a request: JSON with the HTTP `status` of the server, and the response under `told`. `open` (`model`,
+    /// `data`, `check`: names of files) starts a session; all other requests are those of the server.
     pub fn answer_request(&mut self, question: &str, body: &[u8]) -> String {
         let found = if question == "open" {
             self.open_session(body)
@@ -67,6 +74,7 @@ impl RequestHandler {
         json!({ "status": status, "told": told }).to_string()
     }
 
+    /// Opens a session on the files that were added; each recording is one file.
     fn open_session(&mut self, body: &[u8]) -> Result<PageResponse, RequestRefusal> {
         let asked: OpenRequest = parse_body(body)?;
         let alone = |files: Vec<PathBuf>| files.into_iter().map(|file| vec![file]).collect();
@@ -86,7 +94,7 @@ impl RequestHandler {
     }
 }
 
-/// PlainAdvice for a page without a command line: panes of the workbench where one does it, else the library's.
+/// Spelling of advice for a page without a command line: names of panes if a pane does it, else calls of the library.
 struct PageSpelling;
 
 impl RemedySpelling for PageSpelling {
@@ -98,7 +106,7 @@ impl RemedySpelling for PageSpelling {
         match command {
             CommandName::Check => "pane `Mechanism`".to_owned(),
             CommandName::Diagnose => "pane `Diagnosis`".to_owned(),
-            CommandName::Excite => "pane `ExcitationSettings`".to_owned(),
+            CommandName::Excite => "pane `Excitation`".to_owned(),
             CommandName::Adopt | CommandName::Evaluate | CommandName::Identify => {
                 LibrarySpelling.spell_command(command)
             }

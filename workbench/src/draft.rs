@@ -1,12 +1,12 @@
-//! The text that is edited, beside what the disk holds. It knows when both went different ways, and never takes one for the
-//! other by itself.
+//! The edited document: the text of a model file and the text on disk. It detects when both have changed, and never
+//! replaces one by the other by itself.
 //!
-//! Decision: two texts are never merged. If another program and the page both changed the file, both texts stay
-//! until the user chooses. The file is read again right before it is replaced; the remaining gap of less than a
-//! millisecond cannot be closed portably.
+//! Decision: two texts are never merged. If another program and the page both changed the file, both texts stay until
+//! the user chooses. The file is read again right before it is replaced; the remaining gap of less than a millisecond
+//! cannot be closed portably.
 //!
-//! Decision: the file is read and compared four times a second. Notifications of the system are missing on some
-//! disks, differ when an editor replaces a file, and would have to be confirmed by reading anyway.
+//! Decision: the file is read and compared four times a second. Notifications of the system are missing on some disks,
+//! differ when an editor replaces a file, and would have to be confirmed by reading anyway.
 
 use std::borrow::Cow;
 
@@ -15,27 +15,27 @@ use std::borrow::Cow;
 pub(crate) struct EditedDocument {
     /// The text as it is edited.
     text: String,
-    /// What the disk held when the text was last read from it or written to it.
+    /// The text on disk when it was last read or written.
     saved: String,
-    /// What another program wrote to the disk meanwhile, while the text had changes of its own.
+    /// The text that another program wrote to the disk while the edited text had unsaved changes.
     outside: Option<String>,
     /// Counts the changes of the text.
     revision: u64,
 }
 
-/// What came of a look at the disk.
+/// Result of a comparison with the disk.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum DiskChange {
-    /// Nothing that was not known.
+    /// No new change on disk.
     Unchanged,
-    /// The text had no changes of its own and is now what the disk holds.
+    /// The text had no unsaved changes and was replaced by that on disk.
     Reloaded,
-    /// Both have changes: somebody must choose.
+    /// Both texts have changed: the user must choose.
     Conflict,
 }
 
 impl EditedDocument {
-    /// What was just read from the disk; its changes count from `revision`.
+    /// A document with the text of the disk; revisions are counted from `revision`.
     pub(crate) fn new(text: String, revision: u64) -> Self {
         Self {
             saved: text.clone(),
@@ -61,18 +61,19 @@ impl EditedDocument {
         self.revision
     }
 
-    /// Whether there is anything that the disk does not hold.
+    /// Whether the text has unsaved changes.
     pub(crate) fn is_changed(&self) -> bool {
         self.text != self.saved
     }
 
-    /// Whether another program wrote something that the text does not hold.
+    /// Whether another program changed the file while the text had unsaved changes.
     pub(crate) fn is_in_conflict(&self) -> bool {
         self.outside.is_some()
     }
 
-    /// Takes a new text that was made of revision `base`; false, and nothing done, if that is not the last one. Pages end lines
-    /// with a line feed only; where the file has carriage returns before them, the new text gets them too.
+    /// Accepts a new text that was edited from revision `base`. Returns false without a change if `base` is not the
+    /// last revision and the texts differ. Pages end lines with a line feed only; if the file has carriage returns, the
+    /// new text gets them too.
     pub(crate) fn edit(&mut self, base: u64, text: &str) -> bool {
         let text = self.with_ends_of_lines(text);
         let text = text.as_ref();
@@ -86,6 +87,7 @@ impl EditedDocument {
         true
     }
 
+    /// The text with the line ends that most lines of the saved text have.
     fn with_ends_of_lines<'a>(&self, text: &'a str) -> Cow<'a, str> {
         let returns = self.saved.matches("\r\n").count();
         if 2 * returns > self.saved.matches('\n').count() && !text.contains('\r') {
@@ -95,7 +97,7 @@ impl EditedDocument {
         }
     }
 
-    /// Looks at what the disk holds.
+    /// Compares with the text on disk, and loads it if no unsaved change would be lost.
     pub(crate) fn update_from_disk(&mut self, disk: &str) -> DiskChange {
         if disk == self.saved {
             self.outside = None;
@@ -118,21 +120,21 @@ impl EditedDocument {
         DiskChange::Reloaded
     }
 
-    /// The disk holds the text now.
+    /// Notes that the text is now on disk.
     pub(crate) fn mark_saved(&mut self) {
         self.saved.clone_from(&self.text);
         self.outside = None;
     }
 
-    /// Ends a conflict: the text stays, and may be saved over what the other program wrote; what it writes later is a conflict
-    /// again.
+    /// Resolves a conflict: the text stays and may be saved over that of the other program. A later change by that
+    /// program is a new conflict.
     pub(crate) fn keep_own_text(&mut self) {
         if let Some(outside) = self.outside.take() {
             self.saved = outside;
         }
     }
 
-    /// Ends a conflict: what the other program wrote takes the place of the text.
+    /// Resolves a conflict: the text of the other program replaces the edited one.
     pub(crate) fn accept_outside_text(&mut self) {
         if let Some(outside) = self.outside.take() {
             self.text = outside;

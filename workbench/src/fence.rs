@@ -1,5 +1,5 @@
-//! Files that a sitting may read: those of the model's folder, and those that were named when it began with what they are made of. A text that is edited in
-//! a page may name any path.
+//! The file access policy of a session. A text that is edited in a page may name any path, so only these files are
+//! read: those in the model's folder, those named at the start, and the files that these used at the start.
 
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -10,15 +10,18 @@ use modelmill::{Error, Host};
 
 use crate::options::Options;
 
-/// The disk, as far as a sitting may read it.
+/// The part of the disk that a session may read.
 pub(crate) struct FileAccessPolicy {
+    /// The disk.
     disk: DiskFiles,
+    /// Folder of the model, as a canonical path.
     folder: PathBuf,
+    /// Permitted files outside of the folder, as canonical paths.
     named: RwLock<Vec<PathBuf>>,
 }
 
 impl FileAccessPolicy {
-    /// The folder of the model, and nothing else yet.
+    /// A policy that permits the folder of the model only.
     fn for_model_folder(model: &Path) -> Arc<Self> {
         let folder = match model.parent() {
             Some(parent) if parent != Path::new("") => parent,
@@ -31,7 +34,7 @@ impl FileAccessPolicy {
         })
     }
 
-    /// Lets in what a sitting was opened with: what was named, and what the model file as the disk holds it is made of.
+    /// A policy that also permits the files named at the start, and the files that the model files on disk include.
     pub(crate) fn for_session(host: &Host, options: &Options) -> Arc<Self> {
         let fence = Self::for_model_folder(&options.model);
         let named = (options.data.iter().chain(&options.check).flatten())
@@ -48,6 +51,7 @@ impl FileAccessPolicy {
                     .sources
                     .paths()
                     .for_each(|path| fence.allow_file(path)),
+                // A model with faults may be edited as well, so its files are permitted too.
                 Err(Error::Model(fault)) => {
                     fault
                         .sources
@@ -60,7 +64,7 @@ impl FileAccessPolicy {
         fence
     }
 
-    /// Lets a file in that was named on purpose.
+    /// Permits one file.
     fn allow_file(&self, path: &Path) {
         let mut named = match self.named.write() {
             Ok(named) => named,
@@ -69,6 +73,7 @@ impl FileAccessPolicy {
         named.push(canonical_path(path));
     }
 
+    /// Fails if a path leads to a file that is not permitted, also through links.
     fn check_access(&self, path: &Path) -> Result<(), FileError> {
         let real = canonical_path(path);
         let named = match self.named.read() {
@@ -79,7 +84,7 @@ impl FileAccessPolicy {
             return Ok(());
         }
         let says = format!(
-            "it is outside of {}, the folder of the model, and was not named when the workbench began",
+            "it is outside of {}, the folder of the model, and was not named when the workbench was started",
             self.folder.display()
         );
         let kind = ErrorKind::PermissionDenied;
@@ -87,7 +92,7 @@ impl FileAccessPolicy {
     }
 }
 
-/// The path without links, where it leads to anything.
+/// The path without links and `..`; unchanged if nothing exists there.
 fn canonical_path(path: &Path) -> PathBuf {
     path.canonicalize().unwrap_or_else(|_| path.to_owned())
 }

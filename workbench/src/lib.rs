@@ -1,13 +1,15 @@
-//! The workbench: one model file in the browser, on the user's own machine, with its picture, equations, errors along recordings
-//! and diagnosis beside the text.
+//! The workbench: one model file in the browser, on the user's own machine, with its picture, equations, errors along
+//! recordings and diagnosis next to the text.
 //!
-//! `options` is what is put on it, `draft` the text beside what the disk holds, `readings` recordings as a model reads them,
-//! `surroundings` what a sitting needs of where it takes place, `watch` the progress of a diagnosis; `sitting` is the text with
-//! what was derived of it and asked about it, `variant` the model that it is held beside, `told` the answers as JSON, `answers` what a page may ask, `page` the page.
+//! `options` has the files and settings, `draft` the edited document and the text on disk, `readings` the cache of
+//! recordings, `surroundings` the environment of a session (files, clock, threads), `watch` the progress of a job.
+//! `sitting` is the session: the text, the derived model, and the jobs. `variant` is the model that the text is
+//! compared with, `told` the JSON views, `answers` the requests of a page, `page` the page.
 //!
-//! It takes place on this machine, where `machine` has the disk behind a `fence` and a `server` lets the page ask; or on a
-//! `desk` in memory (its files on a `shelf`), which WebAssembly carries into the page itself. All of the work is the library's:
-//! this crate derives, compares and diagnoses nothing by itself.
+//! A session runs on this machine: `machine` gives access to the disk through the file access policy of `fence`, and
+//! `server` receives the requests of the page. Or it runs in memory: `desk` is the request handler and `shelf` the
+//! memory store, compiled to WebAssembly as part of the page. The library does the work: this crate does not derive,
+//! compare or diagnose by itself.
 
 mod answers;
 mod desk;
@@ -35,11 +37,12 @@ pub use options::{ExcitationSettings, Options, WorkbenchCommands, WorkbenchStep}
 #[cfg(not(target_family = "wasm"))]
 pub use page::{PageBundle, standalone_page};
 
-/// Serves the workbench on the loopback address until the program is stopped; `opened` gets the link as soon as it answers.
+/// Serves the workbench on the loopback address until the program is stopped; `opened` gets the link once the server
+/// listens.
 ///
-/// `host` gives libraries of effects and how models are derived; files come through a fence of the workbench's own.
-/// Fails when the model file cannot be read, or the port is taken. A model file that has no meaning is no failure: it is what
-/// the workbench is for.
+/// `host` gives libraries of effects and options for deriving models; files are read through the workbench's file
+/// access policy. Fails if the model file cannot be read, or the port is in use. A model file with faults is no
+/// failure: the page shows the faults.
 #[cfg(not(target_family = "wasm"))]
 pub fn serve(
     host: &modelmill::Host,

@@ -1,4 +1,4 @@
-//! This machine as the surroundings of a sitting: its disk behind a fence, its clock, threads.
+//! This machine as the environment of a session: its disk under the file access policy, its clock, its threads.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -14,15 +14,18 @@ use crate::surroundings::SessionEnvironment;
 /// Bytes of stack for long work, as the program itself has.
 pub(crate) const STACK: usize = 16 << 20;
 
-/// This machine, as far as a sitting may use it.
+/// The part of this machine that a session may use.
 pub(crate) struct LocalMachine {
+    /// The files that may be read.
     fence: Arc<FileAccessPolicy>,
+    /// Zero of the clock.
     since: Instant,
+    /// Last version of the session, for waiting pages.
     changes: watch::Sender<u64>,
 }
 
 impl LocalMachine {
-    /// Files come through the fence.
+    /// Files are read under the policy `fence`.
     pub(crate) fn new(fence: Arc<FileAccessPolicy>) -> Self {
         Self {
             fence,
@@ -31,7 +34,7 @@ impl LocalMachine {
         }
     }
 
-    /// The last version that pages should hear of.
+    /// A receiver of the last version of the session.
     pub(crate) fn changes(&self) -> watch::Receiver<u64> {
         self.changes.subscribe()
     }
@@ -55,7 +58,7 @@ impl SessionEnvironment for LocalMachine {
     }
 
     fn report_progress(&self, _: &Value) {
-        // Pages ask how far it is.
+        // Pages request the progress by themselves.
     }
 
     fn spawn_work(&self, work: Box<dyn FnOnce() + Send>) -> Result<(), String> {

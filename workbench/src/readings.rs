@@ -1,26 +1,28 @@
-//! Recordings as a model reads them, kept while the text changes nothing on which reading depends: that is all of the mechanism
-//! but the values of its parameters. States and regressors are the same then; only remarks on a recording may know values, so
-//! who wants these reads afresh.
+//! A cache of prepared recordings. They depend on the mechanism but not on the values of its parameters, so they are
+//! kept while only values change: states and regressors are then the same. Remarks on a recording may depend on values;
+//! a caller that needs these reads afresh.
 //!
-//! Decision: reading and checking a recording takes four times as long as everything else between a keystroke and
-//! the error. It is repeated when typing stops, because remarks on a recording may depend on values.
+//! Decision: reading and checking a recording takes four times as long as everything else between a keystroke and the
+//! error. It is repeated when typing stops, because remarks on a recording may depend on values.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use modelmill::recording::PreparedRecording;
 use modelmill::{Model, Outcome};
 
-/// Recordings of fit and check.
+/// Recordings for the fit and for validation, in this order.
 pub(crate) type SessionRecordings = [Vec<PreparedRecording>; 2];
 
 /// The recordings as they were last read.
 #[derive(Default)]
 pub(crate) struct RecordingCache {
+    /// Key of the mechanism for which they were read, and the recordings.
     kept: Mutex<Option<(String, Arc<SessionRecordings>)>>,
 }
 
 impl RecordingCache {
-    /// Recordings as `model` reads them, and whether they were read for this model itself; `read` does it.
+    /// Recordings for `model`, and whether they were read now. `read` reads them if the cache has none or `is_afresh`
+    /// is set.
     pub(crate) fn recordings_for(
         &self,
         model: &Model,
@@ -39,12 +41,13 @@ impl RecordingCache {
         }
     }
 
+    /// The contents of the cache; a panic of another thread does not lose them.
     fn lock_cache(&self) -> MutexGuard<'_, Option<(String, Arc<SessionRecordings>)>> {
         self.kept.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-/// A mechanism in words, complete but for the values of its parameters.
+/// A text that is equal for two models if they differ in values of parameters only.
 fn mechanism_key(model: &Model) -> String {
     let mut mechanism = model.derivation.mechanism.clone();
     for parameter in &mut mechanism.parameters {

@@ -1,12 +1,13 @@
-//! The server: it listens on the loopback address alone, and answers only who has the token of the link, asks under its own name,
-//! and comes from its own page.
+//! The server. It listens on the loopback address only. It accepts requests with the token of the link, under its own
+//! name, from its own page.
 //!
-//! A page of any other site may send requests to the loopback address; the name in `Host` keeps out sites whose name was made to
-//! lead here (DNS rebinding), `Origin` those that ask openly, and the token all others.
+//! A page of any other site can send requests to the loopback address. The check of `Host` refuses sites whose name
+//! resolves to this machine (DNS rebinding), the check of `Origin` refuses pages of other sites, and the token refuses
+//! all others.
 //!
 //! Decision: HTTP is axum on hyper and tokio without macros, forms or sockets, because a parser of browser requests
-//! should be maintained by a project of its own. It costs half a minute of one core to build. The page runs no
-//! script but its own (a nonce), and texts of models and recordings enter as text.
+//! should be maintained by a project of its own. It costs half a minute of one core to build. The page runs no script
+//! but its own (a nonce), and texts of models and recordings enter as text.
 
 use std::net::{Ipv4Addr, SocketAddr};
 use std::sync::Arc;
@@ -33,24 +34,29 @@ use crate::machine::{LocalMachine, STACK};
 use crate::page;
 use crate::sitting::{LONGEST, WorkbenchSession};
 
-/// How the page shows that it is the one that was opened with the link.
+/// Header with the token, by which the page proves that it was opened with the link.
 const TOKEN: HeaderName = HeaderName::from_static("x-modelmill-token");
-/// How often the disk is looked at. Files are read rather than watched for notices of the system: a model is short, and notices
-/// do not come from every disk, nor for every way in which editors put a new file in the place of an old one.
+/// Interval at which files are read and compared. Notifications of the system are not used: a model is short, and
+/// notifications are missing on some disks and for some ways in which editors replace a file.
 const POLL_INTERVAL: Duration = Duration::from_millis(250);
-/// How long a page waits for news before it asks again.
+/// Time after which a request for changes is answered even without a change.
 const NEWS_TIMEOUT: Duration = Duration::from_secs(20);
 
+/// State that all handlers share.
 struct ServerState {
+    /// The session of the model file.
     sitting: Arc<WorkbenchSession>,
+    /// This machine; it signals changes to waiting pages.
     machine: Arc<LocalMachine>,
+    /// Token of the link, 32 hexadecimal digits.
     token: String,
+    /// Port on the loopback address.
     port: u16,
 }
 
-/// Serves a sitting until the program is stopped; `opened` gets the link.
+/// Serves a session until the program is stopped; `opened` gets the link.
 ///
-/// Fails when the port cannot be had.
+/// Fails if the port is in use.
 pub(crate) fn serve(
     sitting: Arc<WorkbenchSession>,
     machine: Arc<LocalMachine>,
@@ -62,12 +68,12 @@ pub(crate) fn serve(
         .thread_stack_size(STACK)
         .enable_all()
         .build()
-        .map_err(|error| Error::input(format!("no server can be made: {error}")))?;
+        .map_err(|error| Error::input(format!("the server cannot be started: {error}")))?;
     runtime.block_on(async {
         let address = SocketAddr::from((Ipv4Addr::LOCALHOST, port));
         let taken = |error| {
             Error::input(format!(
-                "{address} cannot be listened on: {error}; choose another port, or none"
+                "the server cannot listen on {address}: {error}; choose another port, or give no port"
             ))
         };
         let listener = TcpListener::bind(address).await.map_err(taken)?;
@@ -91,20 +97,24 @@ pub(crate) fn serve(
 /// 128 random bits in hexadecimal digits.
 fn random_token() -> Result<String, String> {
     let mut bytes = [0_u8; 16];
-    getrandom::fill(&mut bytes).map_err(|error| format!("no token can be drawn: {error}"))?;
+    getrandom::fill(&mut bytes)
+        .map_err(|error| format!("no random token is available: {error}"))?;
     Ok(format!("{:032x}", u128::from_le_bytes(bytes)))
 }
 
+/// Checks the files for changes by other programs, as long as the server runs.
 async fn poll_files(sitting: Arc<WorkbenchSession>) {
     loop {
         tokio::time::sleep(POLL_INTERVAL).await;
         let sitting = Arc::clone(&sitting);
-        // What fails once is tried again.
+        // A failure is ignored here: the next check repeats it.
         let _ = tokio::task::spawn_blocking(move || sitting.check_disk()).await;
     }
 }
 
+/// The routes of page and requests; each passes the checks of [`guard`] first.
 fn router(app: Arc<ServerState>) -> Router {
+    // Escapes of JSON make a text longer than its file.
     let most = usize::try_from(8 * LONGEST).unwrap_or(usize::MAX);
     Router::new()
         .route("/", get(serve_page))
@@ -115,7 +125,7 @@ fn router(app: Arc<ServerState>) -> Router {
         .with_state(app)
 }
 
-/// Refuses what does not come from the page that was opened with the link.
+/// Refuses requests that do not come from the page that was opened with the link.
 async fn guard(State(app): State<Arc<ServerState>>, request: Request, next: Next) -> Response {
     let headers = request.headers();
     let refused = |says: &'static str| (StatusCode::FORBIDDEN, says).into_response();
@@ -133,9 +143,10 @@ async fn guard(State(app): State<Arc<ServerState>>, request: Request, next: Next
             name.is_some_and(|name| names.iter().any(|own| own == name))
         };
         if !text(ORIGIN).is_some_and(is_own) {
-            return refused("Pages of other sites get no answer.\n");
+            return refused("Requests from pages of other sites are refused.\n");
         }
     }
+    // The link has the token in its query; requests of the page have it in a header, which other sites cannot set.
     let is_page = request.uri().path() == "/";
     let given = if is_page {
         let query = request.uri().query().unwrap_or_default();
@@ -148,7 +159,7 @@ async fn guard(State(app): State<Arc<ServerState>>, request: Request, next: Next
     };
     if !given.is_some_and(|given| is_same_token(given, &app.token)) {
         return refused(
-            "Open the link that `modelmill work` printed; its token is missing here.\n",
+            "The token is missing or wrong. Open the link that `modelmill work` printed.\n",
         );
     }
     let mut response = next.run(request).await;
@@ -165,16 +176,16 @@ async fn guard(State(app): State<Arc<ServerState>>, request: Request, next: Next
     response
 }
 
-/// Compares without telling by its time how much was right.
+/// Compares in constant time, so that the duration does not reveal how many characters are right.
 fn is_same_token(given: &str, token: &str) -> bool {
     let pairs = given.bytes().zip(token.bytes());
     given.len() == token.len() && pairs.fold(0, |differs, (a, b)| differs | (a ^ b)) == 0
 }
 
-/// What a handler answers, or why it does not.
+/// The response of a handler, or its refusal.
 type HandlerResult = Result<Response, HttpRefusal>;
 
-/// Why there is no answer.
+/// A refusal: HTTP status, and a sentence with the reason.
 struct HttpRefusal(StatusCode, String);
 
 impl IntoResponse for HttpRefusal {
@@ -190,7 +201,7 @@ impl From<RequestRefusal> for HttpRefusal {
     }
 }
 
-/// Does work that takes its time where it keeps nobody else waiting.
+/// Does long work on a separate thread, so that other requests do not wait. A panic becomes status 500.
 async fn run_blocking<T: Send + 'static>(
     app: &ServerState,
     work: impl FnOnce(&Arc<WorkbenchSession>) -> T + Send + 'static,
@@ -200,11 +211,12 @@ async fn run_blocking<T: Send + 'static>(
     done.map_err(|_| {
         HttpRefusal(
             StatusCode::INTERNAL_SERVER_ERROR,
-            "a fault of the program, which is none of yours; the text is kept".to_owned(),
+            "internal error of the program, not of your input; the text is kept".to_owned(),
         )
     })
 }
 
+/// Sends the page with a policy that permits only its own scripts (by a nonce) and no other connections.
 async fn serve_page() -> HandlerResult {
     let nonce = random_token().map_err(RequestRefusal::from)?;
     let policy = format!(
@@ -219,6 +231,7 @@ async fn serve_page() -> HandlerResult {
     Ok(response)
 }
 
+/// Query of `/api/view`.
 #[derive(Deserialize)]
 struct SinceQuery {
     /// The version that the page has.
@@ -226,20 +239,20 @@ struct SinceQuery {
     since: u64,
 }
 
-/// What stands, as soon as it is news.
+/// Sends the current view once its version differs from that of the page, or after [`NEWS_TIMEOUT`].
 async fn view(
     State(app): State<Arc<ServerState>>,
     Query(SinceQuery { since }): Query<SinceQuery>,
 ) -> HandlerResult {
     let mut changes = app.machine.changes();
     let news = changes.wait_for(|version| *version != since);
-    // Without news it is told once more.
+    // After the timeout the page gets the view that it already has, and requests the next one.
     let _ = tokio::time::timeout(NEWS_TIMEOUT, news).await;
     let told = run_blocking(&app, |sitting| sitting.view()).await?;
     Ok(Json(told).into_response())
 }
 
-/// Anything else.
+/// Answers all other requests, by their names.
 async fn handle_request(
     State(app): State<Arc<ServerState>>,
     Path(question): Path<String>,

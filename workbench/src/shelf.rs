@@ -1,4 +1,4 @@
-//! Memory as the surroundings of a sitting: files that somebody put there, and nothing beside what is asked.
+//! The memory store: the environment of a session in memory. It has the files that were added, a clock, and no threads.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -8,16 +8,19 @@ use serde_json::Value;
 
 use crate::surroundings::SessionEnvironment;
 
-/// Files in memory, a clock, and who hears how far long work is. Clones share the files.
+/// Files in memory, a clock, and a listener for progress. Clones share the files.
 #[derive(Clone)]
 pub(crate) struct MemoryStore {
+    /// The files, by path.
     files: Arc<Mutex<MemoryFiles>>,
+    /// The clock, s.
     seconds: fn() -> f64,
+    /// Receives the progress of long work, as JSON.
     goes_on: fn(&Value),
 }
 
 impl MemoryStore {
-    /// No files yet; `seconds` is the clock.
+    /// A store without files; `seconds` is the clock, `goes_on` receives the progress of long work.
     pub(crate) fn new(seconds: fn() -> f64, goes_on: fn(&Value)) -> Self {
         Self {
             files: Arc::default(),
@@ -26,11 +29,12 @@ impl MemoryStore {
         }
     }
 
-    /// Adds a file, which takes the place of one of its name.
+    /// Adds a file, or replaces the file with this name.
     pub(crate) fn insert_file(&self, path: &Path, bytes: &[u8]) {
         self.with_files(|files| files.insert(path, bytes));
     }
 
+    /// Runs `look` on the files, under the lock.
     fn with_files<T>(&self, look: impl FnOnce(&mut MemoryFiles) -> T) -> T {
         look(&mut self.files.lock().unwrap_or_else(PoisonError::into_inner))
     }
@@ -69,7 +73,7 @@ impl SessionEnvironment for MemoryStore {
     }
 
     fn notify_change(&self, _: u64) {
-        // Nobody but who asks changes anything.
+        // Only the page itself makes changes, and it gets them as responses.
     }
 
     fn report_progress(&self, told: &Value) {
@@ -77,7 +81,7 @@ impl SessionEnvironment for MemoryStore {
     }
 
     fn spawn_work(&self, work: Box<dyn FnOnce() + Send>) -> Result<(), String> {
-        // There are no threads: whoever asks waits.
+        // There are no threads: the work is done before the request returns.
         work();
         Ok(())
     }

@@ -1,5 +1,5 @@
-//! A sitting: the text of a model file, what was derived of it, and what was asked about it. Work is done outside of the lock;
-//! what comes back is kept only if the text is still the one that was asked about.
+//! A session: the text of a model file, the model derived from it, and the jobs on it. Work is done outside of the
+//! lock. A result is kept only if the text has not changed since the work started.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -34,78 +34,101 @@ use crate::watch::JobWatch;
 
 /// Longest model file that is edited, bytes.
 pub(crate) const LONGEST: u64 = 4 << 20;
-/// Poses of a recording along which the picture moves.
+/// Largest number of poses of a recording for the moving picture.
 const POSES: usize = 600;
 
-/// A model file on the workbench.
+/// The session of one model file.
 pub(crate) struct WorkbenchSession {
+    /// Libraries, options of the derivation, and the source of files.
     host: Host,
+    /// Files of the session and how recordings are read.
     options: Options,
+    /// Spelling of commands and advice.
     commands: Arc<dyn WorkbenchCommands>,
+    /// Text, model and diagnosis.
     state: Mutex<SessionState>,
+    /// The search for an excitation.
     planning: Mutex<ExcitationJob>,
+    /// Files, clock and threads.
     surroundings: Arc<dyn SessionEnvironment>,
-    /// Counts everything that pages should hear of.
+    /// Counts all changes of which pages are notified.
     version: AtomicU64,
+    /// Recordings as the edited model reads them.
     readings: RecordingCache,
+    /// The model that the text is compared with.
     variant: VariantCache,
 }
 
+/// The part of a session that the lock protects.
 struct SessionState {
+    /// The edited text and the text on disk.
     draft: EditedDocument,
+    /// The last derivation; its revision may be older than the text.
     derived: DerivedRevision,
-    /// The model as it was last read or saved, if it has a meaning.
+    /// The model of the text as it was last read or saved; `None` if that text has faults.
     saved: Option<Model>,
-    /// Other files that the model is made of, as they were.
+    /// Contents of the other files that the saved model uses; `None` for a file that could not be read.
     other_files: Vec<Option<Vec<u8>>>,
     /// Why the file cannot be read any more.
     unreadable: Option<String>,
+    /// Errors after each step of the session.
     ladder: ErrorLadder,
+    /// The last diagnosis.
     diagnosis: DiagnosisJob,
 }
 
-/// What was derived of a revision of the text.
+/// The derivation of one revision of the text.
 #[derive(Clone)]
 struct DerivedRevision {
+    /// The revision of the text.
     revision: u64,
+    /// The model, or the faults of the text.
     found: Arc<Result<Model, Error>>,
+    /// Time that the derivation took, s.
     seconds: f64,
 }
 
+/// A diagnosis, or the result of the last one.
 #[derive(Default)]
 struct DiagnosisJob {
-    /// Counts the diagnoses of the sitting.
+    /// Counts the diagnoses of the session.
     number: u64,
-    /// The text that is asked about.
+    /// The revision of the text that is diagnosed.
     revision: u64,
+    /// Progress and start time in s, while it runs.
     running: Option<(Arc<JobWatch>, f64)>,
-    /// What came of the last one.
+    /// The findings as JSON, or why there are none.
     answer: Option<Result<Value, String>>,
+    /// Whether the user cancelled it.
     was_cancelled: bool,
+    /// The effects that can be added to the text.
     entries: Vec<NewEffect>,
 }
 
-/// What a page wants to see of the mechanism.
+/// Body of `picture`: pose, view and contents of the picture.
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
 pub(crate) struct PictureRequest {
+    /// Values of active coordinates, rad or m; the others are nominal.
     at: Vec<(String, f64)>,
     /// Azimuth and elevation, degrees.
     from: Option<[f64; 2]>,
+    /// Whether to draw names.
     names: bool,
+    /// Whether to draw the axes of frames.
     frames: bool,
-    /// The saved model below it as a shadow.
+    /// Whether to draw the saved model below it as a shadow.
     shadow: bool,
-    /// Another model as the shadow, as `models` names it.
+    /// Another model to draw as the shadow, by its name in `models`.
     beside: Option<String>,
     /// Drives with their forces and errors, as shares of the largest.
     loads: Vec<(String, f64, f64)>,
 }
 
 impl WorkbenchSession {
-    /// Reads the model file and derives it, if it has a meaning.
+    /// Reads the model file and derives it. Faults of the text are part of the session, not a failure.
     ///
-    /// Fails when it cannot be read.
+    /// Fails if the file cannot be read.
     pub(crate) fn open(
         host: &Host,
         options: Options,
@@ -153,21 +176,23 @@ impl WorkbenchSession {
         })
     }
 
-    /// What the workbench calls the file.
+    /// Path of the model file, for titles and messages.
     pub(crate) fn name(&self) -> String {
         self.options.model.display().to_string()
     }
 
+    /// The state under its lock; a panic of another thread does not lose it.
     fn state(&self) -> MutexGuard<'_, SessionState> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    /// Counts a change and notifies all pages.
     fn notify_pages(&self) {
         let version = 1 + self.version.fetch_add(1, Ordering::Relaxed);
         self.surroundings.notify_change(version);
     }
 
-    /// All that stands at once: the text, what it means, the ladder.
+    /// The complete view: the text, its derivation, the steps of the session, and the commands of the panes.
     pub(crate) fn view(&self) -> Value {
         let state = self.state();
         let name = self.name();
@@ -198,8 +223,8 @@ impl WorkbenchSession {
         told
     }
 
-    /// Takes an edit that a page made of revision `base`, and derives it; `None` if the text has changed since. What it did, if
-    /// anything is said of it, is to stand on the ladder.
+    /// Accepts an edit of revision `base` and derives the new text; `None` if the text has changed since. With `did`,
+    /// the edit is listed as a step of the session under this name.
     pub(crate) fn edit(&self, base: u64, text: &str, did: Option<&str>) -> Option<Value> {
         {
             let mut state = self.state();
@@ -222,7 +247,7 @@ impl WorkbenchSession {
         Some(self.view())
     }
 
-    /// Derives the text as it stands.
+    /// Derives the current text, and keeps the result if the text has not changed meanwhile.
     fn derive(&self) {
         let (text, revision) = {
             let state = self.state();
@@ -247,9 +272,9 @@ impl WorkbenchSession {
         self.notify_pages();
     }
 
-    /// Writes the text to the file as a whole, unless another program wrote something else there.
+    /// Writes the text to the file atomically.
     ///
-    /// Fails with a sentence when that is so, or the file cannot be written.
+    /// Fails with a sentence if another program changed the file meanwhile, or the file cannot be written.
     pub(crate) fn save(&self) -> Result<Value, String> {
         let disk = read_model_text(&self.host, &self.options.model);
         let mut state = self.state();
@@ -260,7 +285,7 @@ impl WorkbenchSession {
             drop(state);
             self.notify_pages();
             return Err(format!(
-                "{} was changed by another program; choose which text stays before it is saved",
+                "{} was changed by another program; choose one of the two texts, then save",
                 self.name()
             ));
         }
@@ -281,7 +306,8 @@ impl WorkbenchSession {
         Ok(self.view())
     }
 
-    /// Ends a conflict with another program: its text is taken, or the text of the page may be saved over it.
+    /// Resolves a conflict with another program: its text replaces that of the page, or may be overwritten by the next
+    /// save.
     pub(crate) fn resolve_conflict(&self, take_theirs: bool) -> Value {
         {
             let mut state = self.state();
@@ -296,7 +322,7 @@ impl WorkbenchSession {
         self.view()
     }
 
-    /// Looks whether another program changed the files.
+    /// Checks whether another program changed the model file or one that it uses; derives again if so.
     #[cfg(not(target_family = "wasm"))]
     pub(crate) fn check_disk(&self) {
         use crate::draft::DiskChange;
@@ -325,16 +351,16 @@ impl WorkbenchSession {
         }
     }
 
-    /// The model of the text as it stands, with its revision.
+    /// The model of the last derivation, with its revision; fails if the text has faults.
     fn model(&self) -> Result<(Model, u64), String> {
         let now = self.state().derived.clone();
         match now.found.as_ref() {
             Ok(model) => Ok((model.clone(), now.revision)),
-            Err(_) => Err("the text has no meaning yet; mend what is said beside it".to_owned()),
+            Err(_) => Err("the text has faults; correct those that are listed below it".to_owned()),
         }
     }
 
-    /// The mechanism as SVG.
+    /// The mechanism as SVG, with another model below it as a shadow if requested and possible.
     pub(crate) fn picture(&self, seeing: &PictureRequest) -> Result<String, String> {
         let (model, _) = self.model()?;
         let drawing = PictureOptions {
@@ -362,13 +388,13 @@ impl WorkbenchSession {
         };
         let told = |error| self.error_text(&error);
         match model.picture(&drawing, shadow.as_ref()) {
-            // The other mechanism may have other coordinates, or not reach that pose.
+            // The other mechanism may have other coordinates, or may not reach this pose; then it is left out.
             Err(_) if shadow.is_some() => model.picture(&drawing, None).map_err(told),
             drawn => drawn.map_err(told),
         }
     }
 
-    /// The page of equations.
+    /// The page of equations as HTML.
     pub(crate) fn equations(&self) -> Result<String, String> {
         let (model, _) = self.model()?;
         let written = model
@@ -377,7 +403,7 @@ impl WorkbenchSession {
         Ok(written.text)
     }
 
-    /// Recordings of fit and check as a model reads them.
+    /// Reads the recordings for fit and validation with a model.
     fn recordings(&self, model: &Model) -> Outcome<SessionRecordings> {
         let read = |all: &[Vec<PathBuf>]| -> Outcome<Vec<PreparedRecording>> {
             let one = |run: &Vec<PathBuf>| {
@@ -389,8 +415,8 @@ impl WorkbenchSession {
         Ok([read(&self.options.data)?, read(&self.options.check)?])
     }
 
-    /// Errors along the recordings, with the values of the file and identified; `with_places` says where they live as well,
-    /// `is_afresh` has the recordings read again.
+    /// Errors along the recordings, with the values of the file and with identified ones. `with_places` adds the
+    /// regions with the largest error, `is_afresh` reads the recordings again.
     pub(crate) fn compare(&self, with_places: bool, is_afresh: bool) -> Result<Value, String> {
         let (model, revision) = self.model()?;
         let mut told = (|| {
@@ -420,7 +446,7 @@ impl WorkbenchSession {
         Ok(told)
     }
 
-    /// Curves of forces and errors along the recordings: of the text, and of the saved model where it is another one.
+    /// Curves of forces and errors along the recordings, as HTML: of the text, and of the saved model if it differs.
     pub(crate) fn curves(&self, is_identified: bool) -> Result<String, String> {
         let (model, _) = self.model()?;
         let saved = self.state().saved.clone();
@@ -441,7 +467,7 @@ impl WorkbenchSession {
             )
         };
         let told = |error| self.error_text(&error);
-        // A model whose drives are others has other curves.
+        // Curves of models with different drives cannot be compared.
         let other =
             saved.filter(|saved| saved.text() != model.text() && saved.drives() == model.drives());
         let edited = version(model).map_err(told)?;
@@ -453,8 +479,7 @@ impl WorkbenchSession {
         })
     }
 
-    /// Models that the text can be held beside: those of the model's folder, and the one that was named when the workbench
-    /// began.
+    /// Models that the text can be compared with: those of the model's folder, and the one named at the start.
     pub(crate) fn models(&self) -> Value {
         let named = self
             .options
@@ -470,11 +495,13 @@ impl WorkbenchSession {
         json!({ "models": models, "named": named })
     }
 
-    /// The model that the text is held beside, by its name of [`Self::models`]; the saved one without a name.
+    /// The model to compare with, by its name in [`Self::models`]; without a name the saved one.
     fn comparison_model(&self, name: Option<&str>) -> Result<Model, String> {
         let Some(name) = name else {
             let saved = self.state().saved.clone();
-            return saved.ok_or_else(|| "the file as it was saved has no meaning".to_owned());
+            return saved.ok_or_else(|| {
+                "the saved file has faults, so there is nothing to compare with".to_owned()
+            });
         };
         let path = self.path_of(name);
         let found = self.variant.model(&self.host, &path);
@@ -489,7 +516,7 @@ impl WorkbenchSession {
         }
     }
 
-    /// What changes from another model, or from the saved one, to the text, and what it costs along the recordings.
+    /// Changes from another model, or from the saved one, to the text, also along the recordings.
     pub(crate) fn variant(&self, beside: Option<&str>) -> Result<Value, String> {
         let (model, revision) = self.model()?;
         let other = self.comparison_model(beside)?;
@@ -511,7 +538,7 @@ impl WorkbenchSession {
         Ok(told)
     }
 
-    /// Poses along the recordings, in time, with measured forces and what the model misses of them where it can be run.
+    /// Poses along the recordings over time, with measured forces and the errors of the model if these can be computed.
     pub(crate) fn motion(&self) -> Result<Value, String> {
         let (model, _) = self.model()?;
         let [fit, check] = self.recordings(&model).map_err(|e| self.error_text(&e))?;
@@ -528,7 +555,7 @@ impl WorkbenchSession {
                 json!({ "file": run.file, "time": thin_out(&run.time), "q": q })
             })
             .collect();
-        // A picture without arrows is better than none.
+        // Without forces the picture still moves, but has no arrows.
         if let Ok(version) = ModelVersion::new(model, fit, check, FixedParameters::All) {
             for (told, run) in runs.iter_mut().zip(&version.runs) {
                 let all = 0..drives.len();
@@ -542,19 +569,19 @@ impl WorkbenchSession {
         Ok(json!({ "names": names, "drives": drives, "runs": runs }))
     }
 
-    /// Begins a diagnosis of the text as it stands.
+    /// Starts a diagnosis of the current text.
     ///
-    /// Fails with a sentence when one goes on, or there is nothing to ask about.
+    /// Fails with a sentence if one is running, the text has faults, or there is no recording.
     pub(crate) fn diagnose(self: &Arc<Self>) -> Result<Value, String> {
         if self.options.data.is_empty() {
-            return Err("there is no recording to find anything in".to_owned());
+            return Err("there is no recording; a diagnosis needs at least one".to_owned());
         }
         self.model()?;
         let watch = Arc::new(JobWatch::new(Arc::clone(&self.surroundings)));
         let (text, number) = {
             let mut state = self.state();
             if state.diagnosis.running.is_some() {
-                return Err("a diagnosis goes on; wait for it, or cancel it".to_owned());
+                return Err("a diagnosis is running; wait until it ends, or cancel it".to_owned());
             }
             state.diagnosis = DiagnosisJob {
                 number: state.diagnosis.number + 1,
@@ -567,22 +594,23 @@ impl WorkbenchSession {
         let sitting = Arc::clone(self);
         let host = self.host.clone().with_progress(Arc::clone(&watch) as _);
         let work = move || {
-            // A panic must not leave the page waiting for ever.
+            // After a panic the page would wait forever; it gets an error instead.
             let asked = std::panic::AssertUnwindSafe(|| sitting.run_diagnosis(&host, &text));
             let found = std::panic::catch_unwind(asked).unwrap_or_else(|_| {
                 Err(Error::input(
-                    "the diagnosis ended by a fault of the program, which is none of yours",
+                    "the diagnosis ended with an internal error of the program, not of your input",
                 ))
             });
             sitting.finish_diagnosis(number, found);
         };
         if let Err(error) = self.surroundings.spawn_work(Box::new(work)) {
             self.state().diagnosis.running = None;
-            return Err(format!("the diagnosis cannot begin: {error}"));
+            return Err(format!("the diagnosis cannot be started: {error}"));
         }
         Ok(self.diagnosis())
     }
 
+    /// Derives the text and diagnoses it, on the thread of the job. Returns the view and the effects to add.
     fn run_diagnosis(&self, host: &Host, text: &str) -> Outcome<(Value, Vec<NewEffect>)> {
         let path = &self.options.model;
         let model = host.derive(&self.name(), host.load_text(path, text)?)?;
@@ -595,6 +623,7 @@ impl WorkbenchSession {
         ))
     }
 
+    /// Stores the result of diagnosis `number`, unless a newer one was started.
     fn finish_diagnosis(&self, number: u64, found: Outcome<(Value, Vec<NewEffect>)>) {
         let mut state = self.state();
         let diagnosis = &mut state.diagnosis;
@@ -614,7 +643,7 @@ impl WorkbenchSession {
         self.notify_pages();
     }
 
-    /// Asks the diagnosis that goes on to stop.
+    /// Cancels the running diagnosis; returns its view.
     pub(crate) fn cancel(&self) -> Value {
         if let Some((watch, _)) = &self.state().diagnosis.running {
             watch.cancel();
@@ -622,7 +651,7 @@ impl WorkbenchSession {
         self.diagnosis()
     }
 
-    /// How far the diagnosis is, or what it found.
+    /// View of the diagnosis: its progress, or its findings.
     pub(crate) fn diagnosis(&self) -> Value {
         let state = self.state();
         let diagnosis = &state.diagnosis;
@@ -641,14 +670,14 @@ impl WorkbenchSession {
         })
     }
 
-    /// Adds an effect that the last diagnosis found to the text, as `add` does to the file.
+    /// Adds an effect that the last diagnosis found to the text, as the command `add` does.
     ///
-    /// Fails with a sentence when there is none, or the text with it has no meaning.
+    /// Fails with a sentence if there is no such effect, or the text with it has faults.
     pub(crate) fn add(&self, entry: usize) -> Result<Value, String> {
         let (text, revision, effect) = {
             let state = self.state();
             let effect = state.diagnosis.entries.get(entry).cloned();
-            let effect = effect.ok_or("there is no such finding; diagnose again")?;
+            let effect = effect.ok_or("there is no such finding; run the diagnosis again")?;
             (
                 state.draft.text().to_owned(),
                 state.draft.revision(),
@@ -662,7 +691,7 @@ impl WorkbenchSession {
             let now = state.draft.revision();
             state.ladder.end_typing(now);
             if !state.draft.edit(revision, &edited.text) {
-                return Err("the text was changed meanwhile; add it again".to_owned());
+                return Err("the text was changed meanwhile; add the effect again".to_owned());
             }
             let what = format!(
                 "+ {} ({})",
@@ -675,30 +704,31 @@ impl WorkbenchSession {
         Ok(self.view())
     }
 
-    /// What an error says, in the words of the reader.
+    /// The text of an error, with commands in the spelling of the user.
     fn error_text(&self, error: &Error) -> String {
         error.spell(&*self.commands)
     }
 }
 
 impl SessionState {
-    /// Something was done to the text as it stands.
+    /// Records a step that led to the current text.
     fn record_step(&mut self, what: &str) {
         self.ladder.record_step(self.draft.revision(), what);
     }
 }
 
-/// As many values as a moving picture needs.
+/// Every n-th value, at most [`POSES`] of them.
 fn thin_out(all: &[f64]) -> Vec<f64> {
     let step = all.len().div_ceil(POSES).max(1);
     all.iter().copied().step_by(step).collect()
 }
 
+/// The text of a model file, up to [`LONGEST`] bytes.
 fn read_model_text(host: &Host, path: &Path) -> Result<String, FileError> {
     host.files().read_text(path, LONGEST)
 }
 
-/// Derives a text, and measures how long that takes.
+/// Derives a text, and measures the time.
 fn derive_revision(
     host: &Host,
     surroundings: &dyn SessionEnvironment,
@@ -717,7 +747,7 @@ fn derive_revision(
     }
 }
 
-/// What stands in the other files that a model is made of.
+/// Contents of the other files that a model uses; `None` for a file that cannot be read.
 fn other_file_contents(host: &Host, model: Option<&Model>) -> Vec<Option<Vec<u8>>> {
     let paths = model.into_iter().flat_map(|model| model.files().skip(1));
     paths
@@ -725,7 +755,7 @@ fn other_file_contents(host: &Host, model: Option<&Model>) -> Vec<Option<Vec<u8>
         .collect()
 }
 
-/// Relative errors of fit and check alone.
+/// The relative errors (nrms) of fit and validation.
 fn relative_errors(figures: &Value) -> Value {
     json!({ "fit": figures["fit"]["nrms"], "check": figures["check"]["nrms"] })
 }

@@ -1,5 +1,5 @@
-//! What a sitting needs from where it takes place: files, a clock, somebody who hears of changes, and somewhere to do long work.
-//! The server's surroundings are this machine, those of a page its own memory.
+//! The environment of a session: files, a clock, notification of changes, and threads for long work. The server uses
+//! this machine, a self-contained page its memory.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -7,23 +7,23 @@ use std::sync::Arc;
 use modelmill::files::FileSource;
 use serde_json::Value;
 
-/// Where a sitting takes place.
+/// Environment of a session.
 pub(crate) trait SessionEnvironment: Send + Sync {
-    /// Where files are read.
+    /// The source of all files that are read.
     fn files(&self) -> Arc<dyn FileSource>;
 
-    /// Writes a file as a whole; fails with a sentence, and the old one is as it was.
+    /// Writes a file atomically; fails with a sentence, and then the old file is unchanged.
     fn write(&self, path: &Path, bytes: &[u8]) -> Result<(), String>;
 
-    /// Seconds since some moment.
+    /// Seconds since a fixed but unspecified moment.
     fn seconds(&self) -> f64;
 
-    /// Something changed that pages should hear of; `version` counts that.
+    /// Notifies pages of a change; `version` counts the changes.
     fn notify_change(&self, version: u64);
 
-    /// Long work has come to something else: an object with `what`, `done` and `total` (0 where nobody knows it).
+    /// Reports the current step of long work: an object with `what`, `done` and `total` (0 if unknown).
     fn report_progress(&self, told: &Value);
 
-    /// Does long work, beside everything else where that is possible; fails with a sentence when it cannot begin.
+    /// Does long work, in parallel if the environment has threads; fails with a sentence if it cannot start.
     fn spawn_work(&self, work: Box<dyn FnOnce() + Send>) -> Result<(), String>;
 }

@@ -1,4 +1,4 @@
-//! What the page is told, as JSON: the model with its base parameters beside those of the file as it was saved, errors, findings.
+//! JSON views for the page: the model with its base parameters and those of the saved file, errors, findings.
 
 use modelmill::diagnose::{DiagnosisFindings, words};
 use modelmill::identify::Identification;
@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 
 use crate::options::WorkbenchCommands;
 
-/// A text that was derived, or why it was not, with what is to be said at its lines.
+/// View of a derivation: warnings and notes if the text is valid, else its faults with their lines.
 pub(crate) fn derivation_view(
     found: &Result<Model, Error>,
     path: &str,
@@ -27,11 +27,12 @@ pub(crate) fn derivation_view(
     }
 }
 
-/// Base parameters with their values, beside those of the model as it was saved.
+/// View of the base parameters with their values and those of the saved model, of coordinates and drives.
 pub(crate) fn equations(model: &Model, saved: Option<&Model>) -> Value {
     let value = |model: &Model, k: usize| model.has_nominal(k).then(|| model.nominal[k]);
     let base: Vec<Value> = (model.base.iter().enumerate())
         .map(|(k, base)| {
+            // Base parameters of two models correspond if their expressions are equal.
             let same = |one: &&Model| {
                 one.base
                     .iter()
@@ -57,6 +58,7 @@ pub(crate) fn equations(model: &Model, saved: Option<&Model>) -> Value {
             })
         })
         .collect();
+    // Base parameters of the saved model that the edited one does not have.
     let gone: Vec<&str> = (saved.iter().flat_map(|saved| &saved.base))
         .filter(|old| {
             model
@@ -86,7 +88,8 @@ pub(crate) fn equations(model: &Model, saved: Option<&Model>) -> Value {
     })
 }
 
-/// Errors of a model along recordings, with its own values and once it is identified, and remarks on both.
+/// View of the errors along recordings, with nominal and with identified values, and of the remarks on recordings and
+/// fit. Each remark occurs once.
 pub(crate) fn errors(
     found: &Identification,
     recordings: &[Vec<PreparedRecording>; 2],
@@ -110,7 +113,8 @@ pub(crate) fn errors(
     })
 }
 
-/// What a diagnosis found: its JSON with sentences, the picture of its ladder, and what can be added.
+/// View of a diagnosis: its JSON, the verdict as a sentence, the picture of the error after each added effect, and the
+/// effects that can be added.
 pub(crate) fn findings(findings: &DiagnosisFindings, commands: &dyn WorkbenchCommands) -> Value {
     let model = &findings.before.model;
     let mut told = findings.json(commands);
@@ -133,7 +137,7 @@ pub(crate) fn findings(findings: &DiagnosisFindings, commands: &dyn WorkbenchCom
     told
 }
 
-/// What an editor offers while one types: the schema of a model file, and the kinds of effects that are known.
+/// Data for completions in the editor: the schema of model files, and the known kinds of effects.
 pub(crate) fn completion_data(kinds: &[EffectKind]) -> Value {
     let schema: Value = serde_json::from_str(modelmill::SCHEMA).unwrap_or_default();
     json!({ "schema": schema, "kinds": print::effects::json(kinds)["kinds"] })

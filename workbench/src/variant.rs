@@ -1,5 +1,5 @@
-//! The variant that the text is held beside: the model as it was saved, or another model file, with what changed between both
-//! and what it costs along the recordings.
+//! The comparison of the text with a variant: the saved model, or another model file. Two models go in; the changes
+//! between them come out, with forces, power and errors along the recordings.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -13,26 +13,31 @@ use serde_json::{Value, json};
 
 use crate::readings::{RecordingCache, SessionRecordings};
 
-/// Longest model file that is held beside the text, bytes.
+/// Longest model file that is compared with the text, bytes.
 const LONGEST: u64 = 4 << 20;
 
-/// What was read and derived of variants, kept while nothing changes on which it depends.
+/// A cache of the other model and of its recordings, valid while the files do not change.
 #[derive(Default)]
 pub(crate) struct VariantCache {
+    /// The last other model.
     kept: Mutex<Option<CachedVariant>>,
+    /// Recordings as the other model reads them.
     readings: RecordingCache,
 }
 
-/// The other model, with its files as they were.
+/// A derived model, with the contents of its files at that time.
 #[derive(Clone)]
 struct CachedVariant {
+    /// Path of the model file.
     path: PathBuf,
+    /// Contents of all files of the model; `None` for a file that could not be read.
     files: Vec<Option<Vec<u8>>>,
+    /// The derived model.
     model: Model,
 }
 
 impl VariantCache {
-    /// A model file beside the text, derived anew when any file of it has changed.
+    /// The model of another file, derived again if any of its files has changed.
     pub(crate) fn model(&self, host: &Host, path: &Path) -> Outcome<Model> {
         let known = self.lock_cache().clone();
         if let Some(known) = known
@@ -51,12 +56,14 @@ impl VariantCache {
         Ok(model)
     }
 
+    /// The contents of the cache; a panic of another thread does not lose them.
     fn lock_cache(&self) -> MutexGuard<'_, Option<CachedVariant>> {
         self.kept.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// What changes from `before` to `after`, and along recordings, if there are any: `read` reads them for `before`, `after`
-    /// has read them. Where both cannot be held beside each other, `refused` says why.
+    /// View of the changes from `before` to `after`, also along recordings if there are any. `read` reads recordings
+    /// for `before`, `after_read` gives those of `after`. If the models cannot be compared along recordings, `refused`
+    /// has the reason.
     pub(crate) fn comparison_view(
         &self,
         before: &Model,
@@ -89,7 +96,7 @@ impl VariantCache {
     }
 }
 
-/// Names of the model files in the folder of a model, without its own.
+/// Names of the other model files in the folder of a model, those that can be loaded.
 pub(crate) fn models_in_folder(host: &Host, model: &Path) -> Vec<String> {
     let folder = match model.parent() {
         Some(parent) if parent != Path::new("") => parent,
@@ -105,7 +112,7 @@ pub(crate) fn models_in_folder(host: &Host, model: &Path) -> Vec<String> {
         .collect()
 }
 
-/// What stands in the files that a model is made of.
+/// Contents of all files of a model; `None` for a file that cannot be read.
 fn file_contents(host: &Host, model: &Model) -> Vec<Option<Vec<u8>>> {
     let paths = model.files();
     paths

@@ -1,4 +1,4 @@
-//! A job of the library as the page sees it: what goes on, how far it is, and that it is to stop.
+//! Watches the jobs of the library for a page: their names, their progress, and requests to cancel.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -8,22 +8,28 @@ use serde_json::{Value, json};
 
 use crate::surroundings::SessionEnvironment;
 
-/// Watches the jobs of one verb.
+/// Watches the jobs of one diagnosis or search.
 pub(crate) struct JobWatch {
+    /// Receives the progress.
     surroundings: Arc<dyn SessionEnvironment>,
+    /// The running jobs, outer ones first.
     jobs: Mutex<Vec<RunningJob>>,
+    /// Whether the user cancelled; jobs that start later are cancelled at once.
     is_cancelled: AtomicBool,
 }
 
-/// A job that goes on.
+/// A running job.
 struct RunningJob {
+    /// What the job does, in words.
     what: String,
+    /// Number of its steps; 0 if unknown.
     total: usize,
+    /// Its progress, and the switch that cancels it.
     job: Arc<JobHandle>,
 }
 
 impl JobWatch {
-    /// Nothing goes on yet; the surroundings hear of every job.
+    /// A watch without jobs; `surroundings` gets the progress of each job.
     pub(crate) fn new(surroundings: Arc<dyn SessionEnvironment>) -> Self {
         Self {
             surroundings,
@@ -32,7 +38,7 @@ impl JobWatch {
         }
     }
 
-    /// Asks all jobs to stop, those too that have not begun.
+    /// Requests all jobs to stop, also those that have not started.
     pub(crate) fn cancel(&self) {
         self.is_cancelled.store(true, Ordering::Relaxed);
         for going in self.jobs().iter() {
@@ -40,7 +46,7 @@ impl JobWatch {
         }
     }
 
-    /// What goes on: the outermost job that counts its steps, or else the innermost one.
+    /// View of the progress: of the outermost job that counts its steps, or else of the innermost one.
     pub(crate) fn progress_view(&self) -> Value {
         let jobs = self.jobs();
         let counting = jobs.iter().find(|going| going.total > 0);
@@ -48,10 +54,11 @@ impl JobWatch {
             Some(going) => {
                 json!({ "what": going.what, "done": going.job.done(), "total": going.total })
             }
-            None => json!({ "what": "beginning", "done": 0, "total": 0 }),
+            None => json!({ "what": "starting", "done": 0, "total": 0 }),
         }
     }
 
+    /// The running jobs; a panic of another thread does not lose them.
     fn jobs(&self) -> std::sync::MutexGuard<'_, Vec<RunningJob>> {
         self.jobs.lock().unwrap_or_else(PoisonError::into_inner)
     }

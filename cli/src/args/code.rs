@@ -55,10 +55,12 @@ pub(crate) struct GenerateArgs {
     /// With reactions: forces and moments in all joints, and the forces that close loops
     #[arg(long)]
     pub(crate) reactions: bool,
-    /// With a function `self_test` that compares the model in base parameters with the model in all parameters, for your own tests
+    /// With a function `self_test` that compares the model in base parameters with the model in all parameters, for
+    /// your own tests
     #[arg(long)]
     pub(crate) self_test: bool,
-    /// What to write: a Rust module, sources in plain C99, or a crate that builds a C library with its header or a Python module
+    /// What to write: a Rust module, sources in plain C99, or a crate that builds a C library with its header or a
+    /// Python module
     #[arg(long, value_parser = languages(), default_value = CodeLanguage::default().name())]
     pub(crate) language: CodeLanguage,
 }
@@ -82,7 +84,8 @@ fn languages_in_folders() -> Vec<(&'static str, &'static str)> {
 /// `atlas`.
 #[derive(Debug, Args)]
 pub(crate) struct AtlasArgs {
-    /// Model files, and robot descriptions (URDF, MJCF, SDF). A robot description gets a line and a picture, but no page
+    /// Model files, and robot descriptions (URDF, MJCF, SDF). A robot description gets a line and a picture, but no
+    /// page
     #[arg(required = true)]
     pub(crate) models: Vec<PathBuf>,
     /// Write `atlas.md`, `atlas.html` and the folder `atlas` into this folder

@@ -86,8 +86,8 @@ pub(crate) struct EvaluateArgs {
     /// Values of the base parameters: `nominal`, or a file that `identify` wrote
     #[arg(long, value_name = "nominal|FIT.json", default_value = "nominal", value_parser = ParameterSource::parse)]
     pub(crate) parameters: ParameterSource,
-    /// Compute reactions instead of the drives' forces: forces (N) and moments (N m) in all joints, and the forces that close
-    /// loops. They need the nominal values of all parameters; base parameters do not determine them
+    /// Compute reactions instead of the drives' forces: forces (N) and moments (N m) in all joints, and the forces that
+    /// close loops. They need the nominal values of all parameters; base parameters do not determine them
     #[arg(long)]
     pub(crate) reactions: bool,
     /// Write the forces to this file instead of standard output
@@ -102,8 +102,8 @@ pub(crate) struct EvaluateArgs {
 pub(crate) struct IdentifyArgs {
     /// Model file (TOML)
     pub(crate) model: PathBuf,
-    /// Recordings (CSV, Parquet, MATLAB, HDF5, MCAP, rosbag2) to identify from; may be repeated; `a.csv+b.csv` joins files of
-    /// one run on time
+    /// Recordings (CSV, Parquet, MATLAB, HDF5, MCAP, rosbag2) to identify from; may be repeated; `a.csv+b.csv` joins
+    /// files of one run on time
     #[arg(long, value_name = "RUN", required = true, num_args = 1..)]
     pub(crate) data: Vec<PathBuf>,
     /// Recordings for validation, not used in the fit; may be repeated
@@ -157,7 +157,8 @@ pub(crate) struct RecordingsArgs {
 pub(crate) struct CompareArgs {
     /// Model file (TOML)
     pub(crate) model: PathBuf,
-    /// Recordings (CSV, Parquet, MATLAB, HDF5, MCAP, rosbag2); may be repeated; `a.csv+b.csv` joins files of one run on time
+    /// Recordings (CSV, Parquet, MATLAB, HDF5, MCAP, rosbag2); may be repeated; `a.csv+b.csv` joins files of one run on
+    /// time
     #[arg(long, value_name = "RUN", required = true, num_args = 1..)]
     pub(crate) data: Vec<PathBuf>,
     /// Values of the base parameters: `nominal`, or a file that `identify` wrote
@@ -178,15 +179,15 @@ pub(crate) struct DiagnosisArgs {
     /// Recordings in which missing effects are searched (CSV, Parquet, MATLAB, HDF5, MCAP, rosbag2); may be repeated
     #[arg(long, value_name = "RUN", required = true, num_args = 1..)]
     pub(crate) data: Vec<PathBuf>,
-    /// Recordings for validation: an effect is accepted only if it lowers the error there. Without any, --data is split into
-    /// blocks (cross-validation)
+    /// Recordings for validation: an effect is accepted only if it lowers the error there. Without any, --data is split
+    /// into blocks (cross-validation)
     #[arg(long, value_name = "RUN", num_args = 1..)]
     pub(crate) check: Vec<PathBuf>,
     /// Do not estimate parameters: fix them at nominal values, so that wrong nominal values show up as well
     #[arg(long)]
     pub(crate) held: bool,
-    /// Fix the base parameters at these values instead of the nominal ones: a file that `identify` wrote, for example from a run
-    /// without a load
+    /// Fix the base parameters at these values instead of the nominal ones: a file that `identify` wrote, for example
+    /// from a run without a load
     #[arg(long, value_name = "nominal|FIT.json", default_value = "nominal", value_parser = ParameterSource::parse)]
     pub(crate) parameters: ParameterSource,
     #[command(flatten)]

@@ -16,7 +16,8 @@ pub(crate) struct DrawingArgs {
     /// Draw the mechanism as SVG: links, joints (filled where driven), loops, drives, centres of mass
     #[arg(long, value_name = "FILE.svg")]
     pub(crate) picture: Option<PathBuf>,
-    /// Values of active coordinates, rad or m; the others are nominal. Passive coordinates are determined by loop closure
+    /// Values of active coordinates, rad or m; the others are nominal. Passive coordinates are determined by loop
+    /// closure
     #[arg(long, value_name = "NAME=VALUE,...", value_parser = parse_value, value_delimiter = ',', requires = "picture",
           allow_hyphen_values = true)]
     at: Vec<(String, f64)>,

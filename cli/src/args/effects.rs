@@ -25,12 +25,12 @@ pub(crate) struct AddArgs {
     pub(crate) model: PathBuf,
     /// Kind of the effect; `modelmill effects` lists them
     pub(crate) kind: String,
-    /// Where the effect acts: drives, coordinates, points, a part, `base` or `force`, depending on the kind; several places
-    /// share its parameters
+    /// Where the effect acts: drives, coordinates, points, a part, `base` or `force`, depending on the kind; several
+    /// places share its parameters
     #[arg(long, value_name = "PLACE,...", required = true, value_delimiter = ',')]
     pub(crate) at: Vec<String>,
-    /// Nominal value of a parameter (`Fc=25.9`) or its name (`Fc.name=Fc_left`), or the value of a constant (`vs=0.02`),
-    /// in SI units; may be repeated
+    /// Nominal value of a parameter (`Fc=25.9`) or its name (`Fc.name=Fc_left`), or the value of a constant
+    /// (`vs=0.02`), in SI units; may be repeated
     #[arg(long, value_name = "NAME=VALUE", value_parser = parse_setting, allow_hyphen_values = true)]
     pub(crate) set: Vec<EffectSetting>,
     /// Comment to write above the effect

@@ -9,11 +9,13 @@ use super::preparation::parse_map;
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Estimation")]
 pub(crate) struct EstimatorArgs {
-    /// How equations are weighted: `channels` divides the equations of each drive by the standard deviation of its residuals
-    /// (iterated), `variance` divides each sample by the standard deviation from the recording's columns `DRIVE_var`
+    /// How equations are weighted: `channels` divides the equations of each drive by the standard deviation of its
+    /// residuals (iterated), `variance` divides each sample by the standard deviation from the recording's columns
+    /// `DRIVE_var`
     #[arg(long, value_enum, default_value = "auto")]
     pub(crate) weights: WeightsArg,
-    /// Huber's robust estimate: residuals beyond BOUND standard deviations (estimated from their median) get a lower weight
+    /// Huber's robust estimate: residuals beyond BOUND standard deviations (estimated from their median) get a lower
+    /// weight
     #[arg(long, value_name = "BOUND", num_args = 0..=1, default_missing_value = "1.345",
         allow_negative_numbers = true, value_parser = parse_positive)]
     pub(crate) robust: Option<f64>,
@@ -24,12 +26,13 @@ pub(crate) struct EstimatorArgs {
     /// returns every physical parameter
     #[arg(long, conflicts_with_all = ["prior", "essential"])]
     pub(crate) physical: bool,
-    /// Leave out base parameters that the recordings do not support, one by one, until leaving them out would be statistically
-    /// significant (Wald test)
+    /// Leave out base parameters that the recordings do not support, one by one, until leaving them out would be
+    /// statistically significant (Wald test)
     #[arg(long, conflicts_with = "prior")]
     pub(crate) essential: bool,
-    /// Instrumental variables, against the bias from noise that is fed back through the controller: recordings of the reference
-    /// motion (one for each --data, with the same samples), or `period=SECONDS` to use the states one period later
+    /// Instrumental variables, against the bias from noise that is fed back through the controller: recordings of the
+    /// reference motion (one for each --data, with the same samples), or `period=SECONDS` to use the states one period
+    /// later
     #[arg(long, value_name = "REF|period=SECONDS", num_args = 1..,
         conflicts_with_all = ["robust", "prior", "physical", "essential"])]
     pub(crate) instruments: Vec<String>,
@@ -56,8 +59,8 @@ pub(crate) enum WeightsArg {
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Leaving out equations")]
 pub(crate) struct StandstillArgs {
-    /// Leave an equation out while its drive is slower than this fraction of its maximum speed; 0.01 is usual. Static friction
-    /// at standstill is unknown
+    /// Leave an equation out while its drive is slower than this fraction of its maximum speed; 0.01 is usual. Static
+    /// friction at standstill is unknown
     #[arg(long, value_name = "PART", value_parser = parse_fraction)]
     pub(crate) standstill: Option<f64>,
 }

@@ -48,8 +48,8 @@ pub(crate) struct CommandLine {
     /// A library of additional kinds of effects (TOML), for every model that is read; may be repeated
     #[arg(long, global = true, value_name = "FILE")]
     pub(crate) library: Vec<PathBuf>,
-    /// Derive models only for the values of their files: constants become numbers. Fewer base parameters remain if lengths are
-    /// zero or equal, and emitted code has no geometry to change
+    /// Derive models only for the values of their files: constants become numbers. Fewer base parameters remain if
+    /// lengths are zero or equal, and emitted code has no geometry to change
     #[arg(long, global = true)]
     pub(crate) at_values: bool,
 }
@@ -67,8 +67,8 @@ pub(crate) enum ProgramCommand {
         modelmill check model-spec/models/panda.toml --picture panda.svg --at q2=0.6,q4=-1.2 --view 60,20"
     )]
     Check(CheckArgs),
-    /// Report what a variant changes: entries, p_g, dependencies, p_min, operation counts; along recordings also forces, power,
-    /// work, limits and error
+    /// Report what a variant changes: entries, p_g, dependencies, p_min, operation counts; along recordings also
+    /// forces, power, work, limits and error
     #[command(
         after_help = "With --data both models follow the motion as the first one reads it, each with the values of its file. \
         A share is the projection of one term of p_min on the total difference of a drive's force. Shares add up to 100 %; a term \
@@ -163,8 +163,8 @@ pub(crate) enum ProgramCommand {
         --data recordings/spidermill-mbs/with-rods-fit.csv \\\n      \
         --check recordings/spidermill-mbs/with-rods-check.csv")]
     Diagnose(DiagnoseArgs),
-    /// Write a diagnosis as one self-contained page: error after each added effect, curves, error maps, candidates, parameters,
-    /// equations
+    /// Write a diagnosis as one self-contained page: error after each added effect, curves, error maps, candidates,
+    /// parameters, equations
     #[command(after_help = "Examples (from the project's root):\n  \
         modelmill report model-spec/models/spidermill.toml \\\n      \
         --data recordings/spidermill-mbs/with-rods-fit.csv \\\n      \
@@ -219,7 +219,8 @@ pub(crate) enum ProgramCommand {
         Example (from the project's root):\n  modelmill atlas model-spec/models/*.toml --out docs"
     )]
     Atlas(AtlasArgs),
-    /// Report what changed between runs of one machine: load, friction, offset, scale of a force, clock, encoders, pushes
+    /// Report what changed between runs of one machine: load, friction, offset, scale of a force, clock, encoders,
+    /// pushes
     #[command(after_help = runs::HELP)]
     Runs(RunsArgs),
     /// Solve identified base parameters for physical ones, as in Table 1 of the paper: all real solutions

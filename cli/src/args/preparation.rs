@@ -16,22 +16,24 @@ const USUAL_ORDER: usize = 4;
 #[derive(Debug, Clone, PartialEq, Args)]
 #[command(next_help_heading = "Reading and preparing recordings")]
 pub(crate) struct PreparationArgs {
-    /// Column of the recording for a name of the model, e.g. `--map theta1=pos_left`, or a sum of columns with a unit if it is
-    /// not SI: `--map "q6=(pos6 - pos5)/32 - 90 [deg]"`; may be repeated. Names of the model are `t`, a coordinate, a
-    /// coordinate with `_d` or `_dd`, a drive, and a drive with `_var` for the variance of its force
+    /// Column of the recording for a name of the model, e.g. `--map theta1=pos_left`, or a sum of columns with a unit
+    /// if it is not SI: `--map "q6=(pos6 - pos5)/32 - 90 [deg]"`; may be repeated. Names of the model are `t`, a
+    /// coordinate, a coordinate with `_d` or `_dd`, a drive, and a drive with `_var` for the variance of its force
     #[arg(long, value_name = "OURS=THEIRS", value_parser = parse_map)]
     pub(crate) map: Vec<(String, String)>,
-    /// Cut-off of the low-pass on positions, Hz. Default: chosen by cross-validation on the forces; without forces, from the
-    /// positions
+    /// Cut-off of the low-pass on positions, Hz. Default: chosen by cross-validation on the forces; without forces,
+    /// from the positions
     #[arg(long, value_name = "HZ", value_parser = parse_cutoff, allow_negative_numbers = true)]
     pub(crate) cutoff: Option<f64>,
     /// Order of the Butterworth low-pass, which runs forwards and backwards [default: 4]
     #[arg(long, value_name = "N", value_parser = parse_order, allow_negative_numbers = true)]
     pub(crate) order: Option<usize>,
-    /// Samples dropped at the start and at the end, after derivatives are computed; a single number applies to both ends
+    /// Samples dropped at the start and at the end, after derivatives are computed; a single number applies to both
+    /// ends
     #[arg(long, value_name = "N[,N]", value_parser = parse_trim, allow_hyphen_values = true)]
     pub(crate) trim: Option<(usize, usize)>,
-    /// Keep every n-th sample, after the same low-pass on forces and regressor. Chosen together with the cut-off if neither
+    /// Keep every n-th sample, after the same low-pass on forces and regressor. Chosen together with the cut-off if
+    /// neither
     /// --cutoff nor --smoothing nor --decimate is given
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = parse_decimate, allow_negative_numbers = true)]
     pub(crate) decimate: usize,
@@ -44,8 +46,8 @@ pub(crate) struct PreparationArgs {
     /// Period of the motion, s; selects `--smoothing fourier`. Determined from the positions if not given
     #[arg(long, value_name = "S", value_parser = parse_period)]
     pub(crate) period: Option<f64>,
-    /// Frequency up to which measured and model force are also compared, Hz, in addition to the unfiltered figures. Default: the
-    /// cut-off, or the highest frequency of the motion
+    /// Frequency up to which measured and model force are also compared, Hz, in addition to the unfiltered figures.
+    /// Default: the cut-off, or the highest frequency of the motion
     #[arg(long, value_name = "HZ", value_parser = parse_cutoff, allow_negative_numbers = true)]
     pub(crate) band: Option<f64>,
     /// Leave out samples with NaN, infinite or empty fields instead of refusing the recording
@@ -71,8 +73,8 @@ pub(crate) enum DerivativesArg {
 /// How positions are smoothed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum SmoothingArg {
-    /// A Fourier series if the run is periodic and only noise remains as residual, unless --cutoff is given; otherwise a
-    /// Butterworth low-pass
+    /// A Fourier series if the run is periodic and only noise remains as residual, unless --cutoff is given; otherwise
+    /// a Butterworth low-pass
     Auto,
     /// A Butterworth low-pass, forwards and backwards, then central differences
     Butterworth,

@@ -31,15 +31,15 @@ pub(crate) struct ImportArgs {
     /// The root of a URDF is not fixed to the ground (floating base), as for a walking robot
     #[arg(long)]
     pub(crate) floating: bool,
-    /// Loop closures and drives of a URDF with loops, in the format of the collection example-parallel-robots. Default: a
-    /// `robot.yaml` next to the URDF, if there is one
+    /// Loop closures and drives of a URDF with loops, in the format of the collection example-parallel-robots. Default:
+    /// a `robot.yaml` next to the URDF, if there is one
     #[arg(long, value_name = "ROBOT.yaml")]
     pub(crate) closures: Option<PathBuf>,
     /// Round angles within 1e-4 rad of a multiple of pi/12, such as 1.5708, to this multiple
     #[arg(long)]
     pub(crate) round_angles: bool,
-    /// Joint values from which loops are closed, rad or m from the description's own zero. They select one of several assembly
-    /// modes
+    /// Joint values from which loops are closed, rad or m from the description's own zero. They select one of several
+    /// assembly modes
     #[arg(long, value_name = "JOINT=VALUE,...", value_parser = parse_value, value_delimiter = ',', allow_hyphen_values = true)]
     pub(crate) at: Vec<(String, f64)>,
     /// Write the model to this file

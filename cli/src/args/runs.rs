@@ -28,11 +28,12 @@ pub(crate) const HELP: &str = "The first run is the reference; every other run i
 pub(crate) struct RunsArgs {
     /// Model file (TOML)
     pub(crate) model: PathBuf,
-    /// Recordings, folders of them, or patterns with * and ? (CSV, Parquet, MATLAB, HDF5, MCAP, rosbag2), two or more; the first
-    /// is the reference
+    /// Recordings, folders of them, or patterns with * and ? (CSV, Parquet, MATLAB, HDF5, MCAP, rosbag2), two or more;
+    /// the first is the reference
     #[arg(long, value_name = "RUN", required = true, num_args = 1..)]
     pub(crate) data: Vec<PathBuf>,
-    /// Fit all runs at once and estimate these separately for each run, separated by commas, e.g. `payload@flange,friction`
+    /// Fit all runs at once and estimate these separately for each run, separated by commas, e.g.
+    /// `payload@flange,friction`
     #[arg(long, value_name = "WHAT", value_delimiter = ',', value_parser = PerRunSelection::parse)]
     per_run: Vec<PerRunSelection>,
     /// A run carried a load of known mass in kg, which determines the scales of all measured forces; may be repeated

@@ -11,8 +11,8 @@ use modelmill::recording::RecordingOptions;
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Distinguishing effects")]
 pub(crate) struct SeparateArgs {
-    /// Instead of exciting the base parameters, search for a motion in which this effect differs most from those of --from. Values
-    /// of its parameters and constants in SI units follow the places: `coulomb_friction@motor:Fc=25.9`
+    /// Instead of exciting the base parameters, search for a motion in which this effect differs most from those of
+    /// --from. Values of its parameters and constants in SI units follow the places: `coulomb_friction@motor:Fc=25.9`
     #[arg(long, value_name = "KIND@PLACE,...[:NAME=VALUE]", value_parser = NamedEffect::parse, requires = "from",
           conflicts_with = "criterion")]
     pub(crate) separate: Option<NamedEffect>,

@@ -27,11 +27,12 @@ pub(crate) struct WorkArgs {
     /// Recordings to fit and to compare with (CSV, Parquet, MATLAB, HDF5, MCAP, rosbag2); may be repeated
     #[arg(long, value_name = "RUN", num_args = 1..)]
     pub(crate) data: Vec<PathBuf>,
-    /// Recordings for validation: an effect is accepted only if it lowers the error there. Without any, --data is split into
-    /// blocks (cross-validation)
+    /// Recordings for validation: an effect is accepted only if it lowers the error there. Without any, --data is split
+    /// into blocks (cross-validation)
     #[arg(long, value_name = "RUN", num_args = 1.., requires = "data")]
     pub(crate) check: Vec<PathBuf>,
-    /// A model file to compare with, for example an earlier version; those of the model's folder can also be chosen on the page
+    /// A model file to compare with, for example an earlier version; those of the model's folder can also be chosen on
+    /// the page
     #[arg(long, value_name = "MODEL")]
     pub(crate) beside: Option<PathBuf>,
     /// Port on the loopback address; 0 selects a free one

@@ -1,5 +1,5 @@
-//! `add`: adds an effect to a model file. A kind with its places and values goes in; the difference of the text comes out.
-//! The new model must be valid and derivable before it is written.
+//! `add`: adds an effect to a model file. A kind with its places and values goes in; the difference of the text comes
+//! out. The new model must be valid and derivable before it is written.
 
 use modelmill::Host;
 use modelmill::add::new_effect;
@@ -13,7 +13,8 @@ use crate::flags::FlagSpelling;
 use crate::output::{self, OutputFile};
 use crate::{commands, terminal};
 
-/// Edits the model file, prints the difference, and writes the result to `--out` or, with `--in-place`, to the model file.
+/// Edits the model file, prints the difference, and writes the result to `--out` or, with `--in-place`, to the model
+/// file.
 pub(crate) fn run(host: &Host, args: &AddArgs) -> CommandOutcome {
     let before = commands::load_quietly(host, &args.model)?;
     let target = args

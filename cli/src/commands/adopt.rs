@@ -11,7 +11,8 @@ use crate::failure::CommandOutcome;
 use crate::output::{self, OutputFile};
 use crate::{commands, terminal};
 
-/// Edits the model file, prints the difference, and writes the result to `--out` or, with `--in-place`, to the model file.
+/// Edits the model file, prints the difference, and writes the result to `--out` or, with `--in-place`, to the model
+/// file.
 pub(crate) fn run(host: &Host, args: &AdoptArgs) -> CommandOutcome {
     let model = commands::model(host, &args.model)?;
     let inputs = model

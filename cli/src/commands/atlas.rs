@@ -1,4 +1,5 @@
-//! `atlas`: pictures, base parameters and counts of many mechanisms, as one table with a page for each, and as one page of HTML.
+//! `atlas`: pictures, base parameters and counts of many mechanisms, as one table with a page for each, and as one page
+//! of HTML.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};

@@ -1,5 +1,5 @@
-//! `excite`: searches for the periodic trajectory that determines the base parameters best, eq. (14), (15) and (17), or that
-//! distinguishes an effect from its alternatives.
+//! `excite`: searches for the periodic trajectory that determines the base parameters best, eq. (14), (15) and (17), or
+//! that distinguishes an effect from its alternatives.
 
 use std::path::PathBuf;
 

@@ -1,4 +1,5 @@
-//! `generate`: writes the model as Rust source, as C99 sources, or as a crate that builds a C library or a Python module.
+//! `generate`: writes the model as Rust source, as C99 sources, or as a crate that builds a C library or a Python
+//! module.
 
 use std::path::Path;
 

@@ -1,4 +1,5 @@
-//! `interpret`: solves identified base parameters for physical parameters; the others are fixed at their nominal values.
+//! `interpret`: solves identified base parameters for physical parameters; the others are fixed at their nominal
+//! values.
 
 use modelmill::Host;
 

@@ -141,8 +141,8 @@ pub(crate) fn diagnose(
 }
 
 impl DiagnosisArgs {
-    /// Which parameters are fixed. With the values of a fit all are: the question is what changed since the fit, and estimated
-    /// parameters would absorb the change.
+    /// Which parameters are fixed. With the values of a fit all are: the question is what changed since the fit, and
+    /// estimated parameters would absorb the change.
     pub(crate) fn fixed_parameters(&self) -> FixedParameters {
         let is_fit = matches!(self.parameters, ParameterSource::Fit(_));
         if self.held || is_fit {

@@ -1,4 +1,5 @@
-//! Progress on standard error for jobs that take longer than a second, on a terminal only. Remarks are printed as they occur.
+//! Progress on standard error for jobs that take longer than a second, on a terminal only. Remarks are printed as they
+//! occur.
 
 use std::io::IsTerminal;
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
@@ -20,8 +21,8 @@ const SHORT_PATIENCE: Duration = Duration::from_millis(300);
 /// Interval between updates of the line.
 const TICK: Duration = Duration::from_millis(100);
 
-/// Shows the library's jobs on a terminal once the program has run for a second: a line with the name of the job and a bar, or a
-/// spinner if the job does not count its steps.
+/// Shows the library's jobs on a terminal once the program has run for a second: a line with the name of the job and a
+/// bar, or a spinner if the job does not count its steps.
 pub(crate) struct TerminalProgress {
     /// Start of the program.
     start: Instant,

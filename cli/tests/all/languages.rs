@@ -1,7 +1,7 @@
 //! Crates for other languages: what `generate --language` writes is built and held against the reference tables.
 //!
-//! The C library also proves that emitted code cannot panic: built without the standard library, it holds no trace of the
-//! machinery that a panic needs.
+//! The C library also proves that emitted code cannot panic: built without the standard library, it holds no trace of
+//! the machinery that a panic needs.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -431,7 +431,10 @@ fn a_folder_that_holds_something_else_is_left_alone() {
     let output = command(&out);
     assert_eq!(output.status.code(), Some(2));
     let says = String::from_utf8_lossy(&output.stderr);
-    assert!(says.contains("the folder has files that modelmill did not write"), "{says}");
+    assert!(
+        says.contains("the folder has files that modelmill did not write"),
+        "{says}"
+    );
     assert_eq!(
         std::fs::read_to_string(out.join("Cargo.toml")).unwrap(),
         "[package]\n"

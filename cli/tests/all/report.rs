@@ -1,9 +1,9 @@
-//! The page that `report` writes: it holds what `diagnose` says, needs nothing else, and answers to wheel, pointer and keys
-//! in a browser.
+//! The page that `report` writes: it holds what `diagnose` says, needs nothing else, and answers to wheel, pointer and
+//! keys in a browser.
 //!
-//! Decision: a page of `report` is tested without the protocol of the developer tools. The test writes a copy with
-//! two more scripts: one that collects errors first, and one that uses wheel, pointer and keys last. It reads what
-//! they wrote from the dumped document.
+//! Decision: a page of `report` is tested without the protocol of the developer tools. The test writes a copy with two
+//! more scripts: one that collects errors first, and one that uses wheel, pointer and keys last. It reads what they
+//! wrote from the dumped document.
 
 use std::path::PathBuf;
 use std::process::Command;
@@ -146,7 +146,8 @@ fn a_folder_that_cannot_be_is_said_before_anything_is_done() {
     );
 }
 
-/// Opens a page without a network, lets `exercise.js` use it, and returns what that wrote down; `None` without a browser.
+/// Opens a page without a network, lets `exercise.js` use it, and returns what that wrote down; `None` without a
+/// browser.
 fn used(page: &str, name: &str) -> Option<Value> {
     let browser = browser::found()?;
     let listen = include_str!("../browser/listen.js");

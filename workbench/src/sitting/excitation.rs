@@ -1,4 +1,4 @@
-//! The excitation of a sitting: limits that planned motion keeps, a search with its progress, and the trajectory that it found.
+//! The excitation of a session: the limits of the motion, a search with its progress, and the trajectory that it found.
 
 use std::path::Path;
 use std::sync::{Arc, MutexGuard, PoisonError};
@@ -15,26 +15,32 @@ use crate::options::ExcitationSettings;
 use crate::told;
 use crate::watch::JobWatch;
 
-/// Harmonics, random trajectories and starts, samples of a file: more of them is a slip of the hand.
+/// Largest number of harmonics; more is a typing error.
 const MOST_HARMONICS: usize = 50;
+/// Largest number of random trajectories, and of starts.
 const MOST_TRIED: usize = 1_000_000;
+/// Largest number of samples of a file.
 const MOST_SAMPLES: f64 = 5e6;
 
-/// A search, and what came of the last one.
+/// A search, or the result of the last one.
 #[derive(Default)]
 pub(crate) struct ExcitationJob {
-    /// Counts the searches of the sitting.
+    /// Counts the searches of the session.
     number: u64,
-    /// The text that is asked about.
+    /// The revision of the text for which the search was started.
     revision: u64,
+    /// The settings of the search.
     settings: ExcitationSettings,
+    /// Progress and start time in s, while it runs.
     running: Option<(Arc<JobWatch>, f64)>,
+    /// The trajectory, or why there is none.
     answer: Option<Result<PlannedTrajectory, String>>,
+    /// Whether the user cancelled it.
     was_cancelled: bool,
 }
 
 impl ExcitationJob {
-    /// Nothing was asked for yet; searches are counted from `first` on.
+    /// No search yet; searches are counted from `first`.
     pub(crate) fn new(first: u64) -> Self {
         Self {
             number: first,
@@ -45,20 +51,23 @@ impl ExcitationJob {
 
 /// A trajectory that was found.
 struct PlannedTrajectory {
+    /// JSON for the page.
     view: Value,
+    /// One period of the trajectory as CSV.
     csv: String,
 }
 
-/// The name under which a trajectory is to be kept.
+/// Body of `keep_trajectory`.
 #[derive(Debug, Deserialize)]
 pub(crate) struct KeepTrajectoryRequest {
+    /// Name of the file to write.
     name: String,
 }
 
 impl ExcitationSettings {
-    /// As the library is asked.
+    /// The same as a request of the library.
     ///
-    /// Fails with a sentence where a value cannot be meant.
+    /// Fails with a sentence if a value is out of its range.
     fn request(&self) -> Result<ExcitationRequest, String> {
         if !(1..=MOST_HARMONICS).contains(&self.harmonics) {
             return Err(format!("harmonics: expected 1 to {MOST_HARMONICS}"));
@@ -73,7 +82,7 @@ impl ExcitationSettings {
         }
         if !(1.0..=1e5).contains(&self.rate) || self.rate * self.period > MOST_SAMPLES {
             return Err(format!(
-                "rate: expected 1 to 100000 samples per second, and no more than {MOST_SAMPLES} of them in a period"
+                "rate: expected 1 to 100000 samples per second, and at most {MOST_SAMPLES} samples in a period"
             ));
         }
         let limit = |text: &String| {
@@ -96,11 +105,12 @@ impl ExcitationSettings {
 }
 
 impl WorkbenchSession {
+    /// The search; a panic of another thread does not lose it.
     fn planning(&self) -> MutexGuard<'_, ExcitationJob> {
         self.planning.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// What an editor offers while one types.
+    /// Data for completions in the editor. If the text has faults, kinds of effects are those of the libraries.
     pub(crate) fn completions(&self) -> Result<Value, String> {
         let kinds = match self.state().derived.found.as_ref() {
             Ok(model) => model.loaded.kinds.clone(),
@@ -109,7 +119,7 @@ impl WorkbenchSession {
         Ok(told::completion_data(&kinds))
     }
 
-    /// Limits of the active coordinates as the text has them; what has none is `null`.
+    /// Limits of the active coordinates in the text, as JSON; `null` where there is none.
     pub(crate) fn limits(&self) -> Result<Value, String> {
         let (model, _) = self.model()?;
         let known = limits::merged_limits(&model, &[]).map_err(|error| self.error_text(&error))?;
@@ -129,9 +139,9 @@ impl WorkbenchSession {
         Ok(json!(model.motions().iter().map(of).collect::<Vec<_>>()))
     }
 
-    /// Begins to search for a trajectory for the text as it stands.
+    /// Starts a search for a trajectory with the current text.
     ///
-    /// Fails with a sentence when a search goes on, or a value cannot be meant.
+    /// Fails with a sentence if a search is running, or a value is out of its range.
     pub(crate) fn excite(self: &Arc<Self>, asked: ExcitationSettings) -> Result<Value, String> {
         self.model()?;
         let request = asked.request()?;
@@ -143,7 +153,7 @@ impl WorkbenchSession {
         let number = {
             let mut planning = self.planning();
             if planning.running.is_some() {
-                return Err("a search goes on; wait for it, or cancel it".to_owned());
+                return Err("a search is running; wait until it ends, or cancel it".to_owned());
             }
             *planning = ExcitationJob {
                 number: planning.number + 1,
@@ -157,22 +167,23 @@ impl WorkbenchSession {
         let sitting = Arc::clone(self);
         let host = self.host.clone().with_progress(watch as _);
         let work = move || {
-            // A panic must not leave the page waiting for ever.
+            // After a panic the page would wait forever; it gets an error instead.
             let asked = std::panic::AssertUnwindSafe(|| sitting.plan(&host, &text, &request));
             let found = std::panic::catch_unwind(asked).unwrap_or_else(|_| {
                 Err(Error::input(
-                    "the search ended by a fault of the program, which is none of yours",
+                    "the search ended with an internal error of the program, not of your input",
                 ))
             });
             sitting.finish_excitation(number, found);
         };
         if let Err(error) = self.surroundings.spawn_work(Box::new(work)) {
             self.planning().running = None;
-            return Err(format!("the search cannot begin: {error}"));
+            return Err(format!("the search cannot be started: {error}"));
         }
         Ok(self.excitation())
     }
 
+    /// Derives the text and searches for the trajectory, on the thread of the job.
     fn plan(
         &self,
         host: &modelmill::Host,
@@ -189,7 +200,7 @@ impl WorkbenchSession {
         told["q"] = found.motion.q.iter().map(|q| json!(thin_out(q))).collect();
         told["samples"] = json!(found.time.len());
         told["says"] = json!(format!(
-            "Condition number {}, {} for the best of {} random trajectories that keep the limits.",
+            "The condition number is {}. It was {} for the best of {} random trajectories within the limits.",
             significant(found.found.condition_number, 4),
             significant(found.found.start_condition_number, 4),
             found.found.feasible_starts
@@ -202,6 +213,7 @@ impl WorkbenchSession {
         })
     }
 
+    /// Stores the result of search `number`, unless a newer one was started.
     fn finish_excitation(&self, number: u64, found: Outcome<PlannedTrajectory>) {
         let mut planning = self.planning();
         if planning.number != number {
@@ -217,7 +229,7 @@ impl WorkbenchSession {
         self.notify_pages();
     }
 
-    /// Asks the search that goes on to stop.
+    /// Cancels the running search; returns its view.
     pub(crate) fn stop_excitation(&self) -> Value {
         if let Some((watch, _)) = &self.planning().running {
             watch.cancel();
@@ -225,7 +237,7 @@ impl WorkbenchSession {
         self.excitation()
     }
 
-    /// How far the search is, or what it found.
+    /// View of the search: its progress, or its result.
     pub(crate) fn excitation(&self) -> Value {
         let revision = self.state().draft.revision();
         let planning = self.planning();
@@ -246,7 +258,7 @@ impl WorkbenchSession {
         })
     }
 
-    /// The trajectory as a file (CSV).
+    /// The trajectory as CSV; fails if there is none.
     pub(crate) fn trajectory(&self) -> Result<Value, String> {
         match &self.planning().answer {
             Some(Ok(planned)) => Ok(json!({ "csv": planned.csv })),
@@ -254,9 +266,9 @@ impl WorkbenchSession {
         }
     }
 
-    /// Writes the trajectory to a file of the model's folder that is not there yet.
+    /// Writes the trajectory to a new file in the model's folder.
     ///
-    /// Fails with a sentence when the name is none of such a file.
+    /// Fails with a sentence if the name is not a plain file name that ends in `.csv`, or the file exists.
     pub(crate) fn keep_trajectory(&self, keeping: &KeepTrajectoryRequest) -> Result<Value, String> {
         let name = keeping.name.trim();
         let is_plain = Path::new(name).file_name().is_some_and(|own| own == name)
@@ -265,7 +277,7 @@ impl WorkbenchSession {
             && !name.chars().any(char::is_control);
         if !is_plain || !name.to_ascii_lowercase().ends_with(".csv") {
             return Err(format!(
-                "`{name}`: the name of a file of the model's folder is expected, such as excitation.csv"
+                "`{name}`: expected the name of a file of the model's folder, such as excitation.csv"
             ));
         }
         let folder = self.options.model.parent().unwrap_or(Path::new(""));

@@ -1,26 +1,30 @@
-//! The ladder of a sitting: what was done to the text, with the errors after each step.
+//! The steps of a session (pane *Ladder*): edits of the text with the errors after each.
 
 use serde_json::{Value, json};
 
-/// Steps of a sitting, each with the errors of the text that it led to. Errors come later than the step, if anybody waits for them
-/// at all: what led to a text whose errors nobody knows has no rung, since those of another text are not its own.
+/// Steps of a session, each with the errors of the resulting text. Errors arrive later than the step, if they are
+/// computed at all. A step without errors of its own revision is not listed.
 pub(super) struct ErrorLadder {
-    /// What was done since the last rung, and to which revision that led.
+    /// Edits since the last listed step, with the revisions that they led to.
     done: Vec<(u64, String)>,
-    /// The errors that were found last, and of which revision.
+    /// The last errors, with their revision.
     compared: Option<(u64, Value)>,
-    /// The revision of the last rung.
+    /// The revision of the last listed step.
     last: Option<u64>,
+    /// The listed steps, oldest first.
     rungs: Vec<LadderStep>,
 }
 
+/// One listed step.
 struct LadderStep {
+    /// What was done, in words.
     what: String,
+    /// Relative errors with nominal and identified values, as JSON.
     errors: Value,
 }
 
 impl ErrorLadder {
-    /// Of a text that was opened with this revision.
+    /// The steps of a text that was opened with this revision.
     pub(super) fn new(opened: u64) -> Self {
         Self {
             done: vec![(opened, "as opened".to_owned())],
@@ -30,7 +34,7 @@ impl ErrorLadder {
         }
     }
 
-    /// The rungs, as pages read them.
+    /// The steps as JSON for the page.
     pub(super) fn view(&self) -> Value {
         let rungs = self.rungs.iter();
         rungs
@@ -38,7 +42,7 @@ impl ErrorLadder {
             .collect()
     }
 
-    /// Something was done that led to a revision of the text, and whose effect on the errors is to stand here.
+    /// Records an edit that led to a revision. It is listed once the errors of this revision are known.
     pub(super) fn record_step(&mut self, revision: u64, what: &str) {
         if (self.done.iter()).all(|(at, one)| *at != revision || one != what) {
             self.done.push((revision, what.to_owned()));
@@ -46,13 +50,13 @@ impl ErrorLadder {
         self.add_step_if_known(revision);
     }
 
-    /// Takes the errors of a revision, and says whether a rung came of them.
+    /// Records the errors of a revision; returns whether a step was listed.
     pub(super) fn add_errors(&mut self, revision: u64, errors: Value) -> bool {
         self.compared = Some((revision, errors));
         self.add_step_if_known(revision)
     }
 
-    /// What was typed until a revision is a step of its own, before something else is done to the text.
+    /// Lists the typing until a revision as a separate step, before another kind of edit follows.
     pub(super) fn end_typing(&mut self, revision: u64) {
         let Some(errors) = self.errors_of(revision) else {
             return;
@@ -63,12 +67,13 @@ impl ErrorLadder {
         }
     }
 
+    /// The errors of a revision, if these are the last ones.
     fn errors_of(&self, revision: u64) -> Option<&Value> {
         let (_, errors) = self.compared.as_ref().filter(|(at, _)| *at == revision)?;
         Some(errors)
     }
 
-    /// Puts what led to a revision on the ladder, if its errors are known.
+    /// Lists the edits that led to a revision, if its errors are known. Edits of older revisions are dropped.
     fn add_step_if_known(&mut self, revision: u64) -> bool {
         let Some(errors) = self.errors_of(revision).cloned() else {
             return false;

@@ -1,6 +1,6 @@
-//! `tour`: all main steps on bundled recordings: derive, compare, find the missing effect, add it, identify again; then a diagnosis
-//! of the model as published in the paper. Its models, recordings and pages are written into one folder, so that each command can
-//! be repeated by hand.
+//! `tour`: all main steps on bundled recordings: derive, compare, find the missing effect, add it, identify again; then
+//! a diagnosis of the model as published in the paper. Its models, recordings and pages are written into one folder, so
+//! that each command can be repeated by hand.
 
 mod story;
 
@@ -145,7 +145,8 @@ impl TourFolder {
         CommandLineSpelling::new(&[fit], &[check], &RecordingOptions::default())
     }
 
-    /// Writes the model with the effects that were found. Returns the commands that do the same, and the difference of the files.
+    /// Writes the model with the effects that were found. Returns the commands that do the same, and the difference of
+    /// the files.
     fn add(
         &self,
         findings: &DiagnosisFindings,
