@@ -125,7 +125,7 @@ fn a_urdf_becomes_a_model() {
     std::fs::write(&urdf, "<robot").expect("written");
     let says = refused(1, &["import", &urdf, "--out", &out]);
     assert!(
-        says.contains("arm.urdf") && says.contains("no URDF"),
+        says.contains("arm.urdf") && says.contains("not a readable URDF"),
         "{says}"
     );
     let says = refused(1, &["import", "no/such.urdf", "--out", &out]);

@@ -1,47 +1,50 @@
-//! Loops of a description: which points have to coincide, which variables follow from them, and a pose at which they close.
+//! Solves the loop closures of a description: numeric kinematics and point pairs go in. Out come the independent pairs,
+//! the passive variables (determined by loop closure), and a pose at which the loops are closed.
 
 use nalgebra::DMatrix;
 
 use super::chain::{CoincidentPair, FrameChain, rank};
 
-/// Gaps, relative to the size, up to which loops close.
+/// Gap relative to the size up to which loops count as closed.
 const CLOSED: f64 = 1e-11;
-/// Gaps up to which they close by the digits of the description.
+/// Gap relative to the size up to which loops count as closed within the digits of the description.
 const NEARLY_CLOSED: f64 = 1e-6;
-/// Singular values below this share of the largest say nothing.
+/// Singular values below this share of the largest count as zero.
 const ZERO_SHARE: f64 = 1e-7;
-/// Where loops stay open, equations that follow from others have singular values up to so many times the gap, relative to
+/// If loops do not close exactly, redundant equations have singular values up to this factor times the gap relative to
 /// the size.
 const GAP_FACTOR: f64 = 100.0;
-/// A pose whose passive variables are settled worse than this is no pose to start from.
+/// A pose with passive variables of worse conditioning than this is not used as nominal pose if there is a better one.
 const WELL_CONDITIONED: f64 = 1e-3;
 
-/// Variables that are settled no better than this are worth another choice of independent ones.
+/// Below this conditioning, another choice of passive variables is searched for.
 const POORLY_CONDITIONED: f64 = 1e-2;
 
-/// A value this little beyond its range is on its edge, rad or m.
+/// Distance by which a value may exceed its range and still counts as at its limit, rad or m.
 pub(crate) const RANGE_TOLERANCE: f64 = 1e-9;
-/// Poses that are tried.
+/// Number of starting poses that are tried.
 const ATTEMPTS: usize = 200;
 
-/// How loops close.
+/// Result of closing the loops.
 pub(crate) struct LoopSolution {
-    /// The pairs that say something.
+    /// The pairs with at least one condition that the pairs before do not contain.
     pub(crate) pairs: Vec<CoincidentPair>,
-    /// Which variables follow from the loops.
+    /// Which variables are passive, by index of the variable.
     pub(crate) passive: Vec<bool>,
-    /// Values at a pose at which the loops close.
+    /// Values of all variables at a pose with closed loops, rad or m.
     pub(crate) values: Vec<f64>,
-    /// The pose is not the nearest to that of the description.
+    /// Whether the pose is not the nearest to that of the description.
     pub(crate) is_moved: bool,
-    /// The largest gap, relative to the size, by which points had to be moved to meet, where it is above rounding.
+    /// The largest gap relative to the size by which points were moved to coincide, if it is above rounding.
     pub(crate) gap: Option<f64>,
-    /// Conditions of the pairs, each pair by itself, and how many of all are independent.
+    /// Number of conditions counted for each pair by itself, and number of independent conditions of all pairs.
     pub(crate) conditions: [usize; 2],
 }
 
-/// Closes loops from `start`. Variables of which `reluctance` is low should stay independent.
-/// A pose within `ranges` is preferred.
+/// Closes loops from the values `start`. Variables with low `reluctance` should stay independent. A pose within
+/// `ranges` is preferred.
+///
+/// Fails if the loops do not close from any of the starting poses.
 pub(crate) fn close_loops(
     chain: &FrameChain,
     pairs: &[CoincidentPair],
@@ -98,10 +101,10 @@ pub(crate) fn close_loops(
     }
     if poses.is_empty() {
         return Err(format!(
-            "its loops do not close: from the pose of the file and {ATTEMPTS} others, gaps of {least:.1e} of its size remain"
+            "its loops do not close: {ATTEMPTS} starting poses were tried, and gaps of at least {least:.1e} of its size remain"
         ));
     }
-    // The rank at poses in general.
+    // The largest rank of all poses is that of a general pose; singular poses have less.
     let ranks: Vec<usize> = poses
         .iter()
         .map(|values| independent_conditions(chain, pairs, values).0)
@@ -116,12 +119,14 @@ pub(crate) fn close_loops(
         .unwrap_or(0);
     let pairs = independent_pairs(chain, pairs, &poses[general]);
     let (_, rows, _) = chain.gaps(&pairs, &poses[general]);
+    // Three rows of a pair can be dependent, for example in a planar loop.
     let by_itself = (0..pairs.len()).map(|k| rank(&rows.rows(3 * k, 3).into_owned(), ZERO_SHARE).0);
     let passive = choose_passive(&rows, reluctance, wanted);
     let settled = |values: &[f64]| {
         let (_, rows, _) = chain.gaps(&pairs, values);
         passive_conditioning(&rows, &passive)
     };
+    // The pose nearest to the description is used, unless it is close to a singularity.
     let mut best = 0;
     if wanted > 0 && settled(&poses[0]) < WELL_CONDITIONED {
         for k in 1..poses.len() {
@@ -133,6 +138,7 @@ pub(crate) fn close_loops(
     let mut values = poses.swap_remove(best);
     let gap = chain.close_pairs(&pairs, &mut values);
     let mut pairs = pairs;
+    // Points that miss each other by the digits of the description are redefined to coincide.
     if gap > CLOSED {
         chain.align_pairs(&mut pairs, &values);
     }
@@ -146,7 +152,7 @@ pub(crate) fn close_loops(
     })
 }
 
-/// How many conditions of the pairs are independent, and the least of their singular values as a share of the largest.
+/// Number of independent conditions of the pairs, and the smallest of their singular values relative to the largest.
 fn independent_conditions(
     chain: &FrameChain,
     pairs: &[CoincidentPair],
@@ -156,7 +162,7 @@ fn independent_conditions(
     rank(&rows, ZERO_SHARE.max(GAP_FACTOR * gaps.amax() / size))
 }
 
-/// The pairs that say something that those before do not.
+/// The pairs that add a condition to the pairs before them.
 fn independent_pairs(
     chain: &FrameChain,
     pairs: &[CoincidentPair],
@@ -175,11 +181,12 @@ fn independent_pairs(
     kept
 }
 
-/// Which variables follow: as many as the rank, those first that need not stay independent, from the end of the description.
+/// Chooses as many passive variables as the rank: first those with high reluctance, from the end of the description.
 fn choose_passive(rows: &DMatrix<f64>, reluctance: &[u8], wanted: usize) -> Vec<bool> {
     let mut order: Vec<usize> = (0..rows.ncols()).rev().collect();
     order.sort_by_key(|k| std::cmp::Reverse(reluctance[*k]));
     let mut passive = Vec::new();
+    // The demand on conditioning is lowered until enough variables are found.
     for least in [1e-2, 1e-4, 1e-6] {
         let n;
         (passive, n) = select_columns(rows, &order, wanted, least);
@@ -190,9 +197,10 @@ fn choose_passive(rows: &DMatrix<f64>, reluctance: &[u8], wanted: usize) -> Vec<
     exchange_passive(rows, reluctance, passive)
 }
 
-/// Exchanges variables that may be exchanged as long as the passive ones are settled badly and that settles them much better.
+/// Exchanges passive and independent variables of equal reluctance while the passive ones are poorly conditioned and an
+/// exchange improves this by a factor of three.
 fn exchange_passive(rows: &DMatrix<f64>, reluctance: &[u8], mut passive: Vec<bool>) -> Vec<bool> {
-    /// An exchange that gains less is not worth another order than that of the description.
+    /// Smallest improvement for which the order of the description is changed.
     const MUCH: f64 = 3.0;
     let n = passive.len();
     let mut now = passive_conditioning(rows, &passive);
@@ -214,7 +222,8 @@ fn exchange_passive(rows: &DMatrix<f64>, reluctance: &[u8], mut passive: Vec<boo
     passive
 }
 
-/// The least singular value of the rows by the passive variables, as a share of the largest; zero where these do not follow.
+/// The smallest singular value of the passive columns relative to the largest; zero if the loops do not determine these
+/// variables.
 fn passive_conditioning(rows: &DMatrix<f64>, passive: &[bool]) -> f64 {
     let columns: Vec<_> = (0..passive.len())
         .filter(|k| passive[*k])
@@ -226,7 +235,8 @@ fn passive_conditioning(rows: &DMatrix<f64>, passive: &[bool]) -> f64 {
     }
 }
 
-/// Columns in their order of which, beside those taken before, no less than a share is left; and how many.
+/// Selects columns in the given order by Gram-Schmidt: a column is taken if the part orthogonal to those before is at
+/// least the share `least` of it. Returns the selection and its size.
 fn select_columns(
     rows: &DMatrix<f64>,
     order: &[usize],
@@ -234,7 +244,7 @@ fn select_columns(
     least: f64,
 ) -> (Vec<bool>, usize) {
     let mut passive = vec![false; rows.ncols()];
-    // Each made orthogonal to those chosen.
+    // Orthonormal directions of the columns chosen so far; two passes of Gram-Schmidt keep them orthogonal to rounding.
     let scale = rows.amax().max(f64::MIN_POSITIVE);
     let mut chosen: Vec<nalgebra::DVector<f64>> = Vec::new();
     for k in order {
@@ -255,10 +265,11 @@ fn select_columns(
     (passive, chosen.len())
 }
 
-/// Numbers between -1 and 1 in an order without meaning, the same on every machine.
+/// A generator of pseudorandom numbers between -1 and 1 (linear congruential), with the same sequence on every machine.
 struct PoseNoise(u64);
 
 impl PoseNoise {
+    /// The next number.
     fn next(&mut self) -> f64 {
         self.0 = self
             .0

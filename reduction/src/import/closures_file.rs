@@ -1,39 +1,45 @@
-//! Closures beside a URDF: the `robot.yaml` of the collection example-parallel-robots.
+//! Reads the loop closures of a URDF from the `robot.yaml` of the collection example-parallel-robots.
 //!
-//! Of YAML it is keys at the start of lines with lists behind them, in brackets or behind dashes, which is what these files
-//! hold; other keys are told.
+//! Only the part of YAML that these files use is read: keys at the start of lines, followed by lists in brackets or
+//! with dashes. Unknown keys are reported.
 
-/// What the file says.
+/// Contents of the file.
 #[derive(Debug, Default)]
 pub(crate) struct ClosureFile {
+    /// Loop closures.
     pub(crate) pairs: Vec<CoincidentFrames>,
-    /// Joints that are driven; all where there are none.
+    /// Names of the driven joints; empty if all are driven.
     pub(crate) drives: Vec<String>,
-    /// Joints with what they are, whatever the URDF has in their place: it knows neither balls nor crosses.
+    /// Joints with their true kinds, which replace those of the URDF. URDF has neither ball joints nor universal
+    /// joints.
     pub(crate) joints: Vec<(String, JointReplacement)>,
     /// What is not read; one sentence each.
     pub(crate) remarks: Vec<String>,
 }
 
-/// What a joint of the URDF is in truth.
+/// True kind of a joint that URDF cannot express.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum JointReplacement {
+    /// Three rotations.
     Ball,
+    /// No motion.
     Fixed,
-    /// Two hinges, about axes of its frame one after the other.
+    /// A universal joint: two hinges in sequence about these axes of its frame.
     Cross([char; 2]),
 }
 
 /// Two frames that coincide.
 #[derive(Debug)]
 pub(crate) struct CoincidentFrames {
+    /// Names of links, or of joints whose child links are meant.
     pub(crate) ends: [String; 2],
-    /// In orientation too.
+    /// Whether the orientations coincide as well as the origins.
     pub(crate) is_full: bool,
+    /// Line of the closures in the file.
     pub(crate) line: u32,
 }
 
-/// Keys that are read.
+/// Keys that are read; others are reported.
 const KNOWN_KEYS: [&str; 5] = [
     "closed_loop",
     "type",
@@ -42,8 +48,9 @@ const KNOWN_KEYS: [&str; 5] = [
     "joint_type",
 ];
 
-/// Reads the file, or says what is wrong.
+/// Reads the file; fails with the line and what was expected.
 pub(crate) fn read(text: &str) -> Result<ClosureFile, String> {
+    // Lines that start with a blank, a dash or a bracket continue the value of the key before.
     let mut entries: Vec<(u32, &str, String)> = Vec::new();
     for (line, text) in (1..).zip(text.lines()) {
         let text = text.split(" #").next().unwrap_or_default();
@@ -70,6 +77,7 @@ pub(crate) fn read(text: &str) -> Result<ClosureFile, String> {
     };
     let (line, ends) = list("closed_loop");
     let (_, kinds) = list("type");
+    // The list of closures is flat after this: two names for each.
     let (pairs, rest) = ends.as_chunks::<2>();
     if !rest.is_empty() || (!kinds.is_empty() && kinds.len() != pairs.len()) {
         return Err(format!(
@@ -129,7 +137,7 @@ pub(crate) fn read(text: &str) -> Result<ClosureFile, String> {
     Ok(out)
 }
 
-/// All words of a list, nested or not.
+/// All words of a list, with nested lists flattened and quotes removed.
 fn list_words(text: &str) -> Vec<String> {
     text.split([',', '[', ']', '\n'])
         .map(|word| {

@@ -1,59 +1,71 @@
-//! Joints that follow others: each joint as `ratio*variable + offset`, where a variable becomes a coordinate of the model.
+//! Resolves couplings between joints. Couplings of the description go in; each joint comes out as `ratio*variable +
+//! offset`, and each variable becomes a coordinate of the model.
 //!
-//! A joint whose angle is a whole multiple of another's shares its coordinate; any other one has a coordinate that follows.
+//! A joint whose angle is an integer multiple of another's shares its coordinate. Any other follower gets a coordinate
+//! with `follows`.
 
 use super::description::{DescriptionJoint, DescriptionJointKind, RobotDescription};
 use crate::write::toml_float;
 
-/// Integer multiples of a coordinate beyond this make expressions that nobody wants.
+/// Largest numerator and denominator of a ratio that is written as a fraction.
 const LARGEST_MULTIPLE: i64 = 60;
-/// A ratio this near to a fraction is the fraction, printed with so many digits.
+/// A ratio this close to a fraction is the fraction, printed with a limited number of digits.
 const SAME_RATIO: f64 = 1e-9;
 
-/// What becomes a coordinate.
+/// A variable: it becomes a coordinate of the model.
 #[derive(Clone)]
 pub(crate) struct JointVariable {
-    /// The joint that it is.
+    /// Name of the joint whose value it is.
     pub(crate) joint: String,
+    /// Whether a drive acts on this joint or on one that follows it.
     pub(crate) is_driven: bool,
 }
 
-/// A joint as its variable moves it.
+/// The value of a joint as a function of a variable: `ratio*variable + offset`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct JointFollower {
-    /// None where it is held.
+    /// Index of the variable; none if the joint is fixed at `offset`.
     pub(crate) variable: Option<usize>,
+    /// Factor of the variable.
     pub(crate) ratio: f64,
+    /// Constant part, rad or m.
     pub(crate) offset: f64,
-    /// Whether it has a coordinate of its own, which follows that of the variable.
+    /// Whether it has a separate coordinate, which follows that of the variable.
     pub(crate) has_own: bool,
-    /// Whether one of both turns and the other slides.
+    /// Whether one joint is revolute and the other prismatic.
     pub(crate) changes_kind: bool,
 }
 
-/// Joints that turn or slide, and what they follow, in the order of the description.
+/// All revolute and prismatic joints with their variables, in the order of the description.
 pub(crate) struct ImportCouplings {
+    /// The variables.
     pub(crate) variables: Vec<JointVariable>,
+    /// Name of each joint, and how it follows its variable.
     pub(crate) follows: Vec<(String, JointFollower)>,
 }
 
 impl ImportCouplings {
+    /// How a joint follows its variable; none if there is no such joint.
     pub(crate) fn find_follower(&self, joint: &str) -> Option<JointFollower> {
         let found = self.follows.iter().find(|(name, _)| name == joint);
         found.map(|(_, follows)| *follows)
     }
 }
 
-/// `q = ratio*q[of] + offset`; none is held.
+/// A rule `q = ratio*q[leader] + offset`.
 #[derive(Clone, Copy)]
 struct CouplingRule {
+    /// Index of the joint that is followed; none fixes the joint at `offset`.
     leader: Option<usize>,
+    /// Factor of the leader's value.
     ratio: f64,
+    /// Constant part, rad or m.
     offset: f64,
+    /// Line of the coupling in the description.
     line: u32,
 }
 
-/// Resolves all couplings of a description.
+/// Resolves all couplings of a description. Adds a remark for each ratio that is rounded to a fraction.
 pub(crate) fn resolve(description: &mut RobotDescription) -> Result<ImportCouplings, String> {
     let joints: Vec<DescriptionJoint> = description
         .links
@@ -100,12 +112,13 @@ pub(crate) fn resolve(description: &mut RobotDescription) -> Result<ImportCoupli
                 let ratio = fraction(rule.ratio).map_or(rule.ratio, |(p, q)| p as f64 / q as f64);
                 if leader.is_some() && (ratio - rule.ratio).abs() > 1e-14 {
                     description.remarks.push(format!(
-                        "line {}: the ratio {} is taken for {}",
+                        "line {}: the ratio {} is rounded to {}",
                         rule.line,
                         rule.ratio,
                         ratio_text(ratio)
                     ));
                 }
+                // Only an integer multiple of an angle keeps sines and cosines polynomial in those of the leader.
                 let shares = |of: usize| match (joint.kind, joints[of].kind) {
                     (DescriptionJointKind::Revolute, DescriptionJointKind::Revolute) => {
                         fraction(ratio).is_some_and(|(_, q)| q == 1)
@@ -126,7 +139,9 @@ pub(crate) fn resolve(description: &mut RobotDescription) -> Result<ImportCoupli
     Ok(ImportCouplings { variables, follows })
 }
 
-/// Every joint by the joint that leads in the end.
+/// The rule of each joint, by the last leader of its chain of couplings; none for joints that follow no other.
+///
+/// Fails if a joint follows itself or two joints.
 fn coupling_rules(
     description: &RobotDescription,
     joints: &[DescriptionJoint],
@@ -136,7 +151,7 @@ fn coupling_rules(
             .iter()
             .position(|joint| joint.name == name)
             .ok_or_else(|| {
-                format!("line {line}: the coupling names `{name}`, which is no joint that turns or slides")
+                format!("line {line}: the coupling names `{name}`, which is not a revolute or prismatic joint")
             })
     };
     let mut rules: Vec<Option<CouplingRule>> = vec![None; joints.len()];
@@ -157,6 +172,7 @@ fn coupling_rules(
             offset: coupling.offset,
             line,
         };
+        // A second coupling of a joint is inverted, if the other joint is still free to follow.
         if rules[one].is_none() {
             rules[one] = Some(rule);
         } else if let Some(other) = of.filter(|of| rules[*of].is_none() && rule.ratio != 0.0) {
@@ -173,6 +189,7 @@ fn coupling_rules(
             ));
         }
     }
+    // Replace leaders that are followers themselves, until the leader is independent.
     for k in 0..joints.len() {
         let mut steps = 0;
         while let Some(rule) = rules[k]
@@ -182,7 +199,7 @@ fn coupling_rules(
             steps += 1;
             if steps > joints.len() {
                 return Err(format!(
-                    "line {}: `{}` follows itself by way of others",
+                    "line {}: `{}` follows itself through other joints",
                     rule.line, joints[k].name
                 ));
             }
@@ -197,7 +214,8 @@ fn coupling_rules(
     Ok(rules)
 }
 
-/// Lets a driven joint lead where the one that leads is not.
+/// Makes a driven follower the leader if the present leader is not driven, and rewrites the rules of the other
+/// followers.
 fn prefer_driven_leaders(joints: &[DescriptionJoint], rules: &mut [Option<CouplingRule>]) {
     for old in 0..joints.len() {
         if rules[old].is_some() || joints[old].is_driven {
@@ -228,7 +246,7 @@ fn prefer_driven_leaders(joints: &[DescriptionJoint], rules: &mut [Option<Coupli
     }
 }
 
-/// Numerator and denominator of a ratio of small whole numbers.
+/// Numerator and denominator if a ratio is a fraction of small integers.
 fn fraction(ratio: f64) -> Option<(i64, i64)> {
     (1..=LARGEST_MULTIPLE).find_map(|q| {
         let p = (ratio * q as f64).round();
@@ -238,7 +256,7 @@ fn fraction(ratio: f64) -> Option<(i64, i64)> {
     })
 }
 
-/// A ratio as a model file has it.
+/// A ratio in the notation of a model file: integer, fraction or decimal.
 pub(crate) fn ratio_text(ratio: f64) -> String {
     match fraction(ratio) {
         Some((p, 1)) => p.to_string(),

@@ -1,4 +1,5 @@
-//! Mass and inertia of simple shapes of one density, about their own centres.
+//! Mass and inertia of homogeneous simple shapes about their own centres. Kinds, sizes and their order are those of
+//! MuJoCo.
 
 use std::f64::consts::PI;
 
@@ -7,14 +8,17 @@ use nalgebra::{Matrix3, Vector3};
 use super::description::DescriptionInertia;
 use super::placed::DescriptionPose;
 
-/// A shape: volume, and the moments of inertia for a mass of one.
+/// A shape: its volume, and its moments of inertia per mass.
 pub(crate) struct GeomShape {
+    /// Volume, m^3.
     volume: f64,
+    /// Principal moments about the centre for a mass of 1 kg, kg m^2.
     moments: [f64; 3],
 }
 
 impl GeomShape {
-    /// A shape as MuJoCo names and sizes it; `half` is half the length where both ends are given. None has no mass (a plane).
+    /// A shape by MuJoCo's kind and sizes, m; `half` is half the length if both ends are given (`fromto`). None for
+    /// kinds without mass, such as planes.
     pub(crate) fn new(kind: &str, size: &[f64], half: Option<f64>) -> Result<Option<Self>, String> {
         let at = |k: usize| {
             size.get(k)
@@ -60,7 +64,7 @@ impl GeomShape {
                 let (r, h) = (at(0)?, half.map_or_else(|| at(1), Ok)?);
                 let (middle, caps) = (2.0 * PI * r * r * h, 4.0 / 3.0 * PI * r.powi(3));
                 let volume = middle + caps;
-                // Each cap's centre lies 3/8 r beyond the end of the cylinder.
+                // The centre of each cap is 3/8 r beyond the end of the cylinder.
                 let of_caps = 0.4 * r * r + h * h + 0.75 * h * r;
                 let across = (middle * (r * r / 4.0 + h * h / 3.0) + caps * of_caps) / volume;
                 let along = (middle * r * r / 2.0 + caps * 0.4 * r * r) / volume;
@@ -71,7 +75,7 @@ impl GeomShape {
             }
             other => {
                 return Err(format!(
-                    "mass and inertia of a {other} are not worked out here: give the body an <inertial>, as MuJoCo writes it \
+                    "mass and inertia of a {other} are not computed here; give the body an <inertial>, as MuJoCo writes it \
                      (mj_saveLastXML)"
                 ));
             }
@@ -79,7 +83,7 @@ impl GeomShape {
         Ok(Some(shape))
     }
 
-    /// The shape with a mass, or else a density.
+    /// Mass and inertia of the shape at a pose, from a mass in kg or else from a density in kg/m^3.
     pub(crate) fn inertial(
         &self,
         mass: Option<f64>,
@@ -96,7 +100,7 @@ impl GeomShape {
     }
 }
 
-/// Several bodies as one.
+/// Mass and inertia of several rigidly connected bodies, about their common centre of mass, in the axes of the frame.
 pub(crate) fn combined_inertia(parts: &[DescriptionInertia]) -> DescriptionInertia {
     let mass: f64 = parts.iter().map(|part| part.mass).sum();
     if mass <= 0.0 {
@@ -106,6 +110,7 @@ pub(crate) fn combined_inertia(parts: &[DescriptionInertia]) -> DescriptionInert
     let centre = moment / mass;
     let mut inertia = Matrix3::zeros();
     for part in parts {
+        // Rotate into the axes of the frame, then shift to the common centre (Steiner).
         let c = part.at.p - centre;
         inertia += part.at.r * part.inertia * part.at.r.transpose()
             + part.mass * (Matrix3::identity() * c.norm_squared() - c * c.transpose());

@@ -1,4 +1,4 @@
-//! Reads URDF: links and joints with the defaults of the format, mimic joints, and closures of a file beside it.
+//! Reads URDF: links and joints with the defaults of the format, mimic joints, and loop closures of a `robot.yaml`.
 //!
 //! Source of names and defaults: the URDF specification of ROS (wiki.ros.org/urdf/XML).
 
@@ -16,18 +16,24 @@ use super::xml::{
     symmetric, three_numbers, vector,
 };
 
-/// A joint between two links, as the file has it.
+/// A joint between two links, as the file describes it.
 struct UrdfJoint {
+    /// Name of the parent link.
     parent: String,
+    /// Name of the child link.
     child: String,
+    /// Pose of the joint, and of the child at zero, in the parent.
     origin: DescriptionPose,
-    /// One after the other; none is fixed.
+    /// Joints in sequence; empty for a fixed joint.
     joints: Vec<DescriptionJoint>,
+    /// Name of the joint.
     name: String,
+    /// Line in the file.
     line: u32,
 }
 
-/// Reads a description, or says in one line what is wrong and where. `closures` is the text of a `robot.yaml`.
+/// Reads a description; fails with one line that states the fault and its place. `closures` is the text of a
+/// `robot.yaml`.
 #[allow(clippy::too_many_lines, reason = "elements in their order")]
 pub(crate) fn read(
     document: &Document,
@@ -59,7 +65,7 @@ pub(crate) fn read(
                     .is_some_and(|text| text.trim().parse() != Ok(1.0))
         }) {
             out.remarks.push(format!(
-                "line {}: the reduction {} of the transmission `{}` is not read: forces are those at the joints",
+                "line {}: the reduction {} of the transmission `{}` is ignored; forces of the model are those at the joints",
                 line(&reduction),
                 reduction.text().unwrap_or_default().trim(),
                 node.attribute("name").unwrap_or_default()
@@ -72,11 +78,12 @@ pub(crate) fn read(
     {
         return Err(located_message(
             &node,
-            "a proposal for closed chains that was never settled; write the closure into a robot.yaml beside the file",
+            "<loop_joint> is not part of the URDF standard; write the closure into a robot.yaml next to the file",
         ));
     }
     check_names(&links, &joints)?;
     let root = root_link(&links, &joints)?;
+    // Breadth first from the root, so that parents stand before their children.
     let mut order = vec![(root, None)];
     let mut k = 0;
     while k < order.len() {
@@ -101,7 +108,7 @@ pub(crate) fn read(
                 && joint.parent != required_attribute(&root, "name")?
             {
                 return Err(format!(
-                    "line {}: the joint `{}` is floating on a link that is not the root; a free body hangs on nothing",
+                    "line {}: the joint `{}` is floating, but its parent link is not the root; only children of the root can be free bodies",
                     joint.line, joint.name
                 ));
             }
@@ -122,7 +129,7 @@ pub(crate) fn read(
                 .any(|(node, _)| node.attribute("name") == Some(joint.child.as_str()))
             {
                 return Err(format!(
-                    "line {}: the link `{}` hangs on two joints; URDF describes trees only",
+                    "line {}: the link `{}` is the child of two joints; URDF describes trees only",
                     joint.line, joint.child
                 ));
             }
@@ -142,7 +149,7 @@ pub(crate) fn read(
     }) {
         return Err(located_message(
             node,
-            "it is in a ring of joints that the root does not reach",
+            "it is part of a loop of joints that is not connected to the root",
         ));
     }
     if let Some(file) = closures {
@@ -151,7 +158,7 @@ pub(crate) fn read(
     Ok(out)
 }
 
-/// Puts in the place of joints what the file of closures says that they are.
+/// Replaces joints by the kinds that the file of closures gives for them. Damping and friction of the URDF stay.
 fn replace_joints(
     joints: &mut [UrdfJoint],
     by: &[(String, JointReplacement)],
@@ -160,7 +167,7 @@ fn replace_joints(
         let found = joints.iter_mut().find(|joint| &joint.name == name);
         let Some(UrdfJoint { joints, line, .. }) = found else {
             return Err(format!(
-                "the file of closures says what `{name}` is, which is no joint"
+                "the file of closures gives a type for the joint `{name}`, which does not exist"
             ));
         };
         let old = std::mem::take(joints);
@@ -188,7 +195,7 @@ fn replace_joints(
     Ok(())
 }
 
-/// A joint that is fixed follows nothing, and what follows a fixed one is held.
+/// Removes couplings of fixed joints, and fixes joints that follow a fixed one.
 fn resolve_fixed_couplings(out: &mut RobotDescription, joints: &[UrdfJoint]) {
     let is_fixed = |name: &str| {
         let mut joints = joints.iter();
@@ -198,14 +205,14 @@ fn resolve_fixed_couplings(out: &mut RobotDescription, joints: &[UrdfJoint]) {
     out.couplings.retain_mut(|coupling| {
         if let Some(of) = coupling.leader.take_if(|of| is_fixed(of)) {
             remarks.push(format!(
-                "line {}: `{}` follows `{of}`, which is fixed: it is held at {}",
+                "line {}: `{}` follows `{of}`, which is fixed; it is fixed at {}",
                 coupling.line, coupling.joint, coupling.offset
             ));
         }
         let moves = !is_fixed(&coupling.joint);
         if !moves {
             remarks.push(format!(
-                "line {}: `{}` is fixed and follows nothing; its <mimic> is left out",
+                "line {}: `{}` is fixed; its <mimic> is left out",
                 coupling.line, coupling.joint
             ));
         }
@@ -213,6 +220,7 @@ fn resolve_fixed_couplings(out: &mut RobotDescription, joints: &[UrdfJoint]) {
     });
 }
 
+/// Checks that names of links and joints are unique, and that joints connect links that exist.
 fn check_names(links: &[Node], joints: &[UrdfJoint]) -> Result<(), String> {
     for (i, node) in links.iter().enumerate() {
         let name = required_attribute(node, "name")?;
@@ -222,14 +230,14 @@ fn check_names(links: &[Node], joints: &[UrdfJoint]) -> Result<(), String> {
         {
             return Err(located_message(
                 node,
-                &format!("two links are called `{name}`; rename one"),
+                &format!("two links have the name `{name}`; rename one"),
             ));
         }
     }
     for (i, joint) in joints.iter().enumerate() {
         if joints[..i].iter().any(|other| other.name == joint.name) {
             return Err(format!(
-                "line {}: two joints are called `{}`; rename one",
+                "line {}: two joints have the name `{}`; rename one",
                 joint.line, joint.name
             ));
         }
@@ -248,7 +256,7 @@ fn check_names(links: &[Node], joints: &[UrdfJoint]) -> Result<(), String> {
     Ok(())
 }
 
-/// The link that no joint moves; all others must hang on it.
+/// The link that is no joint's child. Fails if there is none or more than one.
 fn root_link<'a, 'i>(links: &[Node<'a, 'i>], joints: &[UrdfJoint]) -> Result<Node<'a, 'i>, String> {
     let is_child = |node: &&Node| {
         joints
@@ -258,17 +266,18 @@ fn root_link<'a, 'i>(links: &[Node<'a, 'i>], joints: &[UrdfJoint]) -> Result<Nod
     let mut roots = links.iter().filter(|node| !is_child(node));
     match (roots.next(), roots.next()) {
         (Some(root), None) => Ok(*root),
-        (None, _) => Err("no link is the root: every link hangs on another".to_owned()),
+        (None, _) => Err("there is no root link: every link is the child of a joint".to_owned()),
         (Some(one), Some(two)) => Err(located_message(
             two,
             &format!(
-                "this link and `{}` hang on nothing; join them to one robot",
+                "this link and `{}` are both without a parent; connect them to one robot",
                 one.attribute("name").unwrap_or_default()
             ),
         )),
     }
 }
 
+/// The `<inertial>` of a link; zero mass without one.
 fn inertial(node: &Node) -> Result<DescriptionInertia, String> {
     let Some(inertial) = child(node, "inertial") else {
         return Ok(DescriptionInertia::default());
@@ -289,6 +298,7 @@ fn inertial(node: &Node) -> Result<DescriptionInertia, String> {
     })
 }
 
+/// Reads a `<joint>` with its limits, losses and `<mimic>`, which goes into the couplings of `out`.
 fn joint(node: &Node, out: &mut RobotDescription) -> Result<UrdfJoint, String> {
     let name = required_attribute(node, "name")?;
     let kind = match required_attribute(node, "type")?.as_str() {
@@ -301,12 +311,13 @@ fn joint(node: &Node, out: &mut RobotDescription) -> Result<UrdfJoint, String> {
             return Err(located_message(
                 node,
                 &format!(
-                    "this joint is {other}; models have revolute, continuous, prismatic, floating and fixed joints: write it \
-                     as several of these"
+                    "the joint type {other} is not supported; write it as several joints of the types revolute, continuous, \
+                     prismatic, floating or fixed"
                 ),
             ));
         }
     };
+    // Missing elements and attributes are not faults; the format gives defaults.
     let (limit, dynamics) = (child(node, "limit"), child(node, "dynamics"));
     let given = |of: Option<Node>, key: &str| match of {
         Some(node) if node.has_attribute(key) => number_attribute(&node, key).map(Some),
@@ -330,7 +341,7 @@ fn joint(node: &Node, out: &mut RobotDescription) -> Result<UrdfJoint, String> {
         let (lower, upper) = (given(limit, "lower")?, given(limit, "upper")?);
         if required_attribute(node, "type")? != "continuous" && (lower.is_some() || upper.is_some())
         {
-            // An absent bound is zero, says the format.
+            // The format defines zero as the default of each bound.
             let range = [lower.unwrap_or(0.0), upper.unwrap_or(0.0)];
             joint.range = (range[0] < range[1]).then_some(range);
         }
@@ -361,7 +372,7 @@ fn joint(node: &Node, out: &mut RobotDescription) -> Result<UrdfJoint, String> {
     })
 }
 
-/// The `<origin>` of an element; without one it is where the element is.
+/// The pose `<origin>` of an element; the identity without one.
 fn origin(of: &Node) -> Result<DescriptionPose, String> {
     let Some(node) = child(of, "origin") else {
         return Ok(DescriptionPose::identity());
@@ -379,12 +390,13 @@ fn origin(of: &Node) -> Result<DescriptionPose, String> {
     ))
 }
 
-/// Puts in what a file of closures says: frames that coincide and joints that are driven.
+/// Adds the contents of a file of closures: frames that coincide and joints that are driven.
 fn add_closures(
     out: &mut RobotDescription,
     joints: &[UrdfJoint],
     file: ClosureFile,
 ) -> Result<(), String> {
+    // The file names links, or joints in the place of their child links.
     let place = |name: &str| -> Result<Option<usize>, String> {
         let joint = joints.iter().find(|joint| joint.name == name);
         let link = joint.map_or(name, |joint| joint.child.as_str());
@@ -413,7 +425,7 @@ fn add_closures(
             .all(|joint| &joint.name != name || joint.joints.is_empty())
         {
             return Err(format!(
-                "the file of closures drives `{name}`, which is no joint that moves"
+                "the file of closures lists the drive `{name}`, which is not a movable joint"
             ));
         }
     }

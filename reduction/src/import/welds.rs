@@ -1,9 +1,10 @@
-//! Loops that hold all of two frames are cut where they are simplest.
+//! Replaces rigid loop closures (welds) by simpler ones. A description with welds goes in; loops cut at undriven joints
+//! come out.
 //!
-//! A weld says six things, and three points that coincide say them in nine equations. Where the loop has a ball joint or a
-//! hinge that nothing drives, it can just as well be cut there: what lies between weld and joint hangs on the other side, the
-//! weld is a fixed place, and what closes the loop is one point, or two on an axis. The angles of that joint are no
-//! coordinates any more.
+//! A weld has six conditions, and three coincident points express them in nine equations. If the loop has an undriven
+//! ball joint or hinge, the loop can be cut there instead: the links between weld and joint are attached to the other
+//! side, the weld becomes a fixed connection, and one point closes the loop, or two points on an axis. The angles of
+//! that joint are then no coordinates.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -13,24 +14,25 @@ use super::description::{
 };
 use super::placed::DescriptionPose;
 
-/// Axes meet where they come this near to each other, m.
+/// Axes closer to each other than this intersect, m.
 const MEETING_DISTANCE: f64 = 1e-9;
-/// Axes whose volume is below this do not turn about all directions.
+/// Three unit axes with a triple product below this are coplanar, so they are no ball joint.
 const COPLANAR_VOLUME: f64 = 1e-6;
 
 /// A joint at which a loop can be cut.
 struct LoopCut {
-    /// From the welded link upwards to the one that hangs on the joint.
+    /// Links whose parent changes: from the welded link up to the child of the joint.
     inverted_links: Vec<usize>,
-    /// Links that weigh nothing between the parts of the joint.
+    /// Massless links between the hinges that form a ball joint.
     massless_links: Vec<usize>,
-    /// The place of the joint in the link that hangs on it, its axis along x.
+    /// Pose of the joint in its child link, with the axis along x.
     at: DescriptionPose,
+    /// The closure that replaces the weld.
     constraint: ClosureConstraint,
 }
 
 impl LoopCut {
-    /// Points before axes, and then as little as can be hung anew.
+    /// Order of preference: one point before an axis, then few inverted links.
     fn rank(&self) -> (bool, usize) {
         (
             self.constraint != ClosureConstraint::Origins,
@@ -39,12 +41,12 @@ impl LoopCut {
     }
 }
 
-/// Cuts welds at joints, where there are such.
+/// Replaces each weld by a cut at a joint of its loop, if there is a suitable one.
 pub(crate) fn cut_at_joints(description: &mut RobotDescription) {
     for k in 0..description.closures.len() {
         let closure = &mut description.closures[k];
         for (link, placed) in &mut closure.ends {
-            // A link that is fixed to its parent is a place in it.
+            // A frame of a link that is fixed to its parent is a frame of the parent.
             while let Some(own) = *link
                 && description.links[own].joints.is_empty()
             {
@@ -69,12 +71,12 @@ pub(crate) fn cut_at_joints(description: &mut RobotDescription) {
     sort_links(description);
 }
 
-/// A link and those that carry it.
+/// A link and its ancestors, from the link upwards.
 fn ancestors(links: &[DescriptionLink], link: Option<usize>) -> Vec<usize> {
     std::iter::successors(link, |link| links[*link].parent).collect()
 }
 
-/// The joints at which what hangs between them and one end of a weld can go to the other end.
+/// The joints between one end of a weld and the common ancestor at which the loop can be cut.
 fn possible_cuts(
     description: &RobotDescription,
     end: Option<usize>,
@@ -90,7 +92,7 @@ fn possible_cuts(
         }
         turned.push(link);
         found.extend(cut_below(description, &turned));
-        // Only what has one axis can be hung the other way round.
+        // Only links with at most one axis can be inverted.
         let joints = &links[link].joints;
         if joints.len() > 1
             || joints.iter().any(|j| {
@@ -106,7 +108,7 @@ fn possible_cuts(
     found
 }
 
-/// The cut between the last of some links and what carries it.
+/// The cut between the last link of `turned` and its parent, if its joints are undriven, uncoupled and without losses.
 fn cut_below(description: &RobotDescription, turned: &[usize]) -> Option<LoopCut> {
     let links = &description.links;
     let may_go = |joint: &DescriptionJoint| {
@@ -121,7 +123,7 @@ fn cut_below(description: &RobotDescription, turned: &[usize]) -> Option<LoopCut
         ];
         !joint.is_driven && !is_coupled && acts.iter().all(|x| x.abs() <= 0.0)
     };
-    // Joints upwards, each with its place in the link that hangs on them while all stand at their zero.
+    // Joints upwards, each with its pose in the last link of `turned` while all joints are at zero.
     let mut found: Vec<(DescriptionJointKind, DescriptionPose)> = Vec::new();
     let mut within = Vec::new();
     let mut seen = DescriptionPose::identity();
@@ -149,6 +151,7 @@ fn cut_below(description: &RobotDescription, turned: &[usize]) -> Option<LoopCut
         }
         let parent = link.parent?;
         let inertial = &links[parent].inertial;
+        // Hinges of one ball joint are separated by links without mass, other children and closures.
         let is_bare = inertial.mass == 0.0
             && inertial.inertia.amax() == 0.0
             && links.iter().filter(|l| l.parent == Some(parent)).count() == 1
@@ -163,7 +166,7 @@ fn cut_below(description: &RobotDescription, turned: &[usize]) -> Option<LoopCut
         here = parent;
         within.push(here);
     }
-    // One hinge by itself, if no ball joint is there.
+    // If there is no ball joint, a single hinge.
     let (kind, at) = found.first()?;
     (*kind == DescriptionJointKind::Revolute && links[own].joints.len() == 1).then(|| LoopCut {
         inverted_links: turned.to_vec(),
@@ -173,7 +176,7 @@ fn cut_below(description: &RobotDescription, turned: &[usize]) -> Option<LoopCut
     })
 }
 
-/// Whether joints are one ball joint together.
+/// Whether joints form a ball joint: one ball, or three hinges with intersecting axes that are not coplanar.
 fn is_ball(found: &[(DescriptionJointKind, DescriptionPose)]) -> bool {
     match found {
         [(DescriptionJointKind::Ball, _)] => true,
@@ -190,7 +193,7 @@ fn is_ball(found: &[(DescriptionJointKind, DescriptionPose)]) -> bool {
     }
 }
 
-/// Axes of which x points along a direction.
+/// A right-handed rotation matrix with x along a direction; none for a zero vector.
 fn axes_along(direction: &Vector3<f64>) -> Option<Matrix3<f64>> {
     let x = direction.try_normalize(0.0)?;
     let mut away = Vector3::zeros();
@@ -199,12 +202,12 @@ fn axes_along(direction: &Vector3<f64>) -> Option<Matrix3<f64>> {
     Some(Matrix3::from_columns(&[x, y, x.cross(&y)]))
 }
 
-/// Hangs what lies between weld and joint on the other end of the weld, and makes the joint the closure.
+/// Attaches the links between weld and joint to the other end of the weld, and makes the joint the closure.
 fn apply_cut(description: &mut RobotDescription, closure: usize, end: usize, cut: &LoopCut) {
     let (other, there) = description.closures[closure].ends[1 - end];
     let (_, here) = description.closures[closure].ends[end];
     let own = cut.inverted_links[cut.inverted_links.len() - 1];
-    // Where the joint is in what carries it.
+    // Pose of the joint in its parent, past the massless links; all its joints are removed.
     let parts: Vec<usize> = [own]
         .into_iter()
         .chain(cut.massless_links.iter().copied())
@@ -225,6 +228,7 @@ fn apply_cut(description: &mut RobotDescription, closure: usize, end: usize, cut
         );
     }
     names.reverse();
+    // Invert the chain: each link gets the inverse pose, and the joint of the link above it with the opposite axis.
     let (mut parent, mut at, mut joints) = (other, there.compose(&here.inverse()), Vec::new());
     for link in &cut.inverted_links {
         let now = &mut description.links[*link];
@@ -251,15 +255,19 @@ fn apply_cut(description: &mut RobotDescription, closure: usize, end: usize, cut
     *holds = cut.constraint;
     *ends = [(carrier, in_carrier), (Some(own), cut.at)];
     let says = format!(
-        "line {line}: the loop is cut at {}, which {} no coordinate of {} own here",
+        "line {line}: the loop is cut at {}, which {} no {} in the model",
         names.join(", "),
         if names.len() == 1 { "has" } else { "have" },
-        if names.len() == 1 { "its" } else { "their" },
+        if names.len() == 1 {
+            "coordinate"
+        } else {
+            "coordinates"
+        },
     );
     description.remarks.push(says);
 }
 
-/// Puts parents before their children again, in the order in which they stood otherwise.
+/// Sorts links so that parents stand before their children, with as few changes of the order as possible.
 fn sort_links(description: &mut RobotDescription) {
     let mut order: Vec<usize> = Vec::new();
     while order.len() < description.links.len() {
