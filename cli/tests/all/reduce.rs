@@ -112,13 +112,13 @@ fn a_urdf_becomes_a_model() {
     let ran = crate::common::ran(&["import", &urdf, "--out", &out]);
     assert_eq!(ran.status, 0, "{}", ran.err);
     assert!(
-        ran.err.contains("1.5708 rad, stays as it is"),
+        ran.err.contains("1.5708 rad, is not rounded to pi/2"),
         "{}",
         ran.err
     );
     let ran = crate::common::ran(&["import", &urdf, "--round-angles", "--out", &out]);
     assert_eq!(ran.status, 0, "{}", ran.err);
-    assert!(ran.err.contains("is taken for pi/2"), "{}", ran.err);
+    assert!(ran.err.contains("is rounded to pi/2"), "{}", ran.err);
     let checked = json(&["check", &out, "--json"]);
     assert_eq!(checked["joints"]["active"][0], "hip");
 

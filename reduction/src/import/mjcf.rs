@@ -1,4 +1,4 @@
-//! Reads MJCF, MuJoCo's format: bodies with joints, default classes, equalities and what acts on joints.
+//! Reads MJCF, the format of MuJoCo: bodies with joints, default classes, equalities, actuators, and forces at joints.
 //!
 //! Source of names and defaults: MuJoCo's XML reference (mujoco.readthedocs.io/en/stable/XMLreference.html).
 
@@ -17,7 +17,7 @@ use super::xml::{
     children, exact_numbers, line, located_message, numbers, required_attribute, symmetric, vector,
 };
 
-/// Sections that say nothing of how a robot moves.
+/// Sections without effect on the dynamics, or read elsewhere; they are skipped without a remark.
 const NO_DYNAMICS: [&str; 12] = [
     "asset",
     "visual",
@@ -33,43 +33,52 @@ const NO_DYNAMICS: [&str; 12] = [
     "option",
 ];
 
-/// What the file says of itself.
+/// Settings of `<compiler>`, with MuJoCo's defaults.
 struct MjcfCompiler {
-    /// Angles are in degrees.
+    /// Whether angles are in degrees.
     is_degree: bool,
-    /// Sequence of turns of Euler angles; capitals turn about fixed axes.
+    /// Sequence of rotations of Euler angles; capitals rotate about fixed axes.
     euler: String,
-    /// Ranges count where `limited` is not said.
+    /// Whether a range is a limit if `limited` is not specified.
     has_auto_limits: bool,
-    /// Inertia comes from shapes: always, never, or where there is no other.
+    /// Whether inertia is computed from shapes: always, never, or (none) if there is no `<inertial>`.
     from_geoms: Option<bool>,
+    /// Lower bound of each mass, kg.
     least_mass: f64,
+    /// Lower bound of each principal moment, kg m^2.
     least_inertia: f64,
-    /// Moments that no body has become their mean.
+    /// Whether impossible principal moments are replaced by their mean.
     balances_inertia: bool,
-    /// Groups of shapes that weigh something.
+    /// First and last group of shapes that have mass.
     groups: [f64; 2],
-    /// What all bodies together weigh, if they are made lighter or heavier for that.
+    /// Total mass to which all bodies are scaled, kg.
     total_mass: Option<f64>,
 }
 
+/// The state of the reader: settings, defaults, and the description so far.
 pub(super) struct MjcfReader<'a, 'i> {
+    /// Settings of the file.
     compiler: MjcfCompiler,
+    /// Default classes.
     defaults: MjcfDefaults<'a, 'i>,
+    /// The description.
     pub(super) out: RobotDescription,
-    /// Places of the bodies at the pose of the file, in the world.
+    /// Poses of the bodies in the world, at the pose of the file.
     pub(super) world: Vec<DescriptionPose>,
+    /// Sites: name, link (none is the world) and pose in it.
     pub(super) sites: Vec<(String, Option<usize>, DescriptionPose)>,
 }
 
-/// Where elements of a body stand.
+/// The surroundings of an element.
 #[derive(Clone, Copy)]
 struct MjcfContext<'a> {
+    /// Index of the body; none is the world.
     link: Option<usize>,
+    /// Default class (`childclass`) of the elements inside.
     class: Option<&'a str>,
 }
 
-/// Reads a description, or says in one line what is wrong and where.
+/// Reads a description; fails with one line that states the fault and its place.
 pub(crate) fn read(document: &Document) -> Result<RobotDescription, String> {
     let root = document.root_element();
     let mut reader = MjcfReader {
@@ -90,13 +99,13 @@ pub(crate) fn read(document: &Document) -> Result<RobotDescription, String> {
         }
         let is_off = |flag: Node| flag.attribute("gravity") == Some("disable");
         if children(&option, "flag").any(is_off) {
-            let says = "its flag switches gravity off; bodies have their weight here";
+            let says = "its flag disables gravity; the model has gravity";
             reader.out.remarks.push(located_message(&option, says));
         }
         for key in ["density", "viscosity"] {
             let text = option.attribute(key);
             if text.is_some_and(|text| text.trim().parse() != Ok(0.0)) {
-                let says = format!("`{key}`: forces of a fluid are left out");
+                let says = format!("`{key}`: fluid forces are left out");
                 reader.out.remarks.push(located_message(&option, &says));
             }
         }
@@ -106,13 +115,13 @@ pub(crate) fn read(document: &Document) -> Result<RobotDescription, String> {
         if tag == "include" {
             return Err(located_message(
                 &node,
-                "included files are read where the description is read from a file",
+                "included files can only be read if the description is given as a file",
             ));
         }
         if ["attach", "replicate", "composite", "flexcomp"].contains(&tag) {
             return Err(located_message(
                 &node,
-                "this is not expanded here; MuJoCo writes one whole file of it (mj_saveLastXML)",
+                "this element is not expanded here; save the complete model with MuJoCo (mj_saveLastXML) and import that file",
             ));
         }
     }
@@ -145,6 +154,7 @@ pub(crate) fn read(document: &Document) -> Result<RobotDescription, String> {
     Ok(reader.out)
 }
 
+/// Reads all `<compiler>` elements; later ones replace earlier settings.
 fn compiler(root: &Node) -> Result<MjcfCompiler, String> {
     let mut out = MjcfCompiler {
         is_degree: true,
@@ -192,7 +202,7 @@ fn compiler(root: &Node) -> Result<MjcfCompiler, String> {
         if node.attribute("coordinate") == Some("global") {
             return Err(located_message(
                 &node,
-                "global coordinates left MuJoCo with version 2.3.3; write the file anew with an older one",
+                "global coordinates were removed from MuJoCo in version 2.3.3; convert the file with an older version",
             ));
         }
         if let Some(balance) = node.attribute("balanceinertia") {
@@ -219,6 +229,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
         }
     }
 
+    /// An attribute of an element, its own or that of its default class.
     pub(super) fn text(
         &self,
         node: &Node<'a, 'i>,
@@ -228,6 +239,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
         self.defaults.attribute(node, class, key)
     }
 
+    /// An attribute of exactly `N` numbers, its own or that of its default class.
     pub(super) fn numbers<const N: usize>(
         &self,
         node: &Node<'a, 'i>,
@@ -238,7 +250,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
         text.map(|text| exact_numbers(node, key, text)).transpose()
     }
 
-    /// The first number of an attribute; further ones are said.
+    /// The first number of an attribute, zero without it. Nonzero further ones are reported.
     fn first(
         &mut self,
         node: &Node<'a, 'i>,
@@ -252,13 +264,13 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
         if all.iter().skip(1).any(|x| *x != 0.0) {
             self.out.remarks.push(located_message(
                 node,
-                &format!("of `{key}` the first number counts; further ones are not read"),
+                &format!("only the first number of `{key}` is read"),
             ));
         }
         Ok(all.first().copied().unwrap_or(0.0))
     }
 
-    /// Position and orientation of an element.
+    /// Position and orientation of an element, from any of the ways in which MJCF specifies an orientation.
     fn read_placement(
         &self,
         node: &Node<'a, 'i>,
@@ -309,6 +321,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
                 out.r = if letter.is_ascii_lowercase() {
                     out.r * turn
                 } else {
+                    // Rotations about fixed axes multiply from the left.
                     turn * out.r
                 };
             }
@@ -316,7 +329,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
         Ok(out)
     }
 
-    /// Reads what stands in a body, in a frame of it at `at`.
+    /// Reads the elements inside a body, which are given in a frame at `place` in the body.
     fn read_children(
         &mut self,
         node: &Node<'a, 'i>,
@@ -338,7 +351,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
                     }
                 }
                 "joint" | "freejoint" if inside.link.is_none() => {
-                    return Err(located_message(&child, "the world has no joint"));
+                    return Err(located_message(&child, "the world cannot have a joint"));
                 }
                 "joint" => self.read_joint(&child, inside, place)?,
                 "freejoint" => self.read_free_joint(&child, inside)?,
@@ -348,6 +361,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
         Ok(())
     }
 
+    /// Reads a body with its joints, its inertia and its child bodies.
     fn read_body(
         &mut self,
         node: &Node<'a, 'i>,
@@ -362,7 +376,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
         if self.out.links.iter().any(|link| link.name == name) {
             return Err(located_message(
                 node,
-                &format!("two bodies are called `{name}`"),
+                &format!("two bodies have the name `{name}`; rename one"),
             ));
         }
         let parent = around
@@ -373,7 +387,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
         if node.attribute("mocap") == Some("true") {
             self.out.remarks.push(located_message(
                 node,
-                "a body that is moved from outside; here it stands still",
+                "this mocap body is moved from outside; it is fixed in the model",
             ));
         }
         if node
@@ -382,7 +396,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
         {
             self.out.remarks.push(located_message(
                 node,
-                "`gravcomp` is no mechanics of the body and is left out: weight counts in full",
+                "`gravcomp` is left out: it is a controller and not a property of the body, so the model has the full weight",
             ));
         }
         self.out.links.push(DescriptionLink {
@@ -399,6 +413,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
         self.read_children(node, inside, DescriptionPose::identity())
     }
 
+    /// Mass and inertia of a body: its `<inertial>`, or its shapes, with the bounds of the file.
     fn inertial(
         &mut self,
         node: &Node<'a, 'i>,
@@ -442,7 +457,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
         Ok(found)
     }
 
-    /// An inertia with the bounds that the file asks for, on principal moments, as MuJoCo takes them.
+    /// An inertia with the bounds of the file, applied to the principal moments as in MuJoCo.
     fn bounded_inertia(&self, inertia: Matrix3<f64>) -> Matrix3<f64> {
         let mut moments = inertia.symmetric_eigen();
         let given = moments.eigenvalues;
@@ -459,7 +474,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
         }
     }
 
-    /// Makes all bodies lighter or heavier by one factor, where the file says what they weigh together.
+    /// Scales all masses and inertias by one factor, if the file specifies the total mass.
     fn scale_to_total(&mut self) {
         let masses = self.out.links.iter().map(|link| link.inertial.mass);
         let (sum, Some(total)) = (masses.sum::<f64>(), self.compiler.total_mass) else {
@@ -474,7 +489,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
         }
     }
 
-    /// Mass and inertia of the shapes of a body, also of those in its frames.
+    /// Mass and inertia of the shapes of a body, including those in its `<frame>` elements.
     fn inertia_from_geoms(
         &mut self,
         node: &Node<'a, 'i>,
@@ -501,6 +516,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
         Ok(geoms::combined_inertia(&shapes))
     }
 
+    /// Mass and inertia of one shape; none if it has no mass or is outside of the groups.
     fn geom_inertia(
         &mut self,
         node: &Node<'a, 'i>,
@@ -520,7 +536,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
         if self.text(node, class, "shellinertia")? == Some("true") {
             return Err(located_message(
                 node,
-                "mass and inertia of a hollow shape are not worked out here: give the body an <inertial>, as MuJoCo writes it \
+                "mass and inertia of a hollow shape are not computed here; give the body an <inertial>, as MuJoCo writes it \
                  (mj_saveLastXML)",
             ));
         }
@@ -534,6 +550,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
             Some(text) => numbers(node, "size", text)?,
             None => Vec::new(),
         };
+        // `fromto` gives both ends of the axis of a shape; its z axis points along it.
         let mut half = None;
         if let Some([a, b, c, d, e, f]) = self.numbers(node, class, "fromto")? {
             let (from, to) = (Vector3::new(a, b, c), Vector3::new(d, e, f));
@@ -551,6 +568,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
         Ok(shape.map(|shape| shape.inertial(mass, density, place.compose(&placed))))
     }
 
+    /// Reads a free joint, which only a body of the world may have.
     fn read_free_joint(
         &mut self,
         node: &Node<'a, 'i>,
@@ -563,7 +581,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
         if self.out.links[link].parent.is_some() {
             return Err(located_message(
                 node,
-                "a free joint belongs to a body of the world",
+                "a free joint is possible for a child of the world only",
             ));
         }
         self.out.links[link].joints.push(DescriptionJoint::new(
@@ -574,6 +592,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
         Ok(())
     }
 
+    /// Reads a joint with its zero, limits and losses. It gets a drive only from an actuator.
     fn read_joint(
         &mut self,
         node: &Node<'a, 'i>,
@@ -591,7 +610,9 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
             other => {
                 return Err(located_message(
                     node,
-                    &format!("no joint is of the type `{other}`"),
+                    &format!(
+                        "there is no joint type `{other}`; expected hinge, slide, ball or free"
+                    ),
                 ));
             }
         };
@@ -640,7 +661,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
             if counts && kind == DescriptionJointKind::Ball {
                 self.out.remarks.push(located_message(
                     node,
-                    "the range of a ball joint is a cone, which models do not have",
+                    "the range of a ball joint is left out: models have no limits of this kind",
                 ));
             } else if counts {
                 joint.range = Some(range.map(|x| in_unit(self, x)));

@@ -1,5 +1,5 @@
-//! What acts on the bodies of MJCF: actuators, the joints of fixed tendons and the straight spatial ones that they pull, and the
-//! pose that its author kept.
+//! Reads the actuators of MJCF: drives of joints, of the joints of fixed tendons, and along straight spatial tendons.
+//! Also reads the keyframe, as the pose from which loops are closed.
 
 use nalgebra::Vector3;
 use roxmltree::Node;
@@ -9,7 +9,8 @@ use super::mjcf::MjcfReader;
 use super::xml::{children, located_message, numbers, required_attribute};
 
 impl<'a, 'i> MjcfReader<'a, 'i> {
-    /// Which joints are driven, and by how much.
+    /// Reads all actuators: marks driven joints, adds straight drives, and reports properties of tendons that are left
+    /// out.
     pub(super) fn read_actuators(&mut self, root: &Node<'a, 'i>) -> Result<(), String> {
         let mut n = 0;
         for node in children(root, "actuator").flat_map(|section| {
@@ -33,7 +34,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
                     .flat_map(|section| section.children().collect::<Vec<_>>())
                     .find(|tendon| tendon.attribute("name") == Some(name))
                     .ok_or_else(|| {
-                        located_message(&node, &format!("no tendon is called `{name}`"))
+                        located_message(&node, &format!("there is no tendon `{name}`"))
                     })?;
                 if tendon.tag_name().name() != "fixed" {
                     self.add_tendon_drive(&node, &tendon, gear)?;
@@ -41,7 +42,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
                 }
                 self.out.remarks.push(located_message(
                     &node,
-                    &format!("it drives the joints of the tendon `{name}` together; here each has a force of its own"),
+                    &format!("it drives the joints of the tendon `{name}` together; in the model each joint has a separate drive"),
                 ));
                 for joint in children(&tendon, "joint") {
                     let gear = gear * super::xml::number_attribute(&joint, "coef")?;
@@ -51,7 +52,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
             } else {
                 self.out.remarks.push(located_message(
                     &node,
-                    "it acts on no joint and no tendon and is left out",
+                    "it acts on neither a joint nor a tendon and is left out",
                 ));
             }
         }
@@ -61,6 +62,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
                 .filter(Node::is_element)
                 .collect::<Vec<_>>()
         }) {
+            // Springs and losses of tendons are not part of the model, except those of straight drives.
             let mut bends = Vec::new();
             let is_drive = (self.out.straight_drives.iter())
                 .any(|line| tendon.attribute("name") == Some(line.tendon.as_str()));
@@ -85,7 +87,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
             if tendon.attribute("range").is_some() {
                 self.out.remarks.push(located_message(
                     &tendon,
-                    "a range of a tendon is no equality and is left out",
+                    "the range of this tendon is left out",
                 ));
             }
         }
@@ -96,12 +98,12 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
             }
             self.out
                 .remarks
-                .push("the file has no actuators; every joint has a drive here".to_owned());
+                .push("the file has no actuators; in the model every joint has a drive".to_owned());
         }
         Ok(())
     }
 
-    /// Makes a drive of an actuator that pulls a spatial tendon, if that is a straight line between two sites.
+    /// Adds a straight drive for an actuator on a spatial tendon, if the tendon is a straight line between two sites.
     fn add_tendon_drive(
         &mut self,
         node: &Node<'a, 'i>,
@@ -115,8 +117,8 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
         ) else {
             self.out.remarks.push(located_message(
                 node,
-                "it pulls a tendon that is no straight line between two sites, which models do not have: joints that it moves \
-                 need drives by hand",
+                "it acts on a tendon that is not a straight line between two sites and is left out; add drives to the joints that \
+                 it moves by hand",
             ));
             return Ok(());
         };
@@ -134,7 +136,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
         {
             self.out.remarks.push(located_message(
                 node,
-                &format!("another actuator pulls the tendon `{line}` too: both are one drive here"),
+                &format!("another actuator also acts on the tendon `{line}`; both are one drive in the model"),
             ));
             return Ok(());
         }
@@ -162,14 +164,14 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
             self.out.remarks.push(located_message(
                 node,
                 &format!(
-                    "its gear is {gear}: the force of the drive here is that along the tendon"
+                    "its gear is {gear}; the force of the drive in the model is the force along the tendon"
                 ),
             ));
         }
         Ok(())
     }
 
-    /// Between which forces an actuator stays, before its gear.
+    /// The force limits of an actuator before its gear, N or N m; none if it has no limits.
     fn force_range(&self, node: &Node<'a, 'i>) -> Result<Option<[f64; 2]>, String> {
         if let Some([low, high]) = self.numbers(node, None, "forcerange")?
             && low < high
@@ -186,7 +188,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
         Ok(None)
     }
 
-    /// Gives a joint its drive.
+    /// Marks a joint as driven by an actuator `node`, with force limits and reflected rotor inertia.
     fn add_joint_drive(
         &mut self,
         node: &Node<'a, 'i>,
@@ -203,7 +205,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
             .iter_mut()
             .flat_map(|link| &mut link.joints)
             .find(|joint| joint.name == name)
-            .ok_or_else(|| located_message(node, &format!("no joint is called `{name}`")))?;
+            .ok_or_else(|| located_message(node, &format!("there is no joint `{name}`")))?;
         joint.is_driven = joint.kind != DescriptionJointKind::Free;
         joint.armature += armature * gear * gear;
         if joint.force.is_none() {
@@ -213,14 +215,14 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
             self.out.remarks.push(located_message(
                 node,
                 &format!(
-                    "its gear is {gear}: the force of the drive here is that at the joint `{name}`"
+                    "its gear is {gear}; the force of the drive in the model is the force at the joint `{name}`"
                 ),
             ));
         }
         Ok(())
     }
 
-    /// The first pose of the file that its author kept, to close loops from.
+    /// Reads the first keyframe with positions, as the pose from which loops are closed.
     pub(super) fn read_keyframe(&mut self, root: &Node<'a, 'i>) -> Result<(), String> {
         let mut keys =
             children(root, "keyframe").flat_map(|section| section.children().collect::<Vec<_>>());
@@ -228,6 +230,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
         else {
             return Ok(());
         };
+        // Positions stand in the order of the joints; a ball joint has four, a free joint seven.
         let mut values = numbers(&key, "qpos", text)?.into_iter();
         for joint in self.out.links.iter().flat_map(|link| &link.joints) {
             let n = match joint.kind {
@@ -244,7 +247,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
     }
 }
 
-/// A range times a factor of either sign.
+/// A range multiplied by a factor of either sign, ordered again.
 fn scale_range([low, high]: [f64; 2], factor: f64) -> [f64; 2] {
     let ends = [low * factor, high * factor];
     [ends[0].min(ends[1]), ends[0].max(ends[1])]

@@ -1,19 +1,24 @@
-//! Classes of default attributes in MJCF: an attribute of an element is its own, or that of its class, or that of the class
-//! around it. Source: MuJoCo's XML reference, "default".
+//! Default classes of MJCF. An attribute of an element is its own, or that of its default class, or that of an
+//! enclosing class. Source: MuJoCo's XML reference, "default".
 
 use roxmltree::Node;
 
 use super::xml::{children, located_message};
 
-/// The classes of a file.
+/// The default classes of a file.
 #[derive(Default)]
 pub(crate) struct MjcfDefaults<'a, 'i> {
+    /// Classes; enclosing ones stand before those inside.
     classes: Vec<MjcfDefaultClass<'a, 'i>>,
 }
 
+/// One default class.
 struct MjcfDefaultClass<'a, 'i> {
+    /// Name; `main` for the outermost class.
     name: String,
+    /// Index of the enclosing class.
     parent: Option<usize>,
+    /// The `<default>` element with the attributes.
     node: Node<'a, 'i>,
 }
 
@@ -27,6 +32,7 @@ impl<'a, 'i> MjcfDefaults<'a, 'i> {
         Ok(out)
     }
 
+    /// Adds a class and those inside it; fails for an inner class without a name.
     fn add_class(&mut self, node: Node<'a, 'i>, parent: Option<usize>) -> Result<(), String> {
         let name = match (node.attribute("class"), parent) {
             (Some(name), _) => name,
@@ -50,9 +56,9 @@ impl<'a, 'i> MjcfDefaults<'a, 'i> {
         Ok(())
     }
 
-    /// The attribute `key` of an element that stands in bodies with the class `around`.
+    /// The attribute `key` of an element, with the default class `around` of the body if the element names none.
     ///
-    /// Fails where a class is named that does not exist.
+    /// Fails if the element names a class that does not exist.
     pub(crate) fn attribute(
         &self,
         node: &Node<'a, 'i>,
@@ -70,7 +76,7 @@ impl<'a, 'i> MjcfDefaults<'a, 'i> {
                     .iter()
                     .position(|class| class.name == name)
                     .ok_or_else(|| {
-                        located_message(node, &format!("no default class is called `{name}`"))
+                        located_message(node, &format!("there is no default class `{name}`"))
                     })?,
             ),
         };
@@ -88,7 +94,7 @@ impl<'a, 'i> MjcfDefaults<'a, 'i> {
     }
 }
 
-/// Elements whose defaults are read.
+/// The tag under which a class has the defaults of an element; empty for elements whose defaults are not read.
 fn default_tag(tag: &str) -> &'static str {
     const TAGS: [&str; 14] = [
         "joint",

@@ -1,4 +1,5 @@
-//! What MJCF ties together: bodies by `connect` and `weld`, joints by `joint` and by fixed tendons of constant length.
+//! Reads the equalities of MJCF: `connect` and `weld` become loop closures; `joint`, and fixed tendons of constant
+//! length, become couplings.
 
 use nalgebra::{Matrix3, Vector3};
 use roxmltree::Node;
@@ -12,6 +13,7 @@ use super::xml::{
 };
 
 impl<'a, 'i> MjcfReader<'a, 'i> {
+    /// The index of a body by name; none is the world.
     fn link(&self, node: &Node, name: &str) -> Result<Option<usize>, String> {
         if name == "world" {
             return Ok(None);
@@ -19,9 +21,10 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
         let found = self.out.links.iter().position(|link| link.name == name);
         found
             .map(Some)
-            .ok_or_else(|| located_message(node, &format!("no body is called `{name}`")))
+            .ok_or_else(|| located_message(node, &format!("there is no body `{name}`")))
     }
 
+    /// Link and pose of a site by name.
     pub(super) fn site(
         &self,
         node: &Node,
@@ -30,9 +33,10 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
         let found = self.sites.iter().find(|(site, _, _)| site == name);
         found
             .map(|(_, link, placed)| (*link, *placed))
-            .ok_or_else(|| located_message(node, &format!("no site is called `{name}`")))
+            .ok_or_else(|| located_message(node, &format!("there is no site `{name}`")))
     }
 
+    /// Reads one equality; inactive ones are left out with a remark.
     pub(super) fn read_equality(&mut self, node: &Node<'a, 'i>) -> Result<(), String> {
         if self.text(node, None, "active")? == Some("false") {
             self.out.remarks.push(located_message(
@@ -75,7 +79,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
                 return Err(located_message(
                     node,
                     &format!(
-                        "models do not have the equality `{other}`; they have connect, weld, joint and tendon"
+                        "the equality `{other}` is not supported; supported are connect, weld, joint and tendon"
                     ),
                 ));
             }
@@ -83,7 +87,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
         Ok(())
     }
 
-    /// The two ends of a closure between bodies: the second follows from the pose of the file.
+    /// The two ends of a closure between bodies; the second end is determined by the pose of the file.
     fn body_ends(
         &self,
         node: &Node<'a, 'i>,
@@ -99,7 +103,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
             None => return Err(located_message(node, "it needs `anchor`")),
         };
         if tag == "weld" {
-            // The anchor is a point of the second body; where it is not given, its origin.
+            // The anchor is a point of the second body, by default its origin.
             let pose: Option<[f64; 7]> = match node.attribute("relpose") {
                 Some(text) => Some(exact_numbers(node, "relpose", text)?),
                 None => None,
@@ -129,6 +133,8 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
         Ok([(one, first), (other, second)])
     }
 
+    /// Reads an equality of two joints, or of one joint that is fixed. `polycoef` refers to deviations from the pose of
+    /// the file.
     fn read_joint_equality(&mut self, node: &Node<'a, 'i>) -> Result<(), String> {
         let joint = required_attribute(node, "joint1")?;
         let of = node.attribute("joint2").map(str::to_owned);
@@ -141,7 +147,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
         if of.is_some() && (2..5).any(|k| coefficient(k) != 0.0) {
             return Err(located_message(
                 node,
-                "a coupling by a polynomial of higher degree; models have constant ratios",
+                "a coupling by a polynomial of higher degree is not supported; models have constant ratios only",
             ));
         }
         let ratio = if of.is_some() { coefficient(1) } else { 0.0 };
@@ -157,16 +163,17 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
         Ok(())
     }
 
-    /// The value of a joint at the pose of the file.
+    /// The value of a joint at the pose of the file, rad or m.
     fn joint_zero(&self, node: &Node, name: &str) -> Result<f64, String> {
         let mut joints = self.out.links.iter().flat_map(|link| &link.joints);
         joints
             .find(|joint| joint.name == name)
             .map(|joint| joint.zero)
-            .ok_or_else(|| located_message(node, &format!("no joint is called `{name}`")))
+            .ok_or_else(|| located_message(node, &format!("there is no joint `{name}`")))
     }
 
-    /// A fixed tendon of constant length, or two that follow each other: a coupling, if two joints are concerned.
+    /// Reads a fixed tendon of constant length, or two tendons that follow each other, as a coupling. At most two
+    /// joints may be involved.
     fn read_tendon_equality(&mut self, node: &Node<'a, 'i>) -> Result<(), String> {
         let given = match self.text(node, None, "polycoef")? {
             Some(text) => numbers(node, "polycoef", text)?,
@@ -178,13 +185,14 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
             if (2..5).any(|k| coefficient(k) != 0.0) {
                 return Err(located_message(
                     node,
-                    "a coupling by a polynomial of higher degree; models have constant ratios",
+                    "a coupling by a polynomial of higher degree is not supported; models have constant ratios only",
                 ));
             }
             for (joint, length) in tendon_joints(node, other)? {
                 terms.push((joint, -coefficient(1) * length));
             }
         }
+        // Add up the lengths per joint; both tendons may contain the same joint.
         let mut sums: Vec<(String, f64)> = Vec::new();
         for (joint, length) in terms {
             match sums.iter_mut().find(|(known, _)| *known == joint) {
@@ -200,7 +208,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
                 return Err(located_message(
                     node,
                     &format!(
-                        "it ties {} joints to each other; models have couplings of two",
+                        "it couples {} joints; models have couplings of two joints only",
                         sums.len()
                     ),
                 ));
@@ -220,17 +228,19 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
     }
 }
 
-/// Joints with the lengths that a turn or a slide of each adds to a fixed tendon.
+/// Joints of a fixed tendon with their coefficients: change of length per rad or per m.
 fn tendon_joints(node: &Node<'_, '_>, name: &str) -> Result<Vec<(String, f64)>, String> {
     let root = node.document().root_element();
     let tendon = children(&root, "tendon")
         .flat_map(|section| section.children().collect::<Vec<_>>())
         .find(|tendon| tendon.attribute("name") == Some(name))
-        .ok_or_else(|| located_message(node, &format!("no tendon is called `{name}`")))?;
+        .ok_or_else(|| located_message(node, &format!("there is no tendon `{name}`")))?;
     if tendon.tag_name().name() != "fixed" {
         return Err(located_message(
             node,
-            &format!("`{name}` runs through space; models keep the length of fixed tendons only"),
+            &format!(
+                "`{name}` is a spatial tendon; a constant length is supported for fixed tendons only"
+            ),
         ));
     }
     let joints = children(&tendon, "joint");

@@ -1,19 +1,20 @@
-//! Puts the files that an MJCF includes in the place of its `<include>`.
+//! Expands the `<include>` elements of an MJCF: its text goes in, the text with the contents of all included files
+//! comes out.
 //!
-//! Source: MuJoCo's XML reference, "include": the children of the other file's root, each file once, with names relative to
-//! the folder of the main file.
+//! Source: MuJoCo's XML reference, "include": the children of the other file's root, each file once, with names
+//! relative to the folder of the main file.
 
 use roxmltree::Document;
 
 use super::xml::{located_message, required_attribute};
 
-/// Files that include each other are followed this far.
+/// Largest depth of nested includes.
 const DEEPEST: usize = 20;
 
-/// The text of an MJCF with all files that it includes, each as one line, so that lines of messages are those of the file
-/// itself. `read` gives the text of a file by its name.
+/// The text of an MJCF with all included files, each on one line, so that line numbers in messages are those of the
+/// file itself. `read` gives the text of a file by its name.
 ///
-/// Text that is no XML, or no MJCF, stays as it is: reading it says what is wrong.
+/// Text that is not XML or not MJCF is returned unchanged; the import reports its fault.
 pub fn expand_includes(
     text: &str,
     read: &dyn Fn(&str) -> Result<String, String>,
@@ -21,6 +22,7 @@ pub fn expand_includes(
     expand_file(text, read, &mut Vec::new(), 0)
 }
 
+/// Expands one file. `seen` are the names of the files included so far, `depth` is the level of nesting.
 fn expand_file(
     text: &str,
     read: &dyn Fn(&str) -> Result<String, String>,
@@ -44,7 +46,7 @@ fn expand_file(
         if depth == DEEPEST || seen.contains(&name) {
             return Err(located_message(
                 &node,
-                &format!("`{name}` is included twice; MuJoCo takes a file once"),
+                &format!("`{name}` is included twice; MuJoCo permits each file once"),
             ));
         }
         seen.push(name.clone());
@@ -52,10 +54,7 @@ fn expand_file(
         let whole = expand_file(&other, read, seen, depth + 1)
             .map_err(|fault| located_message(&node, &format!("in `{name}`: {fault}")))?;
         let inner = Document::parse(&whole).map_err(|fault| {
-            located_message(
-                &node,
-                &format!("`{name}` is no XML that can be read ({fault})"),
-            )
+            located_message(&node, &format!("`{name}` is not readable XML ({fault})"))
         })?;
         let children = inner.root_element().children();
         let range = node.range();

@@ -1,7 +1,7 @@
-//! A description as the text of a model file.
+//! Writes the model file of a robot description: a description with cut loops goes in, the text with remarks comes out.
 //!
-//! Every movable joint becomes a frame; links behind fixed joints become part of the link that carries them; each body gets
-//! the ten linear parameters about its frame.
+//! Every movable joint becomes a frame. Links with fixed joints are merged into the link that carries them. Each body
+//! gets the ten linear parameters about its frame.
 
 mod lines;
 
@@ -23,84 +23,114 @@ use super::{DescriptionImport, ImportedJoint, Options};
 use crate::write::{significant_digits, toml_float, toml_string};
 use lines::{NamedDriveLine, relative_variables};
 
-/// Angles this near to a multiple of a twelfth of pi are taken for it where the option asks for it, rad.
+/// Distance from a multiple of pi/12 up to which an angle is rounded to it, if the option `round_angles` is set, rad.
 const SAME_ANGLE: f64 = 1e-4;
-/// Deviations below this are rounding: a right angle is often written with eleven digits behind the point, and forces that
-/// differ by that share of theirs are the same. Kept, such deviations would make base parameters of nothing but rounding.
+/// Differences from a multiple of pi/12 below this are always rounded, rad. A right angle is often written with eleven
+/// decimals, and the relative effect on forces is not larger than this. If kept, such a difference would add base
+/// parameters that are rounding only.
 const ROUNDING: f64 = 2e-11;
-/// Points by which closures hold orientations stand this far from their origins, m.
+/// Distance from the origin of the additional points by which closures fix orientations, m.
 const ORIENTATION_ARM: f64 = 0.1;
 
-/// A body of the model.
+/// A body of the model: all links that move with one frame.
 struct ImportBody {
+    /// Index of the frame.
     frame: usize,
+    /// Mass, kg.
     mass: f64,
+    /// First moment about the frame's origin, kg m.
     moment: Vector3<f64>,
-    /// About the frame's origin.
+    /// About the frame's origin, in its axes, kg m^2.
     inertia: Matrix3<f64>,
 }
 
 /// A coordinate of the model.
 struct ImportCoordinate {
+    /// Name in the model file.
     name: String,
-    /// None for those of a free body.
+    /// Index of its variable; none for the coordinates of a free body.
     variable: Option<usize>,
+    /// Nominal value, rad or m.
     nominal: f64,
+    /// Whether the description drives it.
     is_driven: bool,
-    /// Whether the format wants to know that nothing drives it.
+    /// Whether it belongs to a free body, so that `driven = false` is not written.
     is_free: bool,
-    /// Whether a line moves it, as far as the count of drives goes.
+    /// Whether a straight drive is counted as its drive.
     is_pulled: bool,
 }
 
-/// What acts at a variable, added up over the joints that it moves.
+/// Forces and limits at a variable, added up over the joints that it moves.
 #[derive(Default, Clone)]
 struct VariableForces {
+    /// Viscous friction, N m s/rad or N s/m.
     damping: f64,
+    /// Coulomb friction, N m or N.
     friction: f64,
+    /// Reflected rotor inertia, kg m^2 or kg.
     armature: f64,
+    /// Stiffness of springs, N m/rad or N/m.
     stiffness: f64,
-    /// Stiffness times the place of rest.
+    /// Sum of stiffness times relaxed position, N m or N.
     pull: f64,
+    /// Limits of the position: the intersection over all joints, rad or m.
     range: Option<[f64; 2]>,
+    /// Largest rate, rad/s or m/s.
     rate: Option<f64>,
+    /// Limits of the drive's force, N m or N.
     force: Option<[f64; 2]>,
 }
 
+/// The model file as it is built: sections of text, the numeric kinematics, and names.
 struct ModelTextBuilder<'a> {
+    /// Options of the import.
     options: &'a Options<'a>,
+    /// Joints as functions of variables.
     couplings: ImportCouplings,
-    /// Names that are taken.
+    /// Names that are used already.
     names: Vec<String>,
+    /// Remarks so far.
     remarks: Vec<Message>,
+    /// Lines of `[constants]`.
     constants: String,
-    /// Constants that are angles, with their values.
+    /// Constants that are angles, with their values in rad.
     angles: Vec<(String, f64)>,
-    /// Coordinates that follow others.
+    /// Lines of `[coordinates]` for coordinates that follow others.
     followers: String,
+    /// Tables `[[frame]]`.
     frames: String,
+    /// Names of the frames, by index.
     frame_names: Vec<String>,
+    /// Numeric kinematics of the same frames.
     chain: FrameChain,
-    /// Frame that carries each link, and where the link is in it.
+    /// For each link, the frame that carries it and its pose in that frame.
     links: Vec<(Option<usize>, DescriptionPose)>,
+    /// The coordinates, in the order of the file.
     coordinates: Vec<ImportCoordinate>,
     /// Index into `coordinates` of each variable.
     of_variable: Vec<Option<usize>>,
+    /// Forces and limits at each variable.
     acts: Vec<VariableForces>,
-    /// Rank of each variable when independent ones are chosen; low ones stay independent.
+    /// Reluctance of each variable to be independent; variables with low values stay independent.
     reluctance: Vec<u8>,
+    /// Values of the variables from which loops are closed, rad or m.
     start: Vec<f64>,
+    /// Bodies with mass.
     bodies: Vec<ImportBody>,
+    /// Joints with their coordinates, for the caller.
     joints: Vec<ImportedJoint>,
-    /// Whether there are more drives than freedoms: such have no effects of their own.
+    /// Whether there are more drives than degrees of freedom; then drives cannot have effects.
     has_surplus: bool,
 }
 
-/// Makes the model file of a description.
+/// Writes the model file of a description.
+///
+/// Fails if nothing moves, a mass is negative, or the loops do not close.
 pub(crate) fn model_text(
     mut description: RobotDescription,
     options: &Options,
 ) -> Result<DescriptionImport, String> {
+    // Joints first become variables, so that links can be written in one pass.
     let couplings = couplings::resolve(&mut description)?;
     let n = couplings.variables.len();
     let mut build = ModelTextBuilder {
@@ -134,9 +164,9 @@ pub(crate) fn model_text(
         build.link(&description, index)?;
     }
     if build.coordinates.is_empty() {
-        return Err("this robot has no joint that moves".to_owned());
+        return Err("this robot has no joint that moves; a model needs at least one".to_owned());
     }
-    // What a line pulls had better be independent.
+    // Variables that a straight drive moves should stay independent.
     for line in &description.straight_drives {
         for variable in relative_variables(&build.chain, build.frames_of(line)) {
             build.reluctance[variable] = build.reluctance[variable].min(1);
@@ -148,7 +178,7 @@ pub(crate) fn model_text(
 }
 
 impl ModelTextBuilder<'_> {
-    /// Adds the frames of a link's joints and what it weighs.
+    /// Adds the frames of a link's joints, and its mass and inertia.
     fn link(&mut self, description: &RobotDescription, index: usize) -> Result<(), String> {
         let link = &description.links[index];
         let (mut frame, carried) = link
@@ -159,6 +189,7 @@ impl ModelTextBuilder<'_> {
         let mut here = carried.compose(&link.at);
         let n = link.joints.len();
         for (k, joint) in link.joints.iter().enumerate() {
+            // The last frame of a link has the link's name, the ones before also that of their joint.
             let name = if k + 1 == n {
                 link.name.clone()
             } else {
@@ -177,7 +208,7 @@ impl ModelTextBuilder<'_> {
         self.add_inertia(link, frame, &here)
     }
 
-    /// The frame of a joint that turns or slides; also where the link is in it.
+    /// Adds the frame of a revolute or prismatic joint. Returns the frame and the pose of the link in it.
     #[allow(clippy::too_many_lines, reason = "one frame, piece by piece")]
     fn add_scalar_joint(
         &mut self,
@@ -199,12 +230,12 @@ impl ModelTextBuilder<'_> {
         };
         let follows = self.couplings.find_follower(&joint.name).ok_or_else(|| {
             format!(
-                "line {}: two joints are called `{}`",
+                "line {}: two joints have the name `{}`; rename one",
                 joint.line, joint.name
             )
         })?;
         let is_turn = joint.kind == DescriptionJointKind::Revolute;
-        // Ratio, number of the variable and its name.
+        // Ratio and name of the coordinate; none if a coupling fixes the joint.
         let moved = follows.variable.map(|variable| {
             let coordinate = self.variable(variable);
             self.add_joint_forces(description, joint, variable, follows.ratio, follows.offset);
@@ -224,7 +255,7 @@ impl ModelTextBuilder<'_> {
             (None, Some((-1.0, name))) => format!("-{name}"),
             (None, Some((ratio, name))) => format!("{}*{name}", plain_number(*ratio)),
         };
-        // What follows has its offset in its own coordinate.
+        // A follower with its own coordinate has the offset in that coordinate.
         let left = if follower.is_some() {
             -joint.zero
         } else {
@@ -242,7 +273,7 @@ impl ModelTextBuilder<'_> {
             format!("{kind} = \"{text}\"{axis_text}")
         } else {
             self.remarks.push(message!(
-                "line {}: `{}` is held at {} by a coupling",
+                "line {}: a coupling fixes `{}` at {}",
                 joint.line,
                 joint.name,
                 follows.offset
@@ -262,7 +293,7 @@ impl ModelTextBuilder<'_> {
             r: turned.transpose(),
         };
         if moved.is_none() {
-            // A joint that is held is a fixed place.
+            // A fixed joint becomes a frame with a constant transform.
             let held = DescriptionPose {
                 p: if is_turn {
                     Vector3::zeros()
@@ -297,7 +328,7 @@ impl ModelTextBuilder<'_> {
         Ok((Some(frame), back))
     }
 
-    /// A fixed part of a joint's angle or length.
+    /// The expression of a constant part of a joint's coordinate, rad or m.
     fn offset(&mut self, name: &str, value: f64, joint: &DescriptionJoint) -> String {
         let text = if joint.kind == DescriptionJointKind::Revolute {
             self.angle(name, value, &joint.name)
@@ -307,7 +338,8 @@ impl ModelTextBuilder<'_> {
         text.trim_matches('"').to_owned()
     }
 
-    /// The coordinate of a joint that follows another coordinate.
+    /// Adds a coordinate that follows another one, and returns its name. If one is an angle and the other a length, the
+    /// ratio is a constant with a unit.
     fn follower(
         &mut self,
         joint: &DescriptionJoint,
@@ -338,7 +370,7 @@ impl ModelTextBuilder<'_> {
         own
     }
 
-    /// The coordinate of a variable, made when it is first met.
+    /// The name of the coordinate of a variable; adds the coordinate at the first call.
     fn variable(&mut self, variable: usize) -> String {
         if let Some(k) = self.of_variable[variable] {
             return self.coordinates[k].name.clone();
@@ -357,7 +389,7 @@ impl ModelTextBuilder<'_> {
         name
     }
 
-    /// Adds up what acts at a joint.
+    /// Adds forces and limits of a joint to those of its variable, for a joint `ratio*variable + offset`.
     fn add_joint_forces(
         &mut self,
         description: &RobotDescription,
@@ -367,12 +399,14 @@ impl ModelTextBuilder<'_> {
         offset: f64,
     ) {
         let acts = &mut self.acts[variable];
+        // Power is preserved: coefficients of quadratic terms scale with the square of the ratio.
         acts.damping += ratio * ratio * joint.damping;
         acts.friction += ratio.abs() * joint.friction;
         acts.armature += ratio * ratio * joint.armature;
         let stiffness = ratio * ratio * joint.stiffness;
         acts.stiffness += stiffness;
         acts.pull += stiffness * (joint.rest - offset) / ratio;
+        // A spring acts on a coordinate, which should then be independent.
         if stiffness != 0.0 && self.reluctance[variable] == 2 {
             self.reluctance[variable] = 1;
         }
@@ -388,6 +422,7 @@ impl ModelTextBuilder<'_> {
             let rate = rate / ratio.abs();
             acts.rate = Some(acts.rate.map_or(rate, |old| old.min(rate)));
         }
+        // Force limits and the starting value are those of the joint that gives the variable its name.
         let is_leader = self.couplings.variables[variable].joint == joint.name;
         if is_leader {
             acts.force = joint.force.map(|force| force.map(|force| force * ratio));
@@ -403,7 +438,8 @@ impl ModelTextBuilder<'_> {
         }
     }
 
-    /// A ball joint as three angles, the last about the axis along which the link is longest.
+    /// Adds a ball joint with three angles. The last one is about the axis along which the loop closure `tip` is
+    /// farthest, so that the closure hardly depends on it. Returns the frame and the pose of the link in it.
     fn add_ball_joint(
         &mut self,
         joint: &DescriptionJoint,
@@ -450,8 +486,8 @@ impl ModelTextBuilder<'_> {
             });
         }
         self.remarks.push(message!(
-            "line {}: the ball joint `{}` has three angles here, about {axes} one after the other, which are singular where \
-             the second is a right angle",
+            "line {}: the ball joint `{}` has three angles in the model, in the sequence {axes}; they are singular if the second \
+             is a right angle",
             joint.line, joint.name
         ));
         if joint.damping != 0.0
@@ -481,7 +517,7 @@ impl ModelTextBuilder<'_> {
         (Some(frame), back)
     }
 
-    /// A body that hangs on nothing.
+    /// Adds a free body with position and quaternion. Returns the frame and the pose of the link in it.
     fn add_free_joint(
         &mut self,
         joint: &DescriptionJoint,
@@ -528,7 +564,7 @@ impl ModelTextBuilder<'_> {
         (Some(frame), DescriptionPose::identity())
     }
 
-    /// `transform` of a frame; empty where it is where its parent is.
+    /// The contents of `transform` of a frame; empty if it coincides with its parent.
     fn transform_text(&mut self, joint: &str, at: &DescriptionPose) -> String {
         let mut parts = Vec::new();
         let xyz: Vec<String> = ["x", "y", "z"]
@@ -549,6 +585,7 @@ impl ModelTextBuilder<'_> {
         parts.join(", ")
     }
 
+    /// Writes a frame and adds it to the numeric kinematics. Returns its index.
     fn frame(
         &mut self,
         name: String,
@@ -574,7 +611,7 @@ impl ModelTextBuilder<'_> {
         self.chain.nodes.len() - 1
     }
 
-    /// Puts a link into the body that carries it.
+    /// Adds mass and inertia of a link to the body of its frame.
     fn add_inertia(
         &mut self,
         link: &DescriptionLink,
@@ -585,18 +622,19 @@ impl ModelTextBuilder<'_> {
         let placed = at.compose(&link.inertial.at);
         if mass < 0.0 {
             return Err(format!(
-                "the mass of the link `{name}` is no number that a body can have"
+                "the mass of the link `{name}` is negative; correct it in the description"
             ));
         }
         if mass == 0.0 && matrix.amax() == 0.0 {
             return Ok(());
         }
+        // Principal moments of a body are positive and satisfy the triangle inequality.
         let moments = matrix.symmetric_eigenvalues();
         if moments.min() < -1e-15 * moments.amax()
             || 2.0 * moments.amax() > moments.sum() * (1.0 + 1e-6)
         {
             self.remarks.push(message!(
-                "no body has the inertia of `{name}`: its principal moments are {}, {} and {} kg m^2",
+                "the inertia of `{name}` is impossible for a body: its principal moments are {}, {} and {} kg m^2",
                 significant_digits(moments[0], 4),
                 significant_digits(moments[1], 4),
                 significant_digits(moments[2], 4)
@@ -604,11 +642,12 @@ impl ModelTextBuilder<'_> {
         }
         let Some(frame) = frame else {
             self.remarks.push(message!(
-                "`{name}` stands still; its {} kg have no effect and are left out",
+                "`{name}` does not move; its {} kg have no effect and are left out",
                 significant_digits(mass, 4)
             ));
             return Ok(());
         };
+        // Rotate into the axes of the frame and shift to its origin (Steiner).
         let c = placed.p;
         let inertia = placed.r * matrix * placed.r.transpose()
             + mass * (Matrix3::identity() * c.norm_squared() - c * c.transpose());
@@ -628,13 +667,13 @@ impl ModelTextBuilder<'_> {
         Ok(())
     }
 
-    /// Closes the loops; none where there are none.
+    /// Closes the loops and sets the nominal values; none without loops.
     fn close(&mut self, description: &RobotDescription) -> Result<Option<LoopSolution>, String> {
         for coordinate in &mut self.coordinates {
             let Some(variable) = coordinate.variable else {
                 continue;
             };
-            // Without loops the middle of the range, where zero is outside.
+            // Without loops the nominal value is zero, or the middle of the range if zero is outside.
             coordinate.nominal = match self.acts[variable].range {
                 Some([low, high]) if low < high && !(low..=high).contains(&0.0) => {
                     0.5 * (low + high)
@@ -644,6 +683,7 @@ impl ModelTextBuilder<'_> {
         }
         let mut pairs = Vec::new();
         for (k, closure) in description.closures.iter().enumerate() {
+            // Equal axes and orientations are expressed by additional points that coincide.
             let offsets: &[[f64; 3]] = match closure.constraint {
                 ClosureConstraint::Origins => &[[0.0; 3]],
                 ClosureConstraint::Axes => &[[0.0; 3], [ORIENTATION_ARM, 0.0, 0.0]],
@@ -691,36 +731,36 @@ impl ModelTextBuilder<'_> {
             } else {
                 self.acts[variable].range = None;
                 self.remarks.push(message!(
-                    "no pose was found at which the loops close within all limits: the range of `{}`, {low} to {high}, is left out",
+                    "no pose was found with closed loops within all limits; the range of `{}`, {low} to {high}, is left out",
                     coordinate.name
                 ));
             }
         }
         if closed.is_moved {
             self.remarks.push(
-                "at the pose of the description the loops are open or singular; nominal values are those of another pose"
+                "at the pose of the description the loops are open or singular; another pose is used for the nominal values"
                     .into(),
             );
         }
         let [conditions, independent] = closed.conditions;
         if conditions > independent {
             self.remarks.push(message!(
-                "of {conditions} conditions of its loops {independent} are independent at the poses that were tried; where the others \
-                 are not recognised as following from these, a model keeps too many base parameters or counts poses as singular: \
-                 hold some forces against another program before you rely on it"
+                "of {conditions} conditions of its loops {independent} are independent at the tested poses. If the model does not \
+                 recognise the others as redundant, it has too many base parameters or treats poses as singular. Compare some forces \
+                 with another program before you rely on it"
             ));
         }
         if let Some(gap) = closed.gap {
             self.remarks.push(message!(
-                "the digits of the description close its loops to {} of their size only; points were moved by that to meet at the \
-                 nominal pose",
+                "with the digits of the description the loops close only to {} of their size; points were moved by this gap, so that \
+                 they coincide at the nominal pose",
                 significant_digits(gap, 2)
             ));
         }
         Ok(Some(closed))
     }
 
-    /// Fails where a loop would act between a free body and something else.
+    /// Fails if a closure connects a free body to the world or to another body.
     fn check_free_ends(
         &self,
         closure: &DescriptionClosure,
@@ -743,13 +783,13 @@ impl ModelTextBuilder<'_> {
             return Ok(());
         }
         Err(format!(
-            "line {}: the closure `{}` holds a free body to the world or to another body; models close loops within one \
+            "line {}: the closure `{}` connects a free body to the world or to another body; models support loops within one \
              free body only",
             closure.line, closure.name
         ))
     }
 
-    /// A name that the format takes and nothing else has.
+    /// A valid and unique name: invalid characters become `_`, and a number is added to a name that is used already.
     fn unique_name(&mut self, wanted: &str) -> String {
         let mut name: String = wanted
             .chars()
@@ -769,7 +809,7 @@ impl ModelTextBuilder<'_> {
         name
     }
 
-    /// A length as a constant of its own.
+    /// A length in m as a new constant, in quotes; `0` below rounding.
     fn length(&mut self, name: &str, value: f64) -> String {
         if value.abs() < 1e-12 {
             return "0".to_owned();
@@ -783,7 +823,7 @@ impl ModelTextBuilder<'_> {
         format!("\"{name}\"")
     }
 
-    /// A fixed angle: a multiple of a twelfth of pi, or a constant of its own.
+    /// A constant angle in rad, in quotes: a multiple of pi/12, the sum of one and a known constant, or a new constant.
     fn angle(&mut self, name: &str, value: f64, joint: &str) -> String {
         let twelfth = std::f64::consts::PI / 12.0;
         let n = (value / twelfth).round();
@@ -797,13 +837,13 @@ impl ModelTextBuilder<'_> {
             let short = significant_digits(deviation, 2);
             self.remarks.push(if self.options.round_angles {
                 message!(
-                    "an angle of `{joint}`, {value} rad, is taken for {}; it differs by {short} rad",
+                    "an angle of `{joint}`, {value} rad, is rounded to {} (difference {short} rad)",
                     twelfths_of_pi(n)
                 )
             } else {
                 message!(
-                    "an angle of `{joint}`, {value} rad, stays as it is; {}, from which it differs by {short} rad, makes shorter \
-                     equations: {} takes it for that",
+                    "an angle of `{joint}`, {value} rad, is not rounded to {} (difference {short} rad); rounding gives shorter \
+                     equations: use {}",
                     twelfths_of_pi(n),
                     Remedy::option(OptionName::RoundAngles)
                 )
@@ -817,7 +857,8 @@ impl ModelTextBuilder<'_> {
                 format!("\"{text}\"")
             };
         }
-        // Angles that differ by known ones, such as those of fingers that face each other, are so in symbols too.
+        // An angle that differs from a known one by a multiple of pi/12, as in fingers that face each other, is written
+        // as this sum.
         for (known, of) in &self.angles {
             for (sign, minus) in [(1.0, ""), (-1.0, "-")] {
                 let rest = value - sign * of;
@@ -842,6 +883,7 @@ impl ModelTextBuilder<'_> {
         format!("\"{name}\"")
     }
 
+    /// Joins all sections to the text of the model file.
     fn finish(
         mut self,
         description: &RobotDescription,
@@ -851,7 +893,7 @@ impl ModelTextBuilder<'_> {
         let robot = &description.name;
         let gravity = description.gravity.unwrap_or(Vector3::new(0.0, 0.0, -9.81));
         let mut text = format!(
-            "# Made from {} by modelmill import: a starting point, to be read and mended.\nschema = 1\nname = \"{}\"\n\
+            "# Made from {} by modelmill import: a starting point; check and correct it.\nschema = 1\nname = \"{}\"\n\
              title = {}\n",
             match description.format {
                 "URDF" => "a URDF".to_owned(),
@@ -863,12 +905,11 @@ impl ModelTextBuilder<'_> {
         let note = if description.gravity.is_some() {
             "acceleration of gravity"
         } else {
-            "acceleration of gravity; the description does not say it"
+            "acceleration of gravity; the description does not specify it"
         };
         let along_z = gravity.x == 0.0 && gravity.y == 0.0;
         if gravity.norm() == 0.0 {
-            self.remarks
-                .push("the description says that there is no gravity".into());
+            self.remarks.push("the description has no gravity".into());
             text.push_str("gravity = [0, 0, 0]\n\n[constants]\n");
         } else if along_z && gravity.z < 0.0 {
             let _ = write!(
@@ -916,6 +957,7 @@ impl ModelTextBuilder<'_> {
         }
     }
 
+    /// Writes the points and loops of the independent closures.
     fn loops(
         &mut self,
         description: &RobotDescription,
@@ -959,6 +1001,7 @@ impl ModelTextBuilder<'_> {
         text.push_str(&loops);
     }
 
+    /// Writes the bodies with their ten linear parameters.
     fn parts(&self, text: &mut String) {
         for (k, body) in self.bodies.iter().enumerate() {
             let frame = &self.frame_names[body.frame];
@@ -993,7 +1036,7 @@ impl ModelTextBuilder<'_> {
         }
     }
 
-    /// Drives, what acts at coordinates, and limits.
+    /// Writes drives, effects at coordinates, and limits.
     fn forces(
         &mut self,
         is_passive: &dyn Fn(&ImportCoordinate) -> bool,
@@ -1019,10 +1062,11 @@ impl ModelTextBuilder<'_> {
                 );
             } else if coordinate.is_driven {
                 self.remarks.push(message!(
-                    "`{}` is settled by loops and couplings; it has no drive of its own here",
+                    "`{}` is determined by loops and couplings; it has no separate drive in the model",
                     coordinate.name
                 ));
             }
+            // With surplus drives, effects act at coordinates and not at drives.
             let effects_at = if self.has_surplus {
                 coordinate.name.clone()
             } else {
@@ -1084,7 +1128,8 @@ impl ModelTextBuilder<'_> {
     }
 }
 
-/// Where a link, or one that is fixed to it, is closed to others, in the frame of the link.
+/// The point of a loop closure on a link or on one that is fixed to it, in the frame of the link; none if there is
+/// none.
 fn closure_point(description: &RobotDescription, index: usize) -> Option<Vector3<f64>> {
     let closures = description.closures.iter();
     let mut ends = closures.flat_map(|closure| &closure.ends);
@@ -1107,12 +1152,12 @@ fn closure_point(description: &RobotDescription, index: usize) -> Option<Vector3
     })
 }
 
-/// Fifteen significant digits: what follows is rounding of sums.
+/// A value rounded to fifteen significant digits; further digits are rounding errors of sums.
 fn round_to_15_digits(value: f64) -> f64 {
     format!("{value:.14e}").parse().unwrap_or(value)
 }
 
-/// A coordinate's expression with its fixed part behind it.
+/// The expression of a coordinate plus its constant part.
 fn with_offset(text: String, offset: &str) -> String {
     match (text.is_empty(), offset) {
         (true, _) => offset.to_owned(),
@@ -1122,7 +1167,7 @@ fn with_offset(text: String, offset: &str) -> String {
     }
 }
 
-/// A ratio without a point where it is whole.
+/// A ratio, without a decimal point if it is an integer.
 fn plain_number(ratio: f64) -> String {
     if ratio.fract() == 0.0 {
         format!("{ratio}")
@@ -1131,7 +1176,7 @@ fn plain_number(ratio: f64) -> String {
     }
 }
 
-/// The name of a model: an identifier in small letters.
+/// The name of a model: an identifier in lower-case letters.
 fn module_name(robot: &str) -> String {
     let mut name: String = robot
         .chars()

@@ -1,4 +1,4 @@
-//! Reads SDF: links and joints with poses that refer to each other, as a tree with closures.
+//! Reads SDF: links and joints with poses relative to each other become a tree of links with loop closures.
 //!
 //! Source of names, defaults and frames: the specification (sdformat.org/spec) and its tutorial "Pose Frame Semantics".
 
@@ -15,34 +15,43 @@ use super::xml::{
     symmetric, vector,
 };
 
-/// Values beyond this stand for "no limit".
+/// Values beyond this mean "no limit".
 const NO_LIMIT: f64 = 1e15;
-/// Poses that refer to each other are followed this far.
+/// Largest number of poses that refer to each other in sequence; more is a cycle.
 const LONGEST_CHAIN: usize = 1000;
 
 /// A frame that poses may refer to.
 struct SdfFrame<'a, 'i> {
+    /// Name of the link, joint or frame.
     name: String,
+    /// Its element.
     node: Node<'a, 'i>,
-    /// What the pose is relative to unless the file says otherwise.
+    /// Name of the frame to which the pose is relative by default.
     usually: String,
 }
 
 /// A joint between two links.
 struct SdfJoint {
+    /// Index of the parent link; none is the world.
     parent: Option<usize>,
+    /// Index of the child link; none is the world.
     child: Option<usize>,
+    /// Joints in sequence; empty for a fixed joint.
     joints: Vec<DescriptionJoint>,
-    /// Of the joint, in the model.
+    /// Pose of the joint in the model.
     place: DescriptionPose,
+    /// Name of the joint.
     name: String,
+    /// Line in the file.
     line: u32,
+    /// Type in the file, such as `revolute`.
     kind: String,
 }
 
-/// Reads a description, or says in one line what is wrong and where.
+/// Reads a description; fails with one line that states the fault and its place.
 pub(crate) fn read(document: &Document) -> Result<RobotDescription, String> {
     let root = document.root_element();
+    // The version decides in which axes joint axes are given.
     let version: f64 = root
         .attribute("version")
         .and_then(|text| text.trim().parse().ok())
@@ -56,7 +65,7 @@ pub(crate) fn read(document: &Document) -> Result<RobotDescription, String> {
     if let Some(other) = models.next() {
         return Err(located_message(
             &other,
-            "a second model in one file; keep the one that is wanted",
+            "the file has a second model; keep only the one to import",
         ));
     }
     let mut out = RobotDescription {
@@ -77,11 +86,14 @@ pub(crate) fn read(document: &Document) -> Result<RobotDescription, String> {
     {
         return Err(located_message(
             &inner,
-            "models inside of models are not expanded here; `gz sdf -p` prints one flat model",
+            "nested models are not expanded here; `gz sdf -p` prints one flat model",
         ));
     }
     if text_of(&model, "static").is_some_and(|text| ["true", "1"].contains(&text)) {
-        return Err(located_message(&model, "it is static: nothing moves"));
+        return Err(located_message(
+            &model,
+            "the model is static, so nothing moves",
+        ));
     }
     let frames = model_frames(&model)?;
     let links: Vec<Node> = children(&model, "link").collect();
@@ -114,10 +126,12 @@ pub(crate) fn read(document: &Document) -> Result<RobotDescription, String> {
     Ok(out)
 }
 
+/// The trimmed text of a child element.
 fn text_of<'a>(node: &Node<'a, '_>, tag: &str) -> Option<&'a str> {
     child(node, tag).and_then(|node| node.text()).map(str::trim)
 }
 
+/// The number in a child element; none without that element.
 fn number_of(node: &Node, tag: &str) -> Result<Option<f64>, String> {
     let Some(inner) = child(node, tag) else {
         return Ok(None);
@@ -125,7 +139,7 @@ fn number_of(node: &Node, tag: &str) -> Result<Option<f64>, String> {
     exact_numbers(&inner, tag, inner.text().unwrap_or("")).map(|[x]| Some(x))
 }
 
-/// All frames of a model by name.
+/// All frames of a model: links, joints and explicit frames.
 fn model_frames<'a, 'i>(model: &Node<'a, 'i>) -> Result<Vec<SdfFrame<'a, 'i>>, String> {
     let mut out: Vec<SdfFrame> = Vec::new();
     for node in model.children().filter(Node::is_element) {
@@ -143,7 +157,7 @@ fn model_frames<'a, 'i>(model: &Node<'a, 'i>) -> Result<Vec<SdfFrame<'a, 'i>>, S
             .iter()
             .any(|frame| frame.name == name && frame.node.tag_name() == node.tag_name())
         {
-            return Err(located_message(&node, "this name is there twice"));
+            return Err(located_message(&node, "this name occurs twice; rename one"));
         }
         out.push(SdfFrame {
             name,
@@ -154,7 +168,7 @@ fn model_frames<'a, 'i>(model: &Node<'a, 'i>) -> Result<Vec<SdfFrame<'a, 'i>>, S
     Ok(out)
 }
 
-/// Where a frame is in the model.
+/// The pose of a frame in the model, through all frames to which it is relative. `from` is the element for messages.
 fn pose_in_model(
     frames: &[SdfFrame],
     name: &str,
@@ -167,13 +181,13 @@ fn pose_in_model(
     if depth > LONGEST_CHAIN {
         return Err(located_message(
             from,
-            "its pose refers to itself by way of others",
+            "its pose is relative to itself through other frames",
         ));
     }
     let frame = frames
         .iter()
         .find(|frame| frame.name == name)
-        .ok_or_else(|| located_message(from, &format!("no frame is called `{name}`")))?;
+        .ok_or_else(|| located_message(from, &format!("there is no frame `{name}`")))?;
     let pose = child(&frame.node, "pose");
     let relative = pose
         .and_then(|pose| pose.attribute("relative_to").or(pose.attribute("frame")))
@@ -183,7 +197,7 @@ fn pose_in_model(
     Ok(pose_in_model(frames, relative, &frame.node, depth + 1)?.compose(&placed))
 }
 
-/// The numbers of a `<pose>`.
+/// The pose in a `<pose>` element, with roll, pitch and yaw or a quaternion.
 fn pose_of(node: &Node) -> Result<DescriptionPose, String> {
     let text = node.text().unwrap_or("").trim();
     if text.is_empty() {
@@ -205,6 +219,7 @@ fn pose_of(node: &Node) -> Result<DescriptionPose, String> {
     })
 }
 
+/// Mass and inertia of a link; 1 kg and 1 kg m^2 without `<inertial>`, as in the format.
 fn inertial(node: &Node) -> Result<DescriptionInertia, String> {
     let given = child(node, "inertial");
     let mut out = DescriptionInertia {
@@ -220,7 +235,7 @@ fn inertial(node: &Node) -> Result<DescriptionInertia, String> {
     {
         return Err(located_message(
             &given,
-            "mass and inertia from shapes are not worked out here; write them into the file",
+            "mass and inertia from shapes are not computed here; write them into the file",
         ));
     }
     out.mass = number_of(&given, "mass")?.unwrap_or(1.0);
@@ -231,7 +246,7 @@ fn inertial(node: &Node) -> Result<DescriptionInertia, String> {
         {
             return Err(located_message(
                 &pose,
-                "the pose of an inertial is that in its link; delete `relative_to`",
+                "the pose of an <inertial> is always relative to its link; delete `relative_to`",
             ));
         }
         out.at = pose_of(&pose)?;
@@ -249,6 +264,8 @@ fn inertial(node: &Node) -> Result<DescriptionInertia, String> {
     Ok(out)
 }
 
+/// Reads a `<joint>`: its links, its pose in the model, and its one or two axes. Screws become a rotation and a coupled
+/// translation.
 fn joint(
     node: &Node,
     links: &[Node],
@@ -260,7 +277,7 @@ fn joint(
     let end = |tag: &str| -> Result<Option<usize>, String> {
         let inner = required_child(node, tag)?;
         let mut name = inner.text().unwrap_or("").trim().to_owned();
-        // A frame stands for the link that it is attached to.
+        // A frame as parent or child means the link to which it is attached.
         for _ in 0..LONGEST_CHAIN {
             if name == "world" {
                 return Ok(None);
@@ -274,7 +291,7 @@ fn joint(
             let frame = frames
                 .iter()
                 .find(|frame| frame.name == name)
-                .ok_or_else(|| located_message(&inner, &format!("no link is called `{name}`")))?;
+                .ok_or_else(|| located_message(&inner, &format!("there is no link `{name}`")))?;
             if frame.usually == "__model__" {
                 return Ok(links.first().map(|_| 0));
             }
@@ -282,7 +299,7 @@ fn joint(
         }
         Err(located_message(
             &inner,
-            "its frame is attached to itself by way of others",
+            "its frame is attached to itself through other frames",
         ))
     };
     let kind = required_attribute(node, "type")?;
@@ -303,7 +320,8 @@ fn joint(
             return Err(located_message(
                 node,
                 &format!(
-                    "models have no joint of the type {other}; write it as several of revolute, prismatic, screw, ball and fixed"
+                    "the joint type {other} is not supported; write it as several joints of the types revolute, prismatic, screw, ball \
+                     or fixed"
                 ),
             ));
         }
@@ -327,7 +345,8 @@ fn joint(
         out.couplings.push(screw_coupling(node, turn, slide)?);
     }
     if let Some(physics) = child(node, "sensor").or(child(node, "physics")) {
-        out.remarks.push(located_message(&physics, "not read"));
+        out.remarks
+            .push(located_message(&physics, "this element is not read"));
     }
     Ok(SdfJoint {
         parent,
@@ -340,7 +359,7 @@ fn joint(
     })
 }
 
-/// A screw: limits and losses are those of its turn, and what slides follows.
+/// The coupling of a screw: the translation follows the rotation, which keeps the limits and losses.
 fn screw_coupling(
     node: &Node,
     turn: &DescriptionJoint,
@@ -349,7 +368,7 @@ fn screw_coupling(
     let pitch = number_of(node, "screw_thread_pitch")?.ok_or_else(|| {
         located_message(
             node,
-            "it needs <screw_thread_pitch>, in metres for each turn; the older <thread_pitch> had several meanings",
+            "it needs <screw_thread_pitch>, in metres per revolution; the older <thread_pitch> is ambiguous",
         )
     })?;
     let mut bare = DescriptionJoint::new(
@@ -369,18 +388,18 @@ fn screw_coupling(
     })
 }
 
-/// The name under which a joint's own frame is found; links and joints may share names in old files.
+/// The name of a joint's frame. Fails if a link or frame has the same name, which old files permit.
 fn name_in(frames: &[SdfFrame], node: &Node, name: &str) -> Result<String, String> {
     if frames.iter().filter(|frame| frame.name == name).count() > 1 {
         return Err(located_message(
             node,
-            "a joint and a link or frame have this name, so that poses cannot tell them apart; rename one",
+            "a joint and a link or frame have the same name, so poses that refer to it are ambiguous; rename one",
         ));
     }
     Ok(name.to_owned())
 }
 
-/// Axis (in the axes of the model), limits and losses of one degree of freedom.
+/// Reads the axis (in the axes of the model), limits, losses and `<mimic>` of one degree of freedom.
 fn read_axis(
     joint: &mut DescriptionJoint,
     node: &Node,
@@ -430,7 +449,7 @@ fn read_axis(
         joint.stiffness = number_of(&dynamics, "spring_stiffness")?.unwrap_or(0.0);
         joint.rest = number_of(&dynamics, "spring_reference")?.unwrap_or(0.0);
     }
-    // Drake's elements stand in the joint, not in the axis.
+    // Drake's extension: rotor inertia and gear ratio are children of the joint, not of the axis.
     if let Some(parent) = node.parent()
         && let Some(rotor) = number_of(&parent, "rotor_inertia")?
     {
@@ -455,7 +474,7 @@ fn read_axis(
     Ok(())
 }
 
-/// Makes a tree of links and joints: what closes a ring becomes a closure, ball joints first.
+/// Builds a tree from links and joints. Joints that close a loop become closures, preferably ball joints.
 #[allow(
     clippy::too_many_lines,
     reason = "tree first, then what closes rings, on the same tables"
@@ -468,7 +487,8 @@ fn tree(
     own: &DescriptionPose,
     base: usize,
 ) -> Result<(), String> {
-    // Which joints belong to the tree: the world is the last part.
+    // Spanning tree by merging groups of connected links; the world is the last entry. Ball joints come last, so that
+    // they are cut.
     let n = nodes.len();
     let part = |link: Option<usize>| link.unwrap_or(n);
     let mut group: Vec<usize> = (0..=n).collect();
@@ -486,7 +506,8 @@ fn tree(
             }
         }
     }
-    // Links in the order in which they are reached: from the world, then from the base, then from what is left.
+    // Links in the order in which they are reached: from the world, then from the base link, then from the remaining
+    // links. The last two get a free joint.
     let mut index: Vec<Option<usize>> = vec![None; n];
     let starts = [None, Some(base)].into_iter().chain((0..n).map(Some));
     for start in starts {
@@ -527,6 +548,7 @@ fn tree(
                 let Some(link) = there.filter(|link| index[*link].is_none()) else {
                     continue;
                 };
+                // A joint that is passed from child to parent has the opposite axis, and its parts in reverse order.
                 let carrier = here.map_or_else(|| own.inverse(), |link| places[link]);
                 let to_link = places[link].inverse();
                 let mut moving = between.joints.clone();
@@ -543,7 +565,8 @@ fn tree(
                         .any(|joint| joint.kind == DescriptionJointKind::Ball)
                     {
                         out.remarks.push(format!(
-                            "line {}: the ball joint `{}` is passed from child to parent: its angles are those of the parent",
+                            "line {}: the tree passes the ball joint `{}` from child to parent; its angles are those of the parent relative to \
+                             the child",
                             between.line, between.name
                         ));
                     }
@@ -561,6 +584,7 @@ fn tree(
             }
         }
     }
+    // Joints outside of the tree close loops.
     for between in joints
         .iter()
         .zip(&in_tree)
@@ -573,7 +597,7 @@ fn tree(
             "fixed" => ClosureConstraint::Frames,
             other => {
                 return Err(format!(
-                    "line {}: the joint `{}` closes a loop and is {other}; loops are closed by ball, revolute and fixed joints",
+                    "line {}: the joint `{}` closes a loop and is {other}; loops can be closed by ball, revolute and fixed joints only",
                     between.line, between.name
                 ));
             }
@@ -581,7 +605,7 @@ fn tree(
         let mut place = between.place;
         if let (ClosureConstraint::Axes, Some(joint)) = (holds, between.joints.first()) {
             let turned = nalgebra::Rotation3::rotation_between(&Vector3::x(), &joint.axis);
-            // Against x it is half a turn about any axis across.
+            // For the direction -x it is half a turn about any perpendicular axis.
             place.r = turned.map_or_else(
                 || Matrix3::from_diagonal(&Vector3::new(-1.0, -1.0, 1.0)),
                 nalgebra::Rotation3::into_inner,

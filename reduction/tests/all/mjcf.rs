@@ -44,7 +44,7 @@ fn options_that_change_forces_are_said() {
     let calm = remarks("<option density=\"0\"/>", &one, "");
     assert_eq!(plain, calm);
     let without = remarks("<option><flag gravity=\"disable\"/></option>", &one, "");
-    assert!(without.contains("switches gravity off"), "{without}");
+    assert!(without.contains("disables gravity"), "{without}");
     let wet = remarks("<option viscosity=\"0.1\"/>", &one, "");
     assert!(wet.contains("`viscosity`"), "{wet}");
 }
@@ -99,7 +99,7 @@ fn tendons_that_bend_are_said() {
     let imported = pulled(bent, "<motor tendon=\"rope\"/><motor joint=\"bar_turn\"/>").unwrap();
     let remarks = lines(&imported.remarks);
     assert!(
-        remarks.contains("no straight line between two sites"),
+        remarks.contains("is not a straight line between two sites"),
         "{remarks}"
     );
     assert_eq!(imported.model.matches("[[drive]]").count(), 1);
@@ -205,7 +205,7 @@ fn fixed_tendons_of_constant_length_couple_joints() {
             .to_string()
     };
     let three = fault(text(&(two + &of("third", "1")), ""));
-    assert!(three.contains("ties 3 joints"), "{three}");
+    assert!(three.contains("couples 3 joints"), "{three}");
 }
 
 #[test]

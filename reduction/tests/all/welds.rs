@@ -272,8 +272,8 @@ fn fixed_joints_follow_nothing() {
     assert_eq!(imported.joints.len(), 1);
     let remarks = lines(&imported.remarks);
     assert!(
-        remarks.contains("`one` is fixed and follows nothing"),
+        remarks.contains("`one` is fixed; its <mimic> is left out"),
         "{remarks}"
     );
-    assert!(remarks.contains("it is held at 0.25"), "{remarks}");
+    assert!(remarks.contains("it is fixed at 0.25"), "{remarks}");
 }

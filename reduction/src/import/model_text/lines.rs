@@ -1,4 +1,5 @@
-//! Drives along straight lines between two points: which coordinates they move, and what the model file says of them.
+//! Drives along straight lines between two points: assigns each to a coordinate that it drives, and writes their
+//! points, drives, effects and limits.
 
 use std::fmt::Write as _;
 
@@ -10,14 +11,17 @@ use super::super::description::StraightDrive;
 use super::{ImportCoordinate, ModelTextBuilder, round_to_15_digits};
 use crate::write::toml_float;
 
-/// A line that is a drive of the model, with the names that it and its points have there.
+/// A straight drive with its names in the model.
 pub(super) struct NamedDriveLine<'a> {
+    /// The drive of the description.
     pub(super) line: &'a StraightDrive,
+    /// Name of the drive.
     pub(super) name: String,
+    /// Names of its two points.
     pub(super) points: [String; 2],
 }
 
-/// Variables that move one of two frames on the other.
+/// Variables that move two frames relative to each other: those on the paths to their common ancestor.
 pub(super) fn relative_variables(chain: &FrameChain, frames: [Option<usize>; 2]) -> Vec<usize> {
     let paths = frames.map(|frame| -> Vec<usize> {
         std::iter::successors(frame, |k| chain.nodes[*k].on).collect()
@@ -33,8 +37,10 @@ pub(super) fn relative_variables(chain: &FrameChain, frames: [Option<usize>; 2])
     moves.filter_map(|motion| motion.variable).collect()
 }
 
-/// For each line one of those that it wants, no two the same, for as many lines as can be: by augmenting paths (H. W. Kuhn 1955).
+/// A largest matching of lines to the coordinates in `wanted`: each line gets at most one, and no two the same. Method
+/// of augmenting paths (H. W. Kuhn 1955).
 fn match_lines(wanted: &[Vec<usize>]) -> Vec<Option<usize>> {
+    /// Whether a coordinate can be assigned to `line`, if necessary by moving other lines to another coordinate.
     fn finds(
         line: usize,
         wanted: &[Vec<usize>],
@@ -62,14 +68,15 @@ fn match_lines(wanted: &[Vec<usize>]) -> Vec<Option<usize>> {
 }
 
 impl ModelTextBuilder<'_> {
-    /// The frames that carry the ends of a line.
+    /// The frames of both ends of a line; none is the base.
     pub(super) fn frames_of(&self, line: &StraightDrive) -> [Option<usize>; 2] {
         line.ends
             .map(|(link, _)| link.and_then(|link| self.links[link].0))
     }
 
-    /// Finds for each line an independent coordinate that nothing else drives. Lines that are left over are more drives than
-    /// there are freedoms, which a tree may have if all else is driven.
+    /// Assigns to each line an independent coordinate that has no other drive, and returns the lines that become
+    /// drives. Lines without such a coordinate are surplus drives, which are possible in a tree if all coordinates are
+    /// driven.
     pub(super) fn assign_coordinates<'l>(
         &mut self,
         lines: &'l [StraightDrive],
@@ -79,7 +86,8 @@ impl ModelTextBuilder<'_> {
             let is_passive = |v: usize| closed.is_some_and(|closed| closed.passive[v]);
             !one.is_driven && !one.is_pulled && one.variable.is_some_and(|v| !is_passive(v))
         };
-        // What each line can drive: what moves its ends on each other first; around a loop any coordinate moves all others.
+        // Coordinates that a line can drive: first those that move its ends relative to each other. In a loop any
+        // coordinate moves all others, so all are possible.
         let drives = |line: &StraightDrive| -> Vec<usize> {
             let near = relative_variables(&self.chain, self.frames_of(line));
             let open = self.coordinates.iter().enumerate();
@@ -112,7 +120,7 @@ impl ModelTextBuilder<'_> {
                 kept.push(line);
             } else {
                 self.remarks.push(message!(
-                    "line {}: `{}` pulls what other drives move already, and is left out",
+                    "line {}: `{}` acts on coordinates that other drives already move, and is left out",
                     line.line,
                     line.name
                 ));
@@ -127,7 +135,7 @@ impl ModelTextBuilder<'_> {
             .collect()
     }
 
-    /// The points between which lines act.
+    /// Writes the points between which the lines act.
     pub(super) fn line_points(&self, lines: &[NamedDriveLine<'_>], text: &mut String) {
         for NamedDriveLine { line, points, .. } in lines {
             for ((link, at), point) in line.ends.iter().zip(points) {
@@ -158,7 +166,8 @@ impl ModelTextBuilder<'_> {
         }
     }
 
-    /// Drives, effects and limits of forces of lines, added to those of joints.
+    /// Adds drives, effects and force limits of the lines to those of the joints. With surplus drives, effects and
+    /// limits are left out with a remark.
     pub(super) fn line_forces(
         &mut self,
         lines: &[NamedDriveLine<'_>],
@@ -181,7 +190,7 @@ impl ModelTextBuilder<'_> {
             ] {
                 if value != 0.0 && self.has_surplus {
                     self.remarks.push(message!(
-                        "{kind} of `{place}` is left out: there are more drives than freedoms"
+                        "{kind} of `{place}` is left out: there are more drives than degrees of freedom"
                     ));
                 } else if value != 0.0 {
                     let _ = write!(
@@ -202,8 +211,10 @@ impl ModelTextBuilder<'_> {
         }
         if self.has_surplus && !forces.is_empty() {
             forces.clear();
-            self.remarks
-                .push("limits of forces are left out: there are more drives than freedoms".into());
+            self.remarks.push(
+                "limits of forces are left out: there are more drives than degrees of freedom"
+                    .into(),
+            );
         }
     }
 }
