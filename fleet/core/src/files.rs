@@ -1,16 +1,19 @@
-//! The files of a plan, and recordings from disk beside them.
+//! The source of files for a plan: model files come from the plan, recordings from disk.
 
 use std::path::{Path, PathBuf};
 
 use modelmill::files::{DiskFiles, FileError, FileSource, MemoryFiles, OpenFile, PathKind};
 
-/// What is in the plan comes from memory, all else from disk.
+/// Files of the plan in memory, and all others on disk.
 pub(crate) struct PlanFiles {
+    /// The model files of the plan.
     pub(crate) memory: MemoryFiles,
+    /// The disk.
     pub(crate) disk: DiskFiles,
 }
 
 impl PlanFiles {
+    /// The source of a path: memory if the plan has the file, else the disk.
     fn files_for(&self, path: &Path) -> &dyn FileSource {
         match self.memory.kind(path) {
             PathKind::File => &self.memory,

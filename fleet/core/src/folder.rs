@@ -1,4 +1,5 @@
-//! Folders of recordings: which robot and which day a file belongs to, by its path.
+//! Folders of recordings: a folder goes in, its recordings by robot and day come out. The path of a file determines
+//! both.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -11,19 +12,19 @@ use crate::FleetFault;
 /// A recording that is a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FleetFile {
-    /// Its path below the folder, with `/`; what messages call it.
+    /// Its path below the folder, with `/`; its name in messages.
     pub name: String,
-    /// Where it is.
+    /// The path to open.
     pub path: PathBuf,
-    /// Its day.
+    /// Its day, as the path states it.
     pub day: String,
-    /// Name, size and time of change: a file that was written anew is another recording.
+    /// Name, size and time of change. A file that was written again thus counts as another recording.
     pub key: String,
 }
 
-/// Recordings below a folder by robot, each in the order of day and name.
+/// Recordings below a folder by robot, each sorted by day and name.
 ///
-/// Fails where the folder cannot be read, or holds no recording whose robot is known.
+/// Fails if the folder cannot be read, or has no recording, or a path names no robot.
 pub fn robots(folder: &Path) -> Result<BTreeMap<String, Vec<FleetFile>>, FleetFault> {
     let mut paths = Vec::new();
     walk(folder, &mut paths)?;
@@ -43,21 +44,21 @@ pub fn robots(folder: &Path) -> Result<BTreeMap<String, Vec<FleetFile>>, FleetFa
     group_by_robot(&folder.display(), found)
 }
 
-/// A file or object that was found below a folder.
+/// A file of a folder, or an object of a store.
 #[derive(Clone, Debug)]
 pub struct FolderEntry {
     /// Its path below the folder, with `/`.
     pub name: String,
-    /// Where it is.
+    /// The path to open.
     pub path: PathBuf,
-    /// What changes when it is written anew, such as its size and time.
+    /// A text that changes when the file is written again, such as its size and time.
     pub version: String,
 }
 
-/// What was found by robot, each in the order of day and name; `folder` is what messages call the place. Of what is no recording, by
-/// the endings of names, nothing is said.
+/// Groups recordings by robot, each sorted by day and name. `folder` is the name of the place in messages. Files
+/// without the ending of a recording are ignored.
 ///
-/// Fails where there is no recording, or the path of one names no robot.
+/// Fails if there is no recording, or the path of one names no robot.
 pub fn group_by_robot(
     folder: &dyn std::fmt::Display,
     found: impl IntoIterator<Item = FolderEntry>,
@@ -70,7 +71,7 @@ pub fn group_by_robot(
         let parts: Vec<String> = one.name.split('/').map(str::to_owned).collect();
         let Some((robot, day)) = robot_and_day(&parts) else {
             return Err(FleetFault::new(format!(
-                "{folder}: the path of {} names no robot; put recordings below folders such as `robot=R1/day=2026-03-01`, or \
+                "{folder}: the path of {} names no robot; put recordings into folders such as `robot=R1/day=2026-03-01`, or \
                  `R1/2026-03-01`",
                 one.name
             )));
@@ -84,7 +85,7 @@ pub fn group_by_robot(
     }
     if robots.is_empty() {
         return Err(FleetFault::new(format!(
-            "{folder} holds no recordings (Parquet, CSV, MATLAB, HDF5, MCAP); give the folder above those of the robots"
+            "{folder} has no recordings (Parquet, CSV, MATLAB, HDF5, MCAP); give the folder that contains those of the robots"
         )));
     }
     for files in robots.values_mut() {
@@ -93,13 +94,15 @@ pub fn group_by_robot(
     Ok(robots)
 }
 
+/// The fault of a path that cannot be read.
 fn read_fault(path: &Path, error: &std::io::Error) -> FleetFault {
     FleetFault::new(format!(
-        "{} cannot be read: {error}; check the path and who may read it",
+        "{} cannot be read: {error}; check the path and its permissions",
         path.display()
     ))
 }
 
+/// Adds all files below a folder to `found`, in the order of their names.
 fn walk(folder: &Path, found: &mut Vec<PathBuf>) -> Result<(), FleetFault> {
     let entries = fs::read_dir(folder).map_err(|error| read_fault(folder, &error))?;
     let mut entries: Vec<PathBuf> = entries
@@ -117,7 +120,8 @@ fn walk(folder: &Path, found: &mut Vec<PathBuf>) -> Result<(), FleetFault> {
     Ok(())
 }
 
-/// Robot and day of a path: by `robot=` and `day=`, else by the first folder and the second, or what the name begins with.
+/// Robot and day of a path: from `robot=` and `day=`, else from the first and the second folder, or from the date at
+/// the start of the file name.
 fn robot_and_day(parts: &[String]) -> Option<(String, String)> {
     let named = |key: &str| {
         parts
@@ -147,7 +151,7 @@ fn robot_and_day(parts: &[String]) -> Option<(String, String)> {
     Some((robot, day))
 }
 
-/// Writes a file as a whole or not at all. Fails where the place cannot be written to.
+/// Writes a file atomically: to a file next to it, which then replaces it. Fails if the folder cannot be written to.
 pub fn write_atomic(path: &Path, bytes: &[u8]) -> Result<(), FleetFault> {
     let beside = path.with_extension("part");
     let written = fs::write(&beside, bytes).and_then(|()| fs::rename(&beside, path));

@@ -1,4 +1,4 @@
-//! A plan with its model derived: recordings to summaries, summaries to parameters.
+//! A plan with its derived model. Recordings go in and summaries come out; summaries go in and parameters come out.
 
 use std::path::Path;
 
@@ -11,29 +11,35 @@ use crate::sensors::{self, SensorFault};
 use crate::summary::{BadRecording, FleetSummary};
 use crate::{FleetFault, FleetPlan};
 
-/// A plan with its model derived. It may be shared by threads.
+/// A plan with its derived model. Threads may share it.
 #[derive(Clone)]
 pub struct FleetModel {
+    /// The plan.
     plan: FleetPlan,
+    /// Checksum of the plan, see [`FleetPlan::mark`].
     mark: u64,
+    /// The derived model with the columns of all possible changes.
     pub(crate) common: ReferenceFit,
+    /// For each coordinate and drive: name, whether it is a drive, and the share of a reference recording with a
+    /// constant reading.
     still: Vec<(String, bool, f64)>,
 }
 
-/// What summaries say of the parameters.
+/// Parameters that were solved from a summary.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FleetFit {
     /// Base parameters in the order of the model.
     pub parameters: Vec<FittedValue>,
-    /// For each drive what the recordings' own parameters leave of its force, as a part of it.
+    /// For each drive the residual of its force relative to the force, rms, with the parameters of each recording.
     pub residual_shares: Vec<f64>,
-    /// Recordings that gave an answer.
+    /// Number of recordings that were evaluated.
     pub recordings: u64,
-    /// Recordings that gave none.
+    /// Number of recordings that could not be evaluated.
     pub bad: usize,
 }
 
 impl FleetModel {
+    /// The plan with its derived model.
     pub(crate) fn new(plan: FleetPlan, common: ReferenceFit) -> Self {
         let drives = common.model().drives();
         let usual = plan.reference.still.iter();
@@ -51,7 +57,7 @@ impl FleetModel {
         &self.plan
     }
 
-    /// [`Plan::mark`] of the plan.
+    /// The checksum of the plan, [`FleetPlan::mark`].
     pub fn mark(&self) -> u64 {
         self.mark
     }
@@ -80,8 +86,8 @@ impl FleetModel {
         FleetSummary::empty(self.mark, self.common.n_columns(), self.drives().len())
     }
 
-    /// Summarises one recording whose columns are in memory, in SI units, with their names; the rows may be in any order, which
-    /// is that of column `t`. What is wrong with it stands in the summary.
+    /// Summarises one recording from named columns in memory, in SI units. The rows may be in any order; they are
+    /// sorted by column `t`. If the recording cannot be evaluated, the summary has the reason.
     pub fn summarise(&self, name: &str, columns: Vec<(String, Vec<f64>)>) -> FleetSummary {
         let read = sort_by_time(columns).and_then(|columns| {
             let model = self.common.model();
@@ -90,21 +96,22 @@ impl FleetModel {
         self.summary_or_bad(name, read)
     }
 
-    /// Summarises one recording that is a file, under a name that may be another than its path's.
+    /// Summarises one recording from a file, under a name that may differ from its path.
     pub fn summarise_file(&self, name: &str, path: &Path) -> FleetSummary {
         let model = self.common.model();
         let read = model.recording(path, &self.plan.reading());
         self.summary_or_bad(name, read.map_err(FleetFault::from))
     }
 
-    /// As [`Ground::summarise_file`], of a file that is in memory, such as an object of a store; the ending of its name says what it
-    /// is.
+    /// As [`FleetModel::summarise_file`], from the bytes of a file, such as an object of a store. The ending of the
+    /// name determines the format.
     pub fn summarise_bytes(&self, name: &str, bytes: Vec<u8>) -> FleetSummary {
         let model = self.common.model();
         let read = model.recording_of_bytes(name, bytes, &self.plan.reading());
         self.summary_or_bad(name, read.map_err(FleetFault::from))
     }
 
+    /// The summary of a recording, or a summary that lists it as bad.
     fn summary_or_bad(
         &self,
         name: &str,
@@ -121,6 +128,7 @@ impl FleetModel {
             })
     }
 
+    /// Checks the sensors of a recording and sums it up.
     fn sum_recording(
         &self,
         name: &str,
@@ -142,9 +150,9 @@ impl FleetModel {
         };
         let drives = self.drives();
         if let Some(encoder) = sensors.iter().find(|one| !one.is_force) {
-            // States that are made of it are wrong; nothing is summed, but the fault is told.
+            // States computed from a dead encoder are wrong, so the recording is not used; the fault is reported.
             let says = format!(
-                "the reading of {} stands still for {:.0} % of the recording while others move",
+                "the reading of {} is constant for {:.0} % of the recording while others change",
                 encoder.of,
                 100.0 * encoder.still
             );
@@ -158,6 +166,7 @@ impl FleetModel {
             });
         }
         exclude_dead_sensors(&mut recording, &drives, &sensors);
+        // Forces of dead sensors are excluded above; their drives have no residual either.
         let sums = self.common.sums(&recording)?;
         let is_dead = |drive: &String| sensors.iter().any(|one| one.of == *drive);
         let left = drives
@@ -187,23 +196,24 @@ impl FleetModel {
         })
     }
 
-    /// Base parameters with deviations; parameters that the recordings do not determine have none.
+    /// Solves for the base parameters with standard deviations; parameters that the recordings do not determine have
+    /// none.
     ///
-    /// Fails where the summary is of another plan, or of no recordings.
+    /// Fails if the summary belongs to another plan, or no recording was usable.
     pub fn solve(&self, summary: &FleetSummary) -> Result<FleetFit, FleetFault> {
         self.check_plan(summary)?;
         let Some(base) = &summary.base else {
             let why = match summary.bad.as_slice() {
-                [] => "it is of none".to_owned(),
+                [] => "it contains none".to_owned(),
                 [first, ..] => format!(
-                    "{} gave no answer, {} for one: {}",
+                    "{} could not be evaluated, for example {}: {}",
                     summary.bad.len(),
                     first.recording,
                     first.says
                 ),
             };
             return Err(FleetFault::new(format!(
-                "this summary holds no recording that could be used: {why}"
+                "this summary has no usable recording: {why}"
             )));
         };
         Ok(FleetFit {
@@ -216,13 +226,13 @@ impl FleetModel {
         })
     }
 
-    /// Fails where a summary is of another plan.
+    /// Fails if a summary belongs to another plan.
     pub fn check_plan(&self, summary: &FleetSummary) -> Result<(), FleetFault> {
         if summary.mark == self.mark {
             Ok(())
         } else {
             Err(FleetFault::new(
-                "this summary was made with another plan; summarise its recordings with this one, or take the other plan",
+                "this summary was made with another plan; summarise its recordings with this plan, or use the other plan",
             ))
         }
     }
@@ -251,7 +261,7 @@ impl FleetModel {
     }
 }
 
-/// The forces of sensors that died count in no equation.
+/// Leaves the forces of dead sensors out of all equations.
 fn exclude_dead_sensors(
     recording: &mut PreparedRecording,
     drives: &[String],
@@ -279,12 +289,14 @@ fn exclude_dead_sensors(
     }
 }
 
-/// Columns in the order of time. Rows of equal time stay as they are, and are refused later.
+/// Sorts columns by time. Rows of equal time keep their order, and are refused later.
+///
+/// Fails if columns have different lengths.
 fn sort_by_time(
     mut columns: Vec<(String, Vec<f64>)>,
 ) -> Result<Vec<(String, Vec<f64>)>, FleetFault> {
     let Some((_, time)) = columns.iter().find(|(name, _)| name == "t") else {
-        // The reader of recordings says what is missing, and knows what the plan maps onto time.
+        // The reader of recordings reports missing columns, and knows the mapping of the plan for time.
         return Ok(columns);
     };
     if time.windows(2).all(|two| two[0] <= two[1]) {
@@ -293,7 +305,7 @@ fn sort_by_time(
     let n = time.len();
     if let Some((name, other)) = columns.iter().find(|(_, values)| values.len() != n) {
         return Err(FleetFault::new(format!(
-            "column `t` has {n} numbers and column `{name}` has {}; all columns need one for each sample",
+            "column `t` has {n} numbers and column `{name}` has {}; all columns need one number per sample",
             other.len()
         )));
     }

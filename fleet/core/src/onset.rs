@@ -1,30 +1,31 @@
-//! When something began: the clearest step or ramp of a series of days. Wear grows, so that no two days are alike from then on;
-//! what looks for levels that stay takes such days for single ones.
+//! Detects the onset of a change: a series of daily values goes in, its most significant step or ramp comes out. A ramp
+//! is needed for wear: it grows every day, so a search for constant levels would see only single deviating days.
 
 use modelmill_identify::changes::UncertainValue;
 
-/// What the values of a series do from a day on.
+/// The onset of a step or a ramp in a series.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ChangeOnset {
-    /// The first day on which something is different.
+    /// Index of the first day that differs.
     pub(crate) day: usize,
-    /// By how much the value grows each day; `None` for a step.
+    /// Growth per day of a ramp; `None` for a step.
     pub(crate) per_day: Option<f64>,
-    /// By how much it lowers the sum of squares, in deviations as large as days scatter.
+    /// Reduction of the weighted sum of squares, in units of the variance between days.
     pub(crate) gain: f64,
 }
 
-/// The fewest days before a change and since.
+/// Smallest number of days before a change and since.
 pub(crate) const MINIMUM_DAYS: usize = 2;
-/// A ramp must leave so much less than a step to be preferred.
+/// Additional gain that a ramp needs to be preferred to a step.
 const RAMP_PREFERENCE: f64 = 9.0;
-/// A change must gain so much: six deviations.
+/// Smallest gain of a change: the square of six standard deviations.
 const MINIMUM_GAIN: f64 = 36.0;
-/// The median of the square of a number from the normal distribution.
+/// The median of the square of a standard normal variable.
 const MEDIAN_OF_SQUARE: f64 = 0.4549;
 
-/// The clearest onset of a series, where there is one. Deviations are taken to be larger where days scatter more than they say,
-/// by second differences, in which neither a step nor a ramp shows on more than two days.
+/// The most significant onset of a series, if there is one. Standard deviations are enlarged if the days scatter more
+/// than these. The scatter is estimated from second differences, on which a step or a ramp has an effect on two days at
+/// most.
 pub(crate) fn clearest_onset(values: &[Option<UncertainValue>]) -> Option<ChangeOnset> {
     let known: Vec<(usize, UncertainValue)> = (values.iter().enumerate())
         .filter_map(|(k, one)| Some((k, (*one)?)))
@@ -35,7 +36,7 @@ pub(crate) fn clearest_onset(values: &[Option<UncertainValue>]) -> Option<Change
     }
     let second = |three: &[(usize, UncertainValue)]| {
         let [(a, (x, dx)), (b, (y, dy)), (c, (z, dz))] = [three[0], three[1], three[2]];
-        // Days may be missing in between.
+        // The middle of three days is compared with the line through the others; days may be missing in between.
         let part = (b - a) as f64 / (c - a) as f64;
         let off = y - x - part * (z - x);
         off * off / (dy * dy + ((1.0 - part) * dx).powi(2) + (part * dz).powi(2))
@@ -43,8 +44,10 @@ pub(crate) fn clearest_onset(values: &[Option<UncertainValue>]) -> Option<Change
     let mut squares: Vec<f64> = known.windows(3).map(second).collect();
     squares.sort_by(f64::total_cmp);
     let scatter = (squares[squares.len() / 2] / MEDIAN_OF_SQUARE).max(1.0);
+    // Reference: a constant level over all days.
     let (flat, _) = fit(&known, |_| 0.0)?;
     let mut best: Option<(f64, ChangeOnset)> = None;
+    // Try a step and a ramp from every day on.
     for at in MINIMUM_DAYS..=known.len() - MINIMUM_DAYS {
         let day = known[at].0;
         let step = fit(&known, |k| f64::from(u8::from(k >= day)));
@@ -66,7 +69,8 @@ pub(crate) fn clearest_onset(values: &[Option<UncertainValue>]) -> Option<Change
         .filter(|onset| onset.gain > MINIMUM_GAIN)
 }
 
-/// What a level and a multiple of a shape leave of values, in deviations squared, and that multiple.
+/// Weighted least squares fit of a level and a multiple of `shape`. Returns the weighted sum of squared residuals, and
+/// the multiple.
 fn fit(known: &[(usize, UncertainValue)], shape: impl Fn(usize) -> f64) -> Option<(f64, f64)> {
     let origin = known.first()?.1.0;
     let [mut w, mut s, mut ss, mut x, mut sx] = [0.0; 5];

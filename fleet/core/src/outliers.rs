@@ -1,4 +1,5 @@
-//! Which robots differ from the others of their kind, and in what: by summaries alone.
+//! Detects robots that differ from the others of their kind: summaries of robots go in, outliers with the physical
+//! change come out.
 
 use modelmill::runs::{FittedValue, RunChange};
 use modelmill_identify::changes::NormalEquations;
@@ -7,49 +8,51 @@ use serde_json::{Value, json};
 use crate::robot::change_json;
 use crate::{FleetFault, FleetModel, FleetSummary};
 
-/// Robots that stand in for the others are summed up in so many parts.
+/// Number of parts into which the similar robots, the reference, are summed up.
 const PARTS: usize = 8;
-/// Robots are alike up to so many robust deviations in each parameter.
+/// Largest distance of a similar robot from the median in each parameter, in robust standard deviations.
 const SIMILARITY_LIMIT: f64 = 3.5;
-/// What a change explains of a robot must lie, as a root, so many median distances above the median over the robots: a change of
-/// one value of robots that are distributed normally does so once in a million.
+/// Smallest distance of an outlier: the square root of the gain of a change above its median over the robots, in median
+/// absolute deviations. With normally distributed values one robot in a million exceeds it by chance.
 const OUTLIER_LIMIT: f64 = 12.0;
-/// Changes that stand for this part of the clearest one are told together, by the name of the one that explains most.
+/// Changes with at least this share of the largest distance are reported together, under the name of the one that
+/// explains most.
 const ASSOCIATED_SHARE: f64 = 0.5;
 
-/// A robot as it is held against others.
+/// A robot for the comparison with others.
 #[derive(Clone, Debug)]
 pub struct RobotSummary {
-    /// What it is called.
+    /// Its name.
     pub name: String,
-    /// Its recordings.
+    /// The sum of its recordings.
     pub summary: FleetSummary,
 }
 
-/// A robot that differs.
+/// A robot that differs from the others.
 #[derive(Clone, Debug)]
 pub struct RobotOutlier {
-    /// Which, by place.
+    /// Index of the robot.
     pub robot: usize,
-    /// In what, the clearest first.
+    /// The physical changes relative to the others, the most significant first.
     pub changes: Vec<RunChange>,
 }
 
-/// What is usual in a fleet, and who differs.
+/// The usual values of a fleet, and its outliers.
 #[derive(Clone, Debug)]
 pub struct FleetOutliers {
-    /// For each base parameter the median over the robots and the robust deviation of a robot from it, 1.4826 times the median
-    /// distance; `None` where no robot determines it.
+    /// For each base parameter the median over the robots with the robust standard deviation between robots (1.4826
+    /// times the median absolute deviation); `None` if no robot determines it.
     pub usual: Vec<Option<FittedValue>>,
-    /// For each robot and base parameter how far it lies from the median, in deviations of the robots and of its own.
+    /// `[robot][parameter]`: distance from the median, in standard deviations between robots and of the estimate
+    /// combined.
     pub distances: Vec<Vec<Option<f64>>>,
-    /// Robots that differ in something that physics has a name for, by far more than robots of this fleet do.
+    /// Robots that differ by a physical change much larger than the differences between the robots of this fleet.
     pub found: Vec<RobotOutlier>,
 }
 
-/// Holds robots against each other. None differs where there are fewer than eight.
+/// Compares robots with each other. With fewer than eight similar robots there are no outliers.
 ///
-/// Fails where summaries are of another plan.
+/// Fails if summaries belong to another plan.
 pub fn outliers(ground: &FleetModel, robots: &[RobotSummary]) -> Result<FleetOutliers, FleetFault> {
     let mut fits: Vec<Option<Vec<FittedValue>>> = Vec::new();
     for one in robots {
@@ -80,6 +83,7 @@ pub fn outliers(ground: &FleetModel, robots: &[RobotSummary]) -> Result<FleetOut
             (0..n).map(of).collect()
         })
         .collect();
+    // Similar robots serve as reference: none of their parameters is far from the median.
     let is_alike = |k: &usize| {
         fits[*k].is_some()
             && apart[*k]
@@ -90,13 +94,14 @@ pub fn outliers(ground: &FleetModel, robots: &[RobotSummary]) -> Result<FleetOut
     let alike: Vec<usize> = (0..robots.len()).filter(is_alike).collect();
     let mut found = Vec::new();
     if alike.len() >= PARTS {
+        // The scatter between the parts shows how much the reference varies.
         let mut parts = vec![ground.empty_summary(); PARTS];
         for (i, k) in alike.iter().enumerate() {
             parts[i % PARTS].merge(&robots[*k].summary)?;
         }
         let parts: Vec<NormalEquations> = parts.into_iter().map(|part| part.all_columns).collect();
         let known: Vec<usize> = (0..robots.len()).filter(|k| fits[*k].is_some()).collect();
-        // Roots of gains are proportional to differences.
+        // Square roots of gains are proportional to the size of a change.
         let roots: Vec<Vec<f64>> = known
             .iter()
             .map(|k| {
@@ -105,6 +110,7 @@ pub fn outliers(ground: &FleetModel, robots: &[RobotSummary]) -> Result<FleetOut
             })
             .collect();
         let possible = roots.first().map_or(0, Vec::len);
+        // For each possible change, median and median absolute deviation over all robots.
         let bounds: Vec<(f64, f64)> = (0..possible)
             .map(|g| {
                 let of_all = robust_centre(roots.iter().map(|roots| roots[g]).collect());
@@ -116,8 +122,8 @@ pub fn outliers(ground: &FleetModel, robots: &[RobotSummary]) -> Result<FleetOut
         for (which, roots) in known.iter().zip(&roots) {
             let beyond = |g: usize| (roots[g] - bounds[g].0) / bounds[g].1;
             let clearest = (0..possible).map(beyond).fold(0.0, f64::max);
-            // What robots hardly differ in, such as the zero of a sensor, stands clear of them even where it explains little of a load:
-            // the name is that of the change that explains most.
+            // A change in which robots hardly differ, such as the zero of a sensor, is significant even if it explains
+            // only little of the difference. So the change that explains most gives the name.
             let clear =
                 |g: &usize| beyond(*g) > OUTLIER_LIMIT && beyond(*g) > ASSOCIATED_SHARE * clearest;
             let named = (0..possible)
@@ -147,11 +153,12 @@ pub fn outliers(ground: &FleetModel, robots: &[RobotSummary]) -> Result<FleetOut
     })
 }
 
+/// Value and standard deviation; none for a value that is not determined.
 fn value_and_deviation(fitted: FittedValue) -> Option<(f64, f64)> {
     Some((fitted.value, fitted.deviation?))
 }
 
-/// Median and robust deviation.
+/// Median, and robust standard deviation (1.4826 times the median absolute deviation).
 fn robust_centre(mut values: Vec<f64>) -> Option<FittedValue> {
     if values.is_empty() {
         return None;
@@ -170,7 +177,7 @@ fn robust_centre(mut values: Vec<f64>) -> Option<FittedValue> {
 }
 
 impl FleetOutliers {
-    /// What is usual and who differs, as JSON.
+    /// JSON: `usual` has median and spread of each parameter, `differ` the outliers with their changes.
     pub fn json(&self, ground: &FleetModel, robots: &[RobotSummary]) -> Value {
         let infos = ground.parameters();
         let usual = infos.iter().zip(&self.usual).map(|(info, usual)| {

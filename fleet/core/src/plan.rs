@@ -1,5 +1,5 @@
-//! How every recording of a fleet is summed up: model, preparation, and the reference that columns are built on. A plan is one
-//! JSON document; summaries of two plans do not add.
+//! The plan of a fleet: model, preparation of recordings, and the reference values that define the columns. Reference
+//! recordings go in, one JSON document comes out. Summaries of different plans cannot be added.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -17,58 +17,63 @@ use crate::files::PlanFiles;
 use crate::sensors::FrozenReading;
 use crate::{FleetFault, FleetModel};
 
-/// The version of the document, and of what summaries hold.
+/// Version of the document and of the summaries.
 pub(crate) const VERSION: u32 = 1;
 
-/// How every recording is summed up.
+/// How every recording is prepared and summed up.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FleetPlan {
-    /// 1.
+    /// Version of the document, 1.
     pub version: u32,
-    /// What messages call the model file.
+    /// Path of the model file, for messages.
     pub model: String,
-    /// The text of the model file and, behind it, of those that it extends, each with its name.
+    /// Name and text of the model file and, after it, of the files that it extends.
     pub files: Vec<(String, String)>,
-    /// Our columns with what the recordings call them, as in [`Reading::columns`].
+    /// Names of the model with the columns of the recordings, as in [`RecordingOptions::columns`].
     #[serde(default)]
     pub columns: Vec<(String, String)>,
-    /// How states are prepared; everything is settled, so that all recordings are prepared alike.
+    /// How states are prepared; all values are fixed, so that all recordings are prepared in the same way.
     pub preparation: StatePreparation,
-    /// Whether samples with NaN or empty fields are left out; a recording that has them is a bad one otherwise.
+    /// Whether samples with NaN or empty fields are left out; otherwise a recording with such samples is bad.
     #[serde(default)]
     pub skip_bad_samples: bool,
-    /// What the reference recordings say.
+    /// Results of the reference recordings.
     pub reference: FleetReference,
 }
 
-/// What reference recordings say, and all columns are built on.
+/// Results of the reference recordings, which define all columns.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FleetReference {
-    /// What the recordings are called.
+    /// Names of the recordings.
     pub recordings: Vec<String>,
-    /// Base parameters that are no known numbers, in the order and units of the model.
+    /// Values of the estimated base parameters, in the order and units of the model.
     pub values: Vec<f64>,
-    /// Sums over the rows of each drive.
+    /// For each drive, sums over its rows.
     pub sizes: Vec<ReferenceSums>,
-    /// For each coordinate and drive the longest time for which its reading stood still, as a part of the recording.
+    /// For each coordinate and drive the longest interval with a constant reading, as a share of the recording.
     pub still: Vec<(String, f64)>,
 }
 
-/// Sums over rows, without the columns that are zero throughout.
+/// Normal equations over rows, without columns that are zero in all rows.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ReferenceSums {
+    /// Number of all columns.
     columns: usize,
+    /// Number of rows.
     rows: usize,
+    /// Sum of the squares of the measured forces.
     total: f64,
+    /// Indices of the columns that are not zero.
     kept: Vec<usize>,
-    /// Of each kept column its products with itself and all kept ones behind it, then with the measured force.
+    /// For each kept column its products with itself and the kept ones after it, then with the measured force.
     products: Vec<Vec<f64>>,
 }
 
 impl ReferenceSums {
+    /// The compact form of normal equations.
     fn from_moments(sums: &NormalEquations) -> Self {
         let n = sums.rhs.len();
         let kept: Vec<usize> = (0..n).filter(|k| sums.gram[(*k, *k)] != 0.0).collect();
@@ -86,6 +91,7 @@ impl ReferenceSums {
         }
     }
 
+    /// The normal equations; `None` if the numbers of products and columns do not match.
     fn moments(&self) -> Option<NormalEquations> {
         let mut sums = NormalEquations::new(self.columns);
         (sums.total, sums.rows) = (self.total, self.rows);
@@ -109,11 +115,12 @@ impl ReferenceSums {
 }
 
 impl FleetPlan {
-    /// The plan that reference recordings make, which should be of sound machines: how the first is best prepared is how all
-    /// are, and columns are built on the parameters that all of them say. What `reading` leaves open is settled here. Those that
-    /// cannot be read are left out; [`Reference::recordings`] names the others.
+    /// Makes a plan from reference recordings, which should be of faultless machines. The best preparation of the first
+    /// recording is used for all, and the columns are defined by the parameters of all of them. Options that `reading`
+    /// does not specify are fixed here. Recordings that cannot be read are left out; [`FleetReference::recordings`]
+    /// names the others.
     ///
-    /// Fails where the model has no meaning, or none of the recordings can be read and evaluated.
+    /// Fails if the model has faults, or none of the recordings can be read and evaluated.
     pub fn from_recordings(
         model: &Path,
         reading: &RecordingOptions,
@@ -126,8 +133,9 @@ impl FleetPlan {
             .map(|file| (file.path.display().to_string(), file.text.clone()))
             .collect();
         let path = model.display().to_string();
-        let mut last =
-            FleetFault::new("there is no reference recording; name one or more of sound machines");
+        let mut last = FleetFault::new(
+            "there is no reference recording; give one or more of faultless machines",
+        );
         let mut readable = reference.iter().filter_map(|path| {
             let read = derived.recording(path, reading);
             read.map_err(|error| last = error.into()).ok()
@@ -170,18 +178,19 @@ impl FleetPlan {
         Ok(plan)
     }
 
-    /// Reads a plan from its JSON; `name` is what messages call it.
+    /// Reads a plan from JSON; `name` is its name in messages.
     ///
-    /// Fails where it is none, or of another version.
+    /// Fails if the text is not a plan, or has another version.
     pub fn parse(name: &str, text: &str) -> Result<Self, FleetFault> {
         let plan: Self = serde_json::from_str(text).map_err(|error| {
             FleetFault::new(format!(
-                "{name} is no plan of a fleet: {error}; make one with `modelmill-fleet plan`"
+                "{name} is not a plan of a fleet: {error}; make one with `modelmill-fleet plan`"
             ))
         })?;
         if plan.version != VERSION {
             return Err(FleetFault::new(format!(
-                "{name} is a plan of version {}, and this program knows version {VERSION}; make it anew",
+                "{name} is a plan of version {}, but this program reads version {VERSION}; make the plan again with \
+                 `modelmill-fleet plan`",
                 plan.version
             )));
         }
@@ -190,13 +199,13 @@ impl FleetPlan {
 
     /// The plan as JSON.
     pub fn json(&self) -> String {
-        // Maps with text keys and finite numbers have a text.
+        // Serialisation cannot fail: all keys are texts.
         let mut text = serde_json::to_string(self).unwrap_or_default();
         text.push('\n');
         text
     }
 
-    /// How recordings are read.
+    /// The options for reading recordings. Recordings of a fleet are read without the audit.
     pub fn reading(&self) -> RecordingOptions {
         RecordingOptions {
             columns: self.columns.clone(),
@@ -209,14 +218,14 @@ impl FleetPlan {
         }
     }
 
-    /// What summaries of this plan bear, so that others are not added to them.
+    /// The checksum of the plan. Every summary has it, so that summaries of different plans are not added.
     pub fn mark(&self) -> u64 {
         crate::bytes::checksum(self.json().as_bytes())
     }
 
-    /// The model that is in the plan, derived, and all that is computed once.
+    /// Derives the model of the plan, and computes everything that recordings share.
     ///
-    /// Fails where the model has no meaning or the reference is of another.
+    /// Fails if the model has faults, or the reference belongs to another model.
     pub fn derive_model(&self) -> Result<FleetModel, FleetFault> {
         let mut files = PlanFiles {
             memory: MemoryFiles::default(),
@@ -234,21 +243,21 @@ impl FleetPlan {
             .map(ReferenceSums::moments)
             .collect();
         let sizes = sizes.ok_or_else(|| {
-            FleetFault::new("the plan's reference does not fit itself: its sums lack products; make it anew with `modelmill-fleet plan`")
+            FleetFault::new("the reference of the plan is inconsistent: its sums lack products; make the plan again with `modelmill-fleet plan`")
         })?;
         let ground = ReferenceFit::from_parts(&model, &self.reference.values, sizes)?;
         Ok(FleetModel::new(self.clone(), ground))
     }
 }
 
-/// A low-pass that is to leave the highest harmonic of a motion as it is stands so many times higher.
+/// Ratio of the cut-off to the highest harmonic of a motion, so that the low-pass does not change that harmonic.
 const CUTOFF_RATIO: f64 = 3.5;
-/// One sample is kept of so many as leave this many in a period of the cut-off.
+/// Samples per period of the cut-off that remain after decimation.
 const DECIMATION_RATIO: f64 = 8.0;
 
-/// The preparation with nothing left open: the cut-off and decimation that suit the first recording, by the filter that all can be
-/// given alike. Where the first is best taken for a Fourier series, which others need not share, a low-pass well above its highest
-/// harmonic stands in.
+/// A preparation with all values fixed: cut-off and decimation of the first recording, with a filter that can be
+/// applied to all. If a Fourier series is best for the first recording, others need not be periodic; then a low-pass
+/// well above its highest harmonic is used instead.
 fn fixed_preparation(
     chosen: &PreparedRecording,
     reading: &RecordingOptions,
@@ -257,7 +266,7 @@ fn fixed_preparation(
         .segments
         .first()
         .map(|stretch| &stretch.run)
-        .ok_or_else(|| FleetFault::new(format!("{} holds no samples", chosen.file())))?;
+        .ok_or_else(|| FleetFault::new(format!("{} has no samples", chosen.file())))?;
     let (prepared, asked) = (&run.prepared, &reading.preparation);
     let mut cutoff_hz = asked.cutoff_hz.or(prepared.cutoff_hz);
     let mut decimate = prepared.decimate.max(asked.decimate).max(1);
@@ -267,7 +276,8 @@ fn fixed_preparation(
             _ => 0.0,
         };
         let cutoff = CUTOFF_RATIO * highest;
-        // Beyond a quarter of the rate no filter can be designed; motion is there no more.
+        // The cut-off stays below a quarter of the sampling rate, where the filter can be designed; motion has lower
+        // frequencies.
         let cutoff = cutoff.min(0.2 * rate);
         let every = (1..=1_000_000)
             .take_while(|every| DECIMATION_RATIO * cutoff * f64::from(*every) <= rate)
@@ -290,7 +300,8 @@ fn fixed_preparation(
     })
 }
 
-/// For how long the readings of recordings stood still, at most.
+/// For each coordinate and drive the longest interval with a constant reading in any recording, as a share of that
+/// recording.
 fn standstill_shares(model: &Model, recordings: &[PreparedRecording]) -> Vec<(String, f64)> {
     let names = model.active_coordinates().into_iter().chain(model.drives());
     names

@@ -1,4 +1,5 @@
-//! The days of one robot: parameters over time, when something changed and stayed changed, and which sensors died.
+//! The history of one robot: summaries of its days go in. Parameters over time, permanent changes and dead sensors come
+//! out.
 
 use modelmill::runs::{FittedValue, ParameterStep, RunChange};
 use modelmill_identify::changes::{NormalEquations, UncertainValue, weighted_mean};
@@ -8,43 +9,43 @@ use crate::onset::clearest_onset;
 use crate::sensors::SensorFault;
 use crate::{BadRecording, FleetFault, FleetFit, FleetModel, FleetSummary};
 
-/// A parameter is told to have moved from so many deviations on.
+/// Smallest step of a parameter that is reported, in standard deviations.
 const CHANGE_LIMIT: f64 = 4.0;
 
 /// A day of a robot.
 #[derive(Clone, Debug)]
 pub struct RobotDay {
-    /// What it is called.
+    /// Its name, usually a date.
     pub name: String,
-    /// What its recordings say; `None` where none gave an answer.
+    /// Parameters from its recordings; `None` if none could be evaluated.
     pub fit: Option<FleetFit>,
-    /// Sensors that died in one of its recordings.
+    /// Sensors that were dead in one of its recordings.
     pub sensors: Vec<SensorFault>,
-    /// Recordings that gave no answer.
+    /// Recordings that could not be evaluated.
     pub bad: Vec<BadRecording>,
 }
 
-/// A day from which on something was different and stayed so.
+/// A permanent change of a robot.
 #[derive(Clone, Debug)]
 pub struct RobotChange {
-    /// The day, by place.
+    /// Index of the first day with the change.
     pub day: usize,
-    /// Base parameters that changed, by place, the clearest first: value before and since, with deviations.
+    /// Base parameters that changed, the most significant first: values before and since, with standard deviations.
     pub steps: Vec<ParameterStep>,
-    /// By how much the parameter that told it grows each day, in its unit, where it grows rather than stepped.
+    /// Growth per day of the parameter by which the change was detected, in its unit; `None` for a step.
     pub per_day: Option<f64>,
-    /// What it is in physics, the clearest first.
+    /// The physical changes that explain it, the most significant first.
     pub changes: Vec<RunChange>,
 }
 
-/// A sensor that died, and from which day on.
+/// A dead sensor, with its first day.
 #[derive(Clone, Debug)]
 pub struct DeadSensor {
     /// The coordinate or drive.
     pub sensor: String,
-    /// The first day.
+    /// Index of the first day.
     pub day: usize,
-    /// On how many of the days since then.
+    /// Number of days on which it was dead.
     pub days: usize,
     /// Its first fault.
     pub first: SensorFault,
@@ -53,23 +54,23 @@ pub struct DeadSensor {
 /// A robot over its days.
 #[derive(Clone, Debug)]
 pub struct RobotHistory {
-    /// What it is called.
+    /// Its name.
     pub name: String,
-    /// Its days in order.
+    /// Its days in order of time.
     pub days: Vec<RobotDay>,
-    /// When something changed.
+    /// Permanent changes, in order of time.
     pub changes: Vec<RobotChange>,
-    /// Sensors that died.
+    /// Dead sensors.
     pub dead: Vec<DeadSensor>,
-    /// The recordings before the first change: what it is held against others by.
+    /// The sum of the recordings before the first change, for the comparison with other robots.
     pub before: FleetSummary,
-    /// Samples of all its recordings.
+    /// Number of samples of all its recordings.
     pub samples: u64,
 }
 
-/// Looks at the days of a robot, which are in order of time, each with the summary of its recordings.
+/// Evaluates the days of a robot, in order of time, each with the summary of its recordings.
 ///
-/// Fails where summaries are of another plan.
+/// Fails if summaries belong to another plan.
 pub fn robot_history(
     ground: &FleetModel,
     name: &str,
@@ -87,7 +88,7 @@ pub fn robot_history(
             bad: summary.bad.clone(),
         })
         .collect();
-    // Days without an answer have no place among the runs.
+    // Days without a usable recording are left out of the search for changes.
     let known: Vec<usize> = (0..days.len())
         .filter(|k| looked_at[*k].fit.is_some())
         .collect();
@@ -119,11 +120,11 @@ pub fn robot_history(
     })
 }
 
-/// A day as a run: base parameters, sums, and by what its parts differ.
+/// A day as a run: base parameters, normal equations of all columns, and the scatter within its recordings.
 type DayRun = (Vec<FittedValue>, NormalEquations, f64);
 
-/// When something began, over the days that gave an answer; what is found splits them, and both sides are looked at again. What
-/// physics has no name for is no change of the machine, and stands in the values of the days alone.
+/// Searches for changes by binary segmentation: each change that is found splits the days, and both sides are searched
+/// again. Changes without a physical explanation are not reported; they remain visible in the daily values.
 fn robot_changes(ground: &FleetModel, runs: &[DayRun], known: &[usize]) -> Vec<RobotChange> {
     let mut within: Vec<f64> = runs.iter().map(|run| run.2).collect();
     within.sort_by(f64::total_cmp);
@@ -138,7 +139,7 @@ fn robot_changes(ground: &FleetModel, runs: &[DayRun], known: &[usize]) -> Vec<R
         };
         let at = window.start + since.day;
         open.push(window.start..at);
-        // Growth goes on to the end of its window.
+        // A ramp continues to the end of its window, so only a step leaves days to search.
         if since.per_day.is_none() {
             open.push(at..window.end);
         }
@@ -151,7 +152,7 @@ fn robot_changes(ground: &FleetModel, runs: &[DayRun], known: &[usize]) -> Vec<R
     all
 }
 
-/// The clearest onset of any parameter, if physics has a name for what began there.
+/// The most significant onset of any parameter, if a physical change explains it.
 fn clearest_change(ground: &FleetModel, runs: &[DayRun], within: f64) -> Option<RobotChange> {
     let series = |k: usize| -> Vec<Option<UncertainValue>> {
         let told = runs.iter().map(|run| {
@@ -198,11 +199,12 @@ fn clearest_change(ground: &FleetModel, runs: &[DayRun], within: f64) -> Option<
     })
 }
 
+/// The size of a step in standard deviations of the difference.
 fn step_significance(step: &ParameterStep) -> f64 {
     (step.now.value - step.before.value).abs() / step.before.difference_deviation(step.now)
 }
 
-/// Sensors that died, each with its first day.
+/// Dead sensors, each with its first day and the number of days.
 fn dead_sensors(days: &[RobotDay]) -> Vec<DeadSensor> {
     let mut all: Vec<DeadSensor> = Vec::new();
     for (k, day) in days.iter().enumerate() {
@@ -227,12 +229,12 @@ fn dead_sensors(days: &[RobotDay]) -> Vec<DeadSensor> {
 }
 
 impl RobotHistory {
-    /// Whether nothing is told of it.
+    /// Whether it has neither changes nor dead sensors.
     pub fn is_quiet(&self) -> bool {
         self.changes.is_empty() && self.dead.is_empty()
     }
 
-    /// All that was found as one JSON object: `values` and `std` of each day are in the order of the parameters.
+    /// All results as one JSON object: `values` and `std` of each day are in the order of the parameters.
     pub fn json(&self, ground: &FleetModel) -> Value {
         let infos = ground.parameters();
         let days = self.days.iter().map(|day| {
@@ -282,7 +284,7 @@ impl RobotHistory {
     }
 }
 
-/// A change in physics as JSON, named as `runs` names it.
+/// A physical change as JSON, with the names of the command `runs`.
 pub(crate) fn change_json(change: &RunChange) -> Value {
     let (kind, at, values) = change.change.parts(change.unit);
     let values = values.into_iter().map(|(name, estimate, unit)| {

@@ -1,36 +1,36 @@
-//! Sensors that died: a reading that stands still while others move.
+//! Detects dead sensors: readings of a recording go in, sensors with a constant reading while others change come out.
 
 use serde::{Deserialize, Serialize};
 
-/// A reading stands still for so much more of a recording than it does on sound machines.
+/// Share of a recording by which the constant interval of a dead sensor exceeds that of the reference recordings.
 const FROZEN_MARGIN: f64 = 0.2;
 
-/// A sensor whose reading stood still.
+/// A sensor with a constant reading.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SensorFault {
-    /// What messages call the recording.
+    /// Name of the recording.
     pub recording: String,
     /// The coordinate or drive.
     pub of: String,
-    /// Whether it is a drive's force; the forces of that drive then count in no equation.
+    /// Whether it is a drive's force; that drive is then left out of all equations of the recording.
     pub is_force: bool,
-    /// For how long its reading stood still at a stretch, as a part of the recording.
+    /// Longest interval with a constant reading, as a share of the recording.
     pub still: f64,
-    /// From when on, s.
+    /// Start of this interval, s.
     pub since: f64,
 }
 
-/// How long a reading stood still.
+/// The longest interval with a constant reading.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FrozenReading {
-    /// The first sample of the longest stretch of equal readings.
+    /// Index of its first sample.
     pub from: usize,
-    /// How many samples that is.
+    /// Number of its samples.
     pub samples: usize,
 }
 
 impl FrozenReading {
-    /// The longest stretch of equal readings.
+    /// The longest interval of equal values.
     pub fn from_values(values: &[f64]) -> Self {
         let mut longest = Self {
             from: 0,
@@ -52,14 +52,14 @@ impl FrozenReading {
         longest
     }
 
-    /// The longest stretch of equal readings, as a part of all.
+    /// The longest interval of equal values, as a share of all values.
     pub fn longest_share(values: &[f64]) -> f64 {
         Self::from_values(values).samples as f64 / values.len().max(1) as f64
     }
 }
 
-/// Which sensors died; `columns` are the readings of coordinates and drives, each with for how long it stands still on sound
-/// machines, in order of time.
+/// The dead sensors of a recording. `columns` are the coordinates and drives: name, whether it is a force, the values
+/// in order of time, and the share of a reference recording with a constant reading.
 pub(crate) fn sensor_faults(
     recording: &str,
     time: &[f64],
@@ -74,7 +74,7 @@ pub(crate) fn sensor_faults(
             continue;
         }
         let within = silence.from..silence.from + silence.samples;
-        // Where nothing moves, nothing died: the machine stands.
+        // If no coordinate moves in this interval, the machine is at standstill and the sensor is not dead.
         let moves = columns
             .iter()
             .enumerate()

@@ -1,4 +1,5 @@
-//! One recording, or many, as sums: what a robot, a day or a part says, in some kB.
+//! The summary of one or many recordings: additive statistics of some kB, from which parameters and changes are
+//! computed.
 
 use modelmill_identify::RFactor;
 use modelmill_identify::changes::NormalEquations;
@@ -7,49 +8,50 @@ use crate::FleetFault;
 use crate::bytes::{SummaryReader, SummaryWriter};
 use crate::sensors::SensorFault;
 
-/// The first bytes of a summary, then its version.
+/// The first bytes of a summary.
 const BEGIN: &[u8; 4] = b"MMFS";
+/// Version of the binary format, after the first bytes.
 const VERSION: u64 = 1;
 
-/// A recording that gave no answer.
+/// A recording that could not be evaluated.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct BadRecording {
-    /// What messages call it.
+    /// Its name.
     pub recording: String,
-    /// Why.
+    /// The reason, one sentence.
     pub says: String,
 }
 
-/// Sums over the rows of recordings. [`Summary::merge`] adds them.
+/// Additive statistics over the rows of recordings. [`FleetSummary::merge`] adds them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FleetSummary {
-    /// [`Plan::mark`](crate::Plan::mark) of the plan by which it was made.
+    /// The checksum of its plan, [`FleetPlan::mark`](crate::FleetPlan::mark).
     pub mark: u64,
-    /// Recordings that gave an answer.
+    /// Number of recordings that were evaluated.
     pub recordings: u64,
-    /// Their samples, as they were recorded.
+    /// Number of their samples, before decimation.
     pub samples: u64,
-    /// How long they are, s.
+    /// Their total duration, s.
     pub seconds: f64,
-    /// Products of all columns, over rows of variance 1.
+    /// Normal equations of all columns, over rows scaled to variance 1.
     pub all_columns: NormalEquations,
-    /// The triangle of the base columns over the same rows; `None` without recordings.
+    /// The R factor of the base columns over the same rows; `None` without recordings.
     pub base: Option<RFactor>,
-    /// By what parts of one recording differ among themselves, at most.
+    /// The largest scatter between parts of one recording.
     pub within: f64,
-    /// For each drive the sum over samples of the square of what the recording's own parameters leave of its force, as a part of
-    /// it.
+    /// For each drive the squared relative residual of its force with the recording's own parameters, times the number
+    /// of samples.
     pub residual_squares: Vec<f64>,
-    /// Sensors that died, by recording and name.
+    /// Dead sensors, sorted by recording and name.
     pub sensors: Vec<SensorFault>,
-    /// Remarks, such as contacts and pushes, each with its recording.
+    /// Recording and text of each remark, such as contacts and pushes.
     pub remarks: Vec<(String, String)>,
-    /// Recordings that gave none, by name.
+    /// Recordings that could not be evaluated, sorted by name.
     pub bad: Vec<BadRecording>,
 }
 
 impl FleetSummary {
-    /// Of no recordings, for so many columns and drives.
+    /// The summary of no recordings, for a number of columns and drives.
     pub(crate) fn empty(mark: u64, columns: usize, drives: usize) -> Self {
         Self {
             mark,
@@ -66,13 +68,14 @@ impl FleetSummary {
         }
     }
 
-    /// Adds the recordings of another one. The order in which summaries are added changes nothing but the last digits.
+    /// Adds the recordings of another summary. The order of additions changes rounding only.
     ///
-    /// Fails where the other is of another plan.
+    /// Fails if the other summary belongs to another plan.
     pub fn merge(&mut self, other: &Self) -> Result<(), FleetFault> {
         if self.mark != other.mark || self.all_columns.rhs.len() != other.all_columns.rhs.len() {
             return Err(FleetFault::new(
-                "summaries of two plans do not add: their columns mean different things; make all of them with one plan",
+                "summaries of different plans cannot be added, because their columns have different meanings; make all of them \
+                 with one plan",
             ));
         }
         self.base = match (self.base.take(), &other.base) {
@@ -91,6 +94,7 @@ impl FleetSummary {
         {
             *mine += theirs;
         }
+        // Sorted lists do not depend on the order of additions.
         self.sensors.extend(other.sensors.iter().cloned());
         self.sensors
             .sort_by(|a, b| (&a.recording, &a.of).cmp(&(&b.recording, &b.of)));
@@ -101,13 +105,14 @@ impl FleetSummary {
         Ok(())
     }
 
-    /// What the recordings' own parameters leave of the force of a drive, as a part of it: the effective value over all samples.
+    /// The residual of a drive's force relative to the force, with the parameters of each recording: rms over all
+    /// samples.
     pub fn residual_share(&self, drive: usize) -> f64 {
         let squares = self.residual_squares.get(drive).copied().unwrap_or(0.0);
         (squares / (self.samples as f64).max(1.0)).sqrt()
     }
 
-    /// The summary as bytes; what [`Summary::of_bytes`] reads of them has the same bytes again.
+    /// The summary as bytes, for [`FleetSummary::from_bytes`].
     pub fn bytes(&self) -> Vec<u8> {
         let mut to = SummaryWriter::default();
         to.bytes(BEGIN);
@@ -150,14 +155,14 @@ impl FleetSummary {
         to.finish()
     }
 
-    /// Reads what [`Summary::bytes`] wrote.
+    /// Reads the bytes of [`FleetSummary::bytes`].
     ///
-    /// Fails where bytes are missing or were changed, and where another version wrote them.
+    /// Fails if bytes are missing or were changed, or have another version.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, FleetFault> {
         let what = "a summary";
         if !bytes.starts_with(BEGIN) {
             return Err(FleetFault::new(
-                "these bytes are no summary of recordings; give what `modelmill_summarise` or `summarise` made",
+                "these bytes are not a summary of recordings; give the result of `modelmill_summarise` or `summarise`",
             ));
         }
         let mut from = SummaryReader::new(bytes, what)?;
@@ -165,7 +170,7 @@ impl FleetSummary {
         let version = from.integer()?;
         if version != VERSION {
             return Err(FleetFault::new(format!(
-                "this summary is of version {version}, and this program knows version {VERSION}; summarise the recordings again"
+                "this summary has version {version}, but this program reads version {VERSION}; summarise the recordings again"
             )));
         }
         let mark = from.integer()?;
@@ -173,10 +178,10 @@ impl FleetSummary {
         let samples = from.integer()?;
         let seconds = from.float()?;
         let columns = from.size()?;
-        // A column costs bytes only where it is not zero; no model has more than this.
+        // Zero columns take no bytes, so the number of columns is limited here, to protect memory.
         if columns > 100_000 {
             return Err(FleetFault::new(format!(
-                "{what} claims {columns} columns, which no model has; make it again"
+                "{what} has {columns} columns, more than any model; make it again"
             )));
         }
         let whole = from.moments(columns)?;

@@ -90,7 +90,7 @@ async fn faults_are_told(ground: &Arc<Ground>, store: Arc<dyn ObjectStore>) {
     let faults = [
         (
             "SELECT modelmill_identify(arrow_cast('no summary', 'Binary'))",
-            "no summary of recordings",
+            "not a summary of recordings",
         ),
         (
             "SELECT * FROM modelmill_recordings('s3://fleet/site/elsewhere')",
