@@ -94,7 +94,7 @@ async fn faults_are_told(ground: &Arc<Ground>, store: Arc<dyn ObjectStore>) {
         ),
         (
             "SELECT * FROM modelmill_recordings('s3://fleet/site/elsewhere')",
-            "holds no recordings",
+            "has no recordings",
         ),
         (
             "SELECT * FROM modelmill_recordings('s3://unknown/recordings')",

@@ -1,9 +1,10 @@
-//! A fleet with a truth: robots of one kind that differ a little, some of which wear, carry another load from a day on, or lose a
-//! sensor.
+//! Simulates a fleet with known changes: robots of one kind that differ slightly. Some wear, carry another load from a
+//! day on, or lose a sensor.
 //!
-//! The five-bar stands in as a rig, so that nothing of its mechanics is the mill's: the rig goes along each motion once, and
-//! says what each mass, first moment and inertia of a body adds to the forces, which are linear in them. A robot is a set of
-//! these numbers, with friction; a recording is one of the motions from some moment on, through the rig's sensors.
+//! The robot is a five-bar, simulated as a rig, so that its mechanics are independent of the derived model. The rig
+//! follows each motion once and gives the contribution of each mass, first moment and inertia of a body to the forces,
+//! which are linear in them. A robot is a set of these numbers, with friction. A recording is one of the motions from
+//! some moment on, through the rig's sensors.
 
 use std::fs;
 use std::io::BufWriter;
@@ -23,8 +24,9 @@ use serde_json::{Value, json};
 
 /// The machine as a rig.
 const RIG: &str = include_str!("../five_bar.rig.toml");
-/// The bundled model, and what the fleet's model has besides.
+/// The bundled model.
 const MODEL: &str = include_str!("../../../model-spec/models/five_bar.toml");
+/// The model of the fleet: the bundled one with friction.
 const FRICTION: &str = r#"# The bundled five-bar with friction of both motors.
 schema = 1
 name = "five_bar_friction"
@@ -55,90 +57,106 @@ at = ["motor_right"]
 parameters = { Fv = { name = "Fv_right", nominal = 0.6 } }
 "#;
 
-/// ZZ, MX, MY and M of each link about its joint, as the bundled model has them.
+/// ZZ, MX, MY and M of each link about its joint, as in the bundled model.
 const LINKS: [[f64; 4]; 4] = [
     [0.14, 0.45, 0.01, 2.0],
     [0.13, 0.33, 0.005, 1.1],
     [0.15, 0.47, -0.01, 2.1],
     [0.14, 0.36, 0.004, 1.2],
 ];
-/// Dry friction, N m, and viscous friction, N m s/rad, of the motors.
+/// Coulomb friction of the motors, N m.
 const DRY: [f64; 2] = [0.8, 0.7];
+/// Viscous friction of the motors, N m s/rad.
 const VISCOUS: [f64; 2] = [0.5, 0.6];
-/// From the elbow to the tip, m.
+/// Distance from the elbow to the tip, m.
 const TO_TIP: f64 = 0.6;
-/// Each motion repeats itself after so long, s.
+/// Period of each motion, s.
 const PERIOD: f64 = 6.0;
+/// Harmonics of each motion.
 const HARMONICS: usize = 6;
+/// Number of motions in the fleet.
 const MOTIONS: usize = 4;
-/// About which angles motors move, and how far at most, rad.
+/// Mean angles of the motors, rad.
 const MIDDLE: [f64; 2] = [1.95, 1.19];
+/// Largest deflection from the mean angles, rad.
 const REACH: f64 = 0.3;
-/// Robots differ by this part in each number, deviations.
+/// Relative standard deviation of masses and inertias between robots.
 const ROBOTS: f64 = 0.01;
+/// Relative standard deviation of friction between robots.
 const FRICTIONS: f64 = 0.05;
-/// Friction of one robot differs from recording to recording by this part.
+/// Relative standard deviation of friction between recordings of one robot.
 const DAILY: f64 = 0.005;
-/// Encoders: 17 bits; noise in rad. Torques: noise in N m.
+/// Encoders: 17 bits, noise in rad.
 const ENCODER: SensorChannel = SensorChannel {
     noise: 2e-5,
     resolution: std::f64::consts::TAU / 131_072.0,
     delay: 0.0,
 };
+/// Torque sensors, noise and resolution in N m.
 const TORQUE: SensorChannel = SensorChannel {
     noise: 0.05,
     resolution: 1.0 / 1024.0,
     delay: 0.0,
 };
 
-/// How large a fleet, and from which seed.
+/// Size and seed of a fleet.
 #[derive(Clone, Debug)]
 pub struct FleetSize {
-    /// How many robots.
+    /// Number of robots.
     pub robots: usize,
-    /// On how many days, six or more.
+    /// Number of days, six or more.
     pub days: usize,
-    /// Recordings of a robot on a day.
+    /// Recordings per robot and day.
     pub per_day: usize,
-    /// How long each is, s.
+    /// Duration of each recording, s.
     pub seconds: f64,
-    /// Samples a second.
+    /// Sampling rate, Hz.
     pub rate: f64,
-    /// Another seed makes another fleet.
+    /// Seed; another seed gives another fleet.
     pub seed: u64,
-    /// How many recordings are cut off.
+    /// Number of recordings that are cut off.
     pub bad: usize,
-    /// How large changes of friction and load are: 1 as in the guide, less for smaller ones.
+    /// Size of the changes of friction and load: 1 as in the guide, less for smaller ones.
     pub changes: f64,
 }
 
-/// What a robot has beyond small differences.
+/// The known change of a robot.
 #[derive(Clone, Debug)]
 enum PlantedChange {
+    /// No change.
     Nothing,
-    /// Friction of a motor grows by so large a part of its own each day, from a day on.
+    /// Friction of a motor grows every day by the share `per_day` of its first value, from a day on.
     Wear {
+        /// Index of the motor.
         drive: usize,
+        /// Index of the first day.
         day: usize,
+        /// Growth per day relative to the first value.
         per_day: f64,
     },
-    /// A mass at the tip, kg, from a day on.
+    /// A mass at the tip from a day on.
     Load {
+        /// Index of the first day.
         day: usize,
+        /// Mass, kg.
         mass: f64,
     },
-    /// The torque sensor of a motor stands still from a day on.
+    /// The torque sensor of a motor is constant from a day on.
     Dead {
+        /// Index of the motor.
         drive: usize,
+        /// Index of the first day.
         day: usize,
     },
-    /// A mass at the tip, kg, from the first day on: it differs from the others.
+    /// A mass at the tip on all days, so that the robot differs from the others.
     Odd {
+        /// Mass, kg.
         mass: f64,
     },
 }
 
 impl PlantedChange {
+    /// The change as JSON for `truth.json`; `days` are the names of the days.
     fn json(&self, days: &[String]) -> Value {
         let motor = |drive: &usize| ["motor_left", "motor_right"][*drive];
         match self {
@@ -161,17 +179,20 @@ impl PlantedChange {
     }
 }
 
-/// One period of a motion: positions and rates of the motors, and what each number of each link adds to their torques.
+/// One period of a motion, with the contribution of each number of each link to the torques.
 struct FleetMotion {
+    /// Positions of the motors, rad.
     q: [Vec<f64>; 2],
+    /// Rates of the motors, rad/s.
     qd: [Vec<f64>; 2],
-    /// `[link][number][drive][sample]`.
+    /// `[link][number][drive][sample]`: torque for a number (ZZ, MX, MY, M) of one.
     columns: Vec<[[Vec<f64>; 2]; 4]>,
 }
 
-/// Makes a fleet in a folder: a model file, Parquet by robot, day and recording, and the truth, which comes back too.
+/// Writes a fleet into a folder: a model file, Parquet by robot, day and recording, and `truth.json`, which is also
+/// returned.
 ///
-/// Fails where the size makes no fleet, or the folder cannot be written to.
+/// Fails if the size is too small, or the folder cannot be written to.
 pub fn generate(folder: &Path, size: &FleetSize) -> Result<Value, FleetFault> {
     let is_large_enough = size.robots > 0
         && size.days >= 6
@@ -181,7 +202,7 @@ pub fn generate(folder: &Path, size: &FleetSize) -> Result<Value, FleetFault> {
         && size.changes >= 0.0;
     if !is_large_enough {
         return Err(FleetFault::new(
-            "a fleet has one robot or more, six days or more, one recording a day or more, each of 5 s or more at 20 Hz or more, and no changes of less than nothing",
+            "the fleet is too small: at least one robot, six days, one recording per day of 5 s at 20 Hz, and changes of at least 0 are needed",
         ));
     }
     write_text(&folder.join("five_bar.toml"), MODEL)?;
@@ -236,7 +257,7 @@ pub fn generate(folder: &Path, size: &FleetSize) -> Result<Value, FleetFault> {
     Ok(truth)
 }
 
-/// The whole number nearest to one that is none or more.
+/// A number of at least zero, rounded to an integer.
 #[allow(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
@@ -246,7 +267,7 @@ fn rounded_count(x: f64) -> usize {
     x.round() as usize
 }
 
-/// One of so many places, all alike.
+/// A random index below `n`, uniformly distributed.
 #[allow(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
@@ -256,11 +277,12 @@ fn random_index(noise: &mut GaussianNoise, n: usize) -> usize {
     ((noise.uniform() * n as f64) as usize).min(n - 1)
 }
 
+/// Number of samples of a recording.
 fn samples(size: &FleetSize) -> usize {
     rounded_count(size.seconds * size.rate)
 }
 
-/// Days from the first of March 2026 on.
+/// The date of a day, counted from 1 March 2026.
 fn date(day: usize) -> String {
     let lengths = [31, 30, 31, 30, 31, 31, 30, 31, 30, 31];
     let (mut month, mut left) = (3, day);
@@ -274,6 +296,7 @@ fn date(day: usize) -> String {
     format!("2026-{month:02}-{:02}", left + 1)
 }
 
+/// Writes a text file, and creates its folder.
 fn write_text(path: &Path, text: &str) -> Result<(), FleetFault> {
     if let Some(folder) = path.parent() {
         fs::create_dir_all(folder).map_err(|error| write_fault(folder, &error))?;
@@ -281,14 +304,15 @@ fn write_text(path: &Path, text: &str) -> Result<(), FleetFault> {
     fs::write(path, text).map_err(|error| write_fault(path, &error))
 }
 
+/// The fault of a file that cannot be written.
 fn write_fault(path: &Path, error: &dyn std::fmt::Display) -> FleetFault {
     FleetFault::new(format!(
-        "{} cannot be written: {error}; choose another folder, or make room",
+        "{} cannot be written: {error}; choose another folder, or free disk space",
         path.display()
     ))
 }
 
-/// A motion, and the forces of the rig along it.
+/// Motion `k` of the fleet: a random Fourier series for each motor, and the torques of the rig along it.
 fn motion(size: &FleetSize, k: usize) -> Result<FleetMotion, FleetFault> {
     let files = modelmill::files::MemoryFiles::default();
     let mut rig = modelmill_rig::load("five_bar.rig.toml", RIG, &files)
@@ -324,7 +348,7 @@ fn motion(size: &FleetSize, k: usize) -> Result<FleetMotion, FleetFault> {
         state
     };
     let n = rounded_count(PERIOD * size.rate);
-    // The motions of all bodies once; then forces for one number after the other.
+    // Track the motion of all bodies once; then compute the torques for one number after the other.
     let tracked = rig.clone();
     let mut tracker = RigTracker::new(&tracked).map_err(FleetFault::new)?;
     let mut one = FleetMotion {
@@ -351,7 +375,7 @@ fn motion(size: &FleetSize, k: usize) -> Result<FleetMotion, FleetFault> {
                 set_link(&mut rig.bodies[link], [0.0; 4]);
                 found
             };
-            // ZZ, MX, MY, M.
+            // Torques are linear in ZZ, MX, MY and M. First moments need a mass, so their columns are differences.
             let zz = of([1.0, 0.0, 0.0, 0.0])?;
             let m = of([0.0, 0.0, 0.0, 1.0])?;
             let with_x = of([1.0, 1.0, 0.0, 1.0])?;
@@ -370,7 +394,7 @@ fn motion(size: &FleetSize, k: usize) -> Result<FleetMotion, FleetFault> {
     Ok(one)
 }
 
-/// Gives a body of the rig the numbers ZZ, MX, MY and M about its joint.
+/// Sets the numbers ZZ, MX, MY and M of a body of the rig, about its joint.
 fn set_link(body: &mut RigBody, [zz, mx, my, m]: [f64; 4]) {
     body.mass = m;
     body.centre = if m == 0.0 {
@@ -382,13 +406,17 @@ fn set_link(body: &mut RigBody, [zz, mx, my, m]: [f64; 4]) {
     body.inertia = Matrix3::from_diagonal(&Vector3::new(0.0, 0.0, about_centre));
 }
 
-/// Numbers of a robot.
+/// Parameters of a robot.
 struct RobotParameters {
+    /// ZZ, MX, MY and M of each link.
     links: [[f64; 4]; 4],
+    /// Coulomb friction of each motor, N m.
     dry: [f64; 2],
+    /// Viscous friction of each motor, N m s/rad.
     viscous: [f64; 2],
 }
 
+/// Random parameters of robot `r` around those of the model.
 fn robot_parameters(size: &FleetSize, r: usize) -> RobotParameters {
     let mut noise = GaussianNoise::new(size.seed, 10_000 + r as u64);
     let mut links = LINKS;
@@ -406,11 +434,12 @@ fn robot_parameters(size: &FleetSize, r: usize) -> RobotParameters {
     }
 }
 
-/// Of a hundred robots three wear, three get a load, two lose a sensor and one is odd.
+/// The change of robot `r`: of a hundred robots three wear, three get a load, two lose a sensor, and one has a load on
+/// all days.
 fn planted_change(size: &FleetSize, r: usize) -> PlantedChange {
     let mut noise = GaussianNoise::new(size.seed, 5_000_000 + r as u64);
     let drive = usize::from(noise.uniform() < 0.5);
-    // Two days before and three after, so that there is something to tell.
+    // At least two days before and some after, so that the change can be detected.
     let day = 2 + random_index(&mut noise, size.days - 4);
     let much = noise.uniform();
     // Small fleets have one of each as well.
@@ -432,7 +461,7 @@ fn planted_change(size: &FleetSize, r: usize) -> PlantedChange {
     }
 }
 
-/// Which recordings are cut off, as by a full disk.
+/// Robot, day and number of the recordings that are cut off, as by a full disk.
 fn bad_recordings(size: &FleetSize) -> Vec<(usize, usize, usize)> {
     let mut noise = GaussianNoise::new(size.seed, 9_000_000);
     let mut place = |n: usize| random_index(&mut noise, n);
@@ -444,14 +473,15 @@ fn bad_recordings(size: &FleetSize) -> Vec<(usize, usize, usize)> {
     all
 }
 
-/// Cuts a file off.
+/// Cuts off the last third of a file.
 fn truncate_file(path: &Path) -> Result<(), FleetFault> {
     let file = fs::OpenOptions::new().write(true).open(path);
     let cut = file.and_then(|file| file.set_len(file.metadata()?.len() * 2 / 3));
     cut.map_err(|error| write_fault(path, &error))
 }
 
-/// Writes one recording.
+/// Writes recording `k` of robot `r` on a day: torques from its parameters and change, then noise and resolution of the
+/// sensors.
 fn write_recording(
     path: &Path,
     size: &FleetSize,
@@ -489,7 +519,7 @@ fn write_recording(
     links[1][0] += load * TO_TIP * TO_TIP;
     links[1][1] += load * TO_TIP;
     links[1][3] += load;
-    // One period without noise.
+    // Torques over one period, without noise.
     let torque: Vec<Vec<f64>> = (0..2)
         .map(|d| {
             let mut sum: Vec<f64> = (motion.qd[d].iter())
@@ -521,7 +551,7 @@ fn write_recording(
         }
     }
     if let Some(drive) = dead {
-        // It dies a tenth into the first recording of its day, and keeps its last reading.
+        // The sensor fails after a tenth of the first recording of its first day, and keeps its last reading.
         let from = match planted {
             PlantedChange::Dead { day: first, .. } if day == *first && k == 0 => all / 10,
             _ => 0,
@@ -532,11 +562,12 @@ fn write_recording(
     write_parquet(path, &time, &positions, &torques)
 }
 
+/// The sign of a number; zero for zero.
 fn sign(x: f64) -> f64 {
     if x == 0.0 { 0.0 } else { x.signum() }
 }
 
-/// The columns as Parquet.
+/// Writes the columns as Parquet: time in s, positions in rad, torques in N m.
 fn write_parquet(
     path: &Path,
     time: &[f64],

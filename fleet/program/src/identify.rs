@@ -1,5 +1,6 @@
-//! A folder of recordings to results: every recording is summed up once, robots are looked at one after the other, and then held
-//! against each other. Memory holds the summaries of the robots that are looked at just now, and one small summary of each.
+//! Evaluates a folder of recordings: each recording is summarised once, each robot is evaluated over its days, and then
+//! robots are compared with each other. In memory are the summaries of the robots that are being evaluated, and one
+//! small summary of each other.
 
 use std::fs;
 use std::path::Path;
@@ -17,34 +18,41 @@ use serde_json::{Value, json};
 use crate::page;
 use crate::state::SummaryStore;
 
-/// Robots of which a plan is made.
+/// Number of robots whose recordings are used for a new plan.
 const REFERENCE: usize = 8;
 
-/// What is asked.
+/// Files and options of a run.
 pub struct FleetRequest<'a> {
     /// The model file.
     pub model: &'a Path,
     /// The folder of recordings.
     pub recordings: &'a Path,
-    /// Where states, results and page go.
+    /// Folder for summaries, results and page.
     pub out: &'a Path,
-    /// The plan; made from recordings of several robots where there is none.
+    /// The plan; if not given, one is made from recordings of several robots.
     pub plan: Option<&'a Path>,
-    /// How recordings are read, where no plan says it.
+    /// How recordings are read, if there is no plan.
     pub reading: &'a RecordingOptions,
 }
 
-/// What was found.
+/// Results of a fleet.
 pub(crate) struct FleetResults {
+    /// The plan with its derived model.
     pub(crate) ground: FleetModel,
+    /// The robots over their days.
     pub(crate) robots: Vec<RobotHistory>,
+    /// The robots before their first change, in the same order.
     pub(crate) ones: Vec<RobotSummary>,
+    /// Usual values and robots that differ.
     pub(crate) outliers: modelmill_fleet::outliers::FleetOutliers,
+    /// Number of recordings in the folder.
     pub(crate) recordings: usize,
+    /// Number of samples of all recordings that were evaluated.
     pub(crate) samples: u64,
 }
 
 impl FleetResults {
+    /// Recordings that could not be evaluated, of all robots.
     pub(crate) fn bad(&self) -> impl Iterator<Item = &modelmill_fleet::BadRecording> {
         self.robots
             .iter()
@@ -52,16 +60,16 @@ impl FleetResults {
     }
 }
 
-/// Identifies a fleet; the result is what is said in the end.
+/// Evaluates a fleet, writes `results.json` and `fleet.html`, and returns a text for the terminal.
 ///
-/// Fails where the folder holds no recordings, the model has no meaning, or results cannot be written.
+/// Fails if the folder has no recordings, the model has faults, or results cannot be written.
 pub fn identify(asked: &FleetRequest<'_>) -> Result<String, FleetFault> {
     let begin = Instant::now();
     let robots = folder::robots(asked.recordings)?;
     let states = asked.out.join("state");
     fs::create_dir_all(&states).map_err(|error| {
         FleetFault::new(format!(
-            "{} cannot be made: {error}; choose another place",
+            "{} cannot be created: {error}; choose another folder with `--out`",
             states.display()
         ))
     })?;
@@ -71,6 +79,7 @@ pub fn identify(asked: &FleetRequest<'_>) -> Result<String, FleetFault> {
     )?;
     let ground = plan.derive_model()?;
     let total: usize = robots.values().map(Vec::len).sum();
+    // Counters for the progress and for the summaries that were stored by an earlier run.
     let [done, kept_ones] = [AtomicUsize::new(0), AtomicUsize::new(0)];
     let planned = begin.elapsed();
     let looked_at: Vec<RobotHistory> = robots
@@ -113,7 +122,7 @@ pub fn identify(asked: &FleetRequest<'_>) -> Result<String, FleetFault> {
     let seconds = summed.saturating_sub(planned).as_secs_f64();
     let rate = found.samples as f64 * (total - kept) as f64 / total as f64 / seconds.max(1e-9);
     Ok(format!(
-        "{}\n{} recordings, {} of which were done before; {:.3e} samples; {seconds:.1} s to sum them up{}; {:.1} s in all; \
+        "{}\n{} recordings, {} of which were done before; {:.3e} samples; {seconds:.1} s to summarise them{}; {:.1} s in total; \
          at most {} in memory\n{} and {} written\n",
         summary_sentence(&found),
         total,
@@ -131,7 +140,7 @@ pub fn identify(asked: &FleetRequest<'_>) -> Result<String, FleetFault> {
     ))
 }
 
-/// In one sentence.
+/// The results in one sentence.
 pub(crate) fn summary_sentence(found: &FleetResults) -> String {
     let changed = found
         .robots
@@ -144,14 +153,14 @@ pub(crate) fn summary_sentence(found: &FleetResults) -> String {
         .filter(|robot| !robot.dead.is_empty())
         .count();
     format!(
-        "{} robots: {changed} changed on some day, {dead} lost a sensor, {} differ from the others; {} recordings gave no answer",
+        "{} robots: {changed} changed on some day, {dead} lost a sensor, {} differ from the others; {} recordings gave no result",
         found.robots.len(),
         found.outliers.found.len(),
         found.bad().count()
     )
 }
 
-/// The most memory that the process has had, in words; Linux says it.
+/// The largest memory of the process so far, as text (from `/proc`, on Linux only).
 fn most_memory() -> String {
     let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
@@ -161,28 +170,28 @@ fn most_memory() -> String {
     )
 }
 
-/// The plan of the folder: the one that is given, the one that is there, or a new one.
+/// The plan: the one that is given, the one in the folder, or a new one, which is written there.
 fn plan(asked: &FleetRequest<'_>, robots: &[&[FleetFile]]) -> Result<FleetPlan, FleetFault> {
     let there = asked.out.join("plan.json");
     let path = asked.plan.unwrap_or(&there);
     if asked.plan.is_some() || path.exists() {
         let text = fs::read_to_string(path).map_err(|error| {
             FleetFault::new(format!(
-                "{} cannot be read: {error}; name a plan that is there",
+                "{} cannot be read: {error}; give an existing plan with `--plan`",
                 path.display()
             ))
         })?;
         let plan = FleetPlan::parse(&path.display().to_string(), &text)?;
         let model = fs::read_to_string(asked.model).map_err(|error| {
             FleetFault::new(format!(
-                "{} cannot be read: {error}; name the model file",
+                "{} cannot be read: {error}; give the model file",
                 asked.model.display()
             ))
         })?;
         if plan.files.first().is_none_or(|(_, text)| *text != model) {
             return Err(FleetFault::new(format!(
-                "{} is of another model than {}: what was summed up by it does not fit; choose another folder with `--out`, or \
-                 the model as it was",
+                "{} was made with another model than {}, so its summaries cannot be used; choose another folder with `--out`, or \
+                 use the model of the plan",
                 path.display(),
                 asked.model.display()
             )));
@@ -192,7 +201,7 @@ fn plan(asked: &FleetRequest<'_>, robots: &[&[FleetFile]]) -> Result<FleetPlan, 
         }
         return Ok(plan);
     }
-    // Robots from all over the fleet, and their first recordings; those that cannot be read are passed over.
+    // The first recordings of robots evenly distributed over the fleet; unreadable ones are left out of the plan.
     let every = robots.len().div_ceil(REFERENCE).max(1);
     let reference: Vec<&Path> = robots
         .iter()
@@ -204,7 +213,7 @@ fn plan(asked: &FleetRequest<'_>, robots: &[&[FleetFile]]) -> Result<FleetPlan, 
     Ok(plan)
 }
 
-/// The summaries of a robot's recordings, day by day; those that are not kept are made.
+/// The summaries of a robot by day. Recordings without a stored summary are summarised, and the summary is stored.
 fn daily_summaries(
     ground: &FleetModel,
     states: &Path,
@@ -237,7 +246,7 @@ fn daily_summaries(
     Ok(days)
 }
 
-/// All that was found.
+/// All results as JSON.
 fn json(found: &FleetResults) -> Value {
     let ground = &found.ground;
     let parameters = ground.parameters();

@@ -1,7 +1,7 @@
-//! `modelmill-fleet`: recordings of many machines of one kind, on one computer.
+//! `modelmill-fleet`: evaluates recordings of many machines of one kind, on one computer.
 //!
-//! `make` makes a fleet with a truth, `plan` settles how recordings are summed up, `identify` sums them up and says what every
-//! robot is and what changed, and `score` holds that against a truth.
+//! `make` simulates a fleet with known changes, `plan` fixes how recordings are prepared, `identify` summarises them
+//! and reports parameters and changes of every robot, and `score` compares results with the known changes.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -11,71 +11,74 @@ use modelmill::recording::{RecordingOptions, StatePreparation};
 use modelmill_fleet::{FleetFault, folder};
 use modelmill_fleet_program::{generate, identify, score};
 
-/// Recordings of many machines of one kind: parameters per robot and day, what changed and when, and who differs.
+/// Evaluate recordings of many machines of one kind: parameters per robot and day, changes and their days, outliers.
 #[derive(Parser)]
 #[command(name = "modelmill-fleet", version)]
 struct FleetCli {
+    /// The command to run.
     #[command(subcommand)]
     command: FleetCommand,
 }
 
+/// The commands.
 #[derive(Subcommand)]
 enum FleetCommand {
-    /// Make a fleet of five-bars with a truth, as Parquet.
+    /// Simulate a fleet of five-bars with known changes, as Parquet.
     Make(MakeArgs),
-    /// Settle how every recording is summed up, from a few of sound machines.
+    /// Fix how every recording is prepared, from a few recordings of faultless machines.
     Plan(PlanArgs),
-    /// Sum up a folder of recordings and say what is different.
+    /// Summarise a folder of recordings and report changes, outliers and dead sensors.
     Identify(FleetIdentifyArgs),
-    /// Hold what `identify` found against the truth of `make`.
+    /// Compare the results of `identify` with the known changes of `make`.
     Score {
         /// The folder that `identify` wrote.
         found: PathBuf,
-        /// `truth.json`.
+        /// `truth.json`, which `make` wrote.
         truth: PathBuf,
     },
 }
 
+/// `make`.
 #[derive(clap::Args)]
 struct MakeArgs {
-    /// Where it goes.
+    /// Folder for the fleet.
     folder: PathBuf,
-    /// How many robots.
+    /// Number of robots.
     #[arg(long, default_value_t = 100)]
     robots: usize,
-    /// On how many days.
+    /// Number of days, at least 6.
     #[arg(long, default_value_t = 10)]
     days: usize,
-    /// Recordings of a robot on a day.
+    /// Recordings per robot and day.
     #[arg(long, default_value_t = 2)]
     per_day: usize,
-    /// How long each is, s.
+    /// Duration of each recording, s.
     #[arg(long, default_value_t = 60.0)]
     seconds: f64,
-    /// Samples a second.
+    /// Sampling rate, Hz.
     #[arg(long, default_value_t = 250.0)]
     rate: f64,
-    /// Another seed makes another fleet.
+    /// Seed; another seed gives another fleet.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// How many recordings are cut off.
+    /// Number of recordings that are cut off.
     #[arg(long, default_value_t = 2)]
     bad: usize,
-    /// How large the changes of friction and load are; 1 as in the guide, 0.5 for half of that.
+    /// Size of the changes of friction and load: 1 as in the guide, 0.5 for half of that.
     #[arg(long, default_value_t = 1.0)]
     changes: f64,
 }
 
-/// How recordings are read, where no plan says it.
+/// How recordings are read, if there is no plan.
 #[derive(clap::Args, Clone)]
 struct ReadingArgs {
-    /// Our column and what recordings call it, such as `q1=pos_left`; may be given again.
+    /// Column of the recordings for a name of the model, such as `q1=pos_left`; may be repeated.
     #[arg(long = "map", value_name = "OURS=THEIRS")]
     map: Vec<String>,
-    /// Cut-off of the low-pass on positions, Hz; chosen by the first reference recording where it is not given.
+    /// Cut-off of the low-pass on positions, Hz. Default: chosen from the first reference recording.
     #[arg(long)]
     cutoff: Option<f64>,
-    /// Every how many samples one is kept; chosen likewise.
+    /// Keep every n-th sample; 1 chooses it from the first reference recording.
     #[arg(long, default_value_t = 1)]
     decimate: usize,
     /// Leave out samples with NaN or empty fields.
@@ -84,11 +87,12 @@ struct ReadingArgs {
 }
 
 impl ReadingArgs {
+    /// The same as options of the library; fails for a `--map` without `=`.
     fn reading(&self) -> Result<RecordingOptions, FleetFault> {
         let columns = self.map.iter().map(|text| {
             let (ours, theirs) = text.split_once('=').ok_or_else(|| {
                 FleetFault::new(format!(
-                    "`--map {text}` names no column; write it as `--map q1=pos_left`"
+                    "`--map {text}` has no column; write it as `--map q1=pos_left`"
                 ))
             })?;
             Ok((ours.to_owned(), theirs.to_owned()))
@@ -106,33 +110,37 @@ impl ReadingArgs {
     }
 }
 
+/// `plan`.
 #[derive(clap::Args)]
 struct PlanArgs {
     /// The model file.
     model: PathBuf,
-    /// Recordings of sound machines; the first decides how all are prepared.
+    /// Recordings of faultless machines; the first determines how all are prepared.
     #[arg(required = true)]
     reference: Vec<PathBuf>,
-    /// Where the plan goes.
+    /// Write the plan to this file.
     #[arg(long, default_value = "plan.json")]
     out: PathBuf,
     #[command(flatten)]
     reading: ReadingArgs,
 }
 
+/// `identify`.
 #[derive(clap::Args)]
 struct FleetIdentifyArgs {
     /// The model file.
     model: PathBuf,
-    /// The folder: `robot=R/day=D/.../FILE`, `R/D/FILE`, or `R/FILE` with the day at the front of the file's name.
+    /// Folder with recordings: `robot=R/day=D/.../FILE`, `R/D/FILE`, or `R/FILE` with the day at the start of the file
+    /// name.
     recordings: PathBuf,
-    /// Where states, results and page go. Called again with the same folder, it goes on from the recordings that are done.
+    /// Folder for summaries, results and page. With the same folder again, recordings that are summarised already are
+    /// not read again.
     #[arg(long)]
     out: PathBuf,
-    /// The plan; made from recordings of eight robots where it is not given.
+    /// The plan. Default: made from recordings of eight robots.
     #[arg(long)]
     plan: Option<PathBuf>,
-    /// Threads; all cores where it is not given.
+    /// Number of threads. Default: all cores.
     #[arg(long)]
     threads: Option<usize>,
     #[command(flatten)]
@@ -160,6 +168,7 @@ fn main() -> ExitCode {
     }
 }
 
+/// Runs a command; returns the text for standard output.
 fn run(command: FleetCommand) -> Result<String, FleetFault> {
     match command {
         FleetCommand::Make(args) => {
@@ -191,7 +200,7 @@ fn run(command: FleetCommand) -> Result<String, FleetFault> {
             )?;
             folder::write_atomic(&args.out, plan.json().as_bytes())?;
             Ok(format!(
-                "{} from {} reference recordings: cut-off {} Hz, one in {} samples kept\n",
+                "{} from {} reference recordings: cut-off {} Hz, every {}. sample kept\n",
                 args.out.display(),
                 plan.reference.recordings.len(),
                 plan.preparation

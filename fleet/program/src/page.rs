@@ -1,4 +1,5 @@
-//! What was found as one page, which opens on the robots that are not as they should be.
+//! The results as one HTML page. Robots that changed come first, then outliers, dead sensors, usual values and bad
+//! recordings.
 
 use std::fmt::Write as _;
 
@@ -10,10 +11,10 @@ use modelmill_fleet::robot::RobotHistory;
 
 use crate::identify::{FleetResults, summary_sentence};
 
-/// Robots that are shown with pictures; all others stand in the tables and in the JSON.
+/// Largest number of robots with pictures; the others are listed in a table and in the JSON.
 const MOST_PICTURED: usize = 60;
 
-/// The page's text.
+/// The page as HTML.
 pub(crate) fn page(found: &FleetResults) -> String {
     let title = format!("A fleet of {} robots", found.robots.len());
     let mut page = begin_page(&title);
@@ -32,15 +33,15 @@ pub(crate) fn page(found: &FleetResults) -> String {
             "Robots that differ from the others",
             outlier_table(found),
         ),
-        ("sensors", "Sensors that died", dead_sensor_table(found)),
+        ("sensors", "Dead sensors", dead_sensor_table(found)),
         (
             "usual",
-            "What is usual in this fleet",
+            "Usual values of this fleet",
             usual_values_table(found),
         ),
         (
             "bad",
-            "Recordings that gave no answer",
+            "Recordings without a result",
             bad_recordings_table(found),
         ),
     ];
@@ -54,9 +55,10 @@ pub(crate) fn page(found: &FleetResults) -> String {
     page
 }
 
+/// Physical changes as a list, each with its alternatives.
 fn change_list(changes: &[RunChange]) -> String {
     if changes.is_empty() {
-        return "<p>No single change in physics explains it.</p>\n".to_owned();
+        return "<p>No single physical change explains it.</p>\n".to_owned();
     }
     let mut html = String::from("<ul>\n");
     for one in changes {
@@ -64,7 +66,7 @@ fn change_list(changes: &[RunChange]) -> String {
         if !one.rivals.is_empty() {
             let _ = write!(
                 html,
-                "<br><small>not told from: {}</small>",
+                "<br><small>not distinguishable from: {}</small>",
                 escape(&one.rivals.join("; "))
             );
         }
@@ -74,7 +76,7 @@ fn change_list(changes: &[RunChange]) -> String {
     html
 }
 
-/// How clear the changes of a robot are.
+/// The most significant step of a robot, in standard deviations.
 fn change_clarity(robot: &RobotHistory) -> f64 {
     let steps = robot.changes.iter().flat_map(|since| &since.steps);
     steps
@@ -85,6 +87,7 @@ fn change_clarity(robot: &RobotHistory) -> f64 {
         .fold(0.0, f64::max)
 }
 
+/// The section of robots that changed, the most significant first: days, physical changes, and one picture for each.
 fn changed_robots(found: &FleetResults) -> String {
     let mut robots: Vec<&RobotHistory> = found
         .robots
@@ -92,7 +95,7 @@ fn changed_robots(found: &FleetResults) -> String {
         .filter(|robot| !robot.changes.is_empty())
         .collect();
     if robots.is_empty() {
-        return "<p>No robot changed and stayed changed.</p>\n".to_owned();
+        return "<p>No robot changed permanently.</p>\n".to_owned();
     }
     robots.sort_by(|a, b| change_clarity(b).total_cmp(&change_clarity(a)));
     let infos = found.ground.parameters();
@@ -120,7 +123,7 @@ fn changed_robots(found: &FleetResults) -> String {
             );
             html.push_str(&change_list(&since.changes));
         }
-        // The clearest parameter says it in one picture.
+        // The picture shows the parameter with the most significant step.
         let Some(step) = robot.changes.first().and_then(|since| since.steps.first()) else {
             continue;
         };
@@ -148,7 +151,7 @@ fn changed_robots(found: &FleetResults) -> String {
     if robots.len() > MOST_PICTURED {
         let _ = writeln!(
             html,
-            "<p>And {} more, which stand in <code>results.json</code>:</p>",
+            "<p>And {} more, with details in <code>results.json</code>:</p>",
             robots.len() - MOST_PICTURED
         );
         let rows: Vec<Vec<TableCell>> = robots[MOST_PICTURED..]
@@ -163,18 +166,15 @@ fn changed_robots(found: &FleetResults) -> String {
                 })
             })
             .collect();
-        html.push_str(&table(
-            "changes",
-            &["robot", "from", "what is different"],
-            &rows,
-        ));
+        html.push_str(&table("changes", &["robot", "from", "change"], &rows));
     }
     html
 }
 
+/// The table of robots that differ from the others.
 fn outlier_table(found: &FleetResults) -> String {
     if found.outliers.found.is_empty() {
-        return "<p>No robot differs from the others by far more than they differ by among themselves.</p>\n".to_owned();
+        return "<p>No robot differs from the others by much more than they differ from each other.</p>\n".to_owned();
     }
     let rows: Vec<Vec<TableCell>> = (found.outliers.found.iter())
         .map(|one| {
@@ -191,12 +191,13 @@ fn outlier_table(found: &FleetResults) -> String {
         .collect();
     let head = [
         "robot",
-        "what is different from the others",
-        "#parameter farthest from the median, deviations",
+        "difference from the others",
+        "#largest distance of a parameter from the median, standard deviations",
     ];
     table("changes", &head, &rows)
 }
 
+/// The table of dead sensors.
 fn dead_sensor_table(found: &FleetResults) -> String {
     let rows: Vec<Vec<TableCell>> = (found.robots.iter())
         .flat_map(|robot| {
@@ -216,19 +217,21 @@ fn dead_sensor_table(found: &FleetResults) -> String {
         })
         .collect();
     if rows.is_empty() {
-        return "<p>All sensors move while their machines do.</p>\n".to_owned();
+        return "<p>There are none: all readings change while their machines move.</p>\n"
+            .to_owned();
     }
     let head = [
         "robot",
         "sensor",
         "from",
         "#days",
-        "#stood still for",
+        "#constant for",
         "first recording",
     ];
     table("sensors", &head, &rows)
 }
 
+/// The table of base parameters with median and spread over the robots.
 fn usual_values_table(found: &FleetResults) -> String {
     let infos = found.ground.parameters();
     let rows: Vec<Vec<TableCell>> = (infos.iter().zip(&found.outliers.usual))
@@ -255,18 +258,19 @@ fn usual_values_table(found: &FleetResults) -> String {
         "expression",
     ];
     format!(
-        "<p>Of each robot the days before anything changed.</p>\n{}",
+        "<p>Of each robot only the days before its first change are used.</p>\n{}",
         table("parameters", &head, &rows)
     )
 }
 
+/// The table of recordings that could not be evaluated, with the reasons.
 fn bad_recordings_table(found: &FleetResults) -> String {
     let rows: Vec<Vec<TableCell>> = found
         .bad()
         .map(|one| vec![TableCell::text(&one.recording), TableCell::text(&one.says)])
         .collect();
     if rows.is_empty() {
-        return "<p>All gave one.</p>\n".to_owned();
+        return "<p>There are none: all recordings gave a result.</p>\n".to_owned();
     }
-    table("runs", &["recording", "why"], &rows)
+    table("runs", &["recording", "reason"], &rows)
 }

@@ -1,4 +1,5 @@
-//! What was found beside what was planted.
+//! Compares results with the known changes of a simulated fleet: `results.json` and `truth.json` go in, a table of
+//! detection rates comes out.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -8,10 +9,11 @@ use std::path::Path;
 use modelmill_fleet::FleetFault;
 use serde_json::Value;
 
+/// Reads a JSON file.
 fn read(path: &Path) -> Result<Value, FleetFault> {
     let text = fs::read_to_string(path).map_err(|error| {
         FleetFault::new(format!(
-            "{} cannot be read: {error}; name what `identify` or `make` wrote",
+            "{} cannot be read: {error}; give a file or folder that `identify` or `make` wrote",
             path.display()
         ))
     })?;
@@ -19,19 +21,24 @@ fn read(path: &Path) -> Result<Value, FleetFault> {
         .map_err(|error| FleetFault::new(format!("{}: {error}", path.display())))
 }
 
-/// How many of a kind there are, how many were found, and with their day within a day.
+/// Counts for one kind of change.
 #[derive(Default)]
 struct ScoreTally {
+    /// Number of simulated changes.
     planted: usize,
+    /// Number of changes that were detected.
     found: usize,
+    /// Number of changes that were detected within one day of the right day.
     in_time: usize,
+    /// Number of changes that were detected with the right name.
     named: usize,
+    /// Changes with a miss in any of these, one line each.
     missed: Vec<String>,
 }
 
-/// Holds results, in a folder that [`crate::identify`] wrote, against a truth.
+/// Compares results, in a folder that [`crate::identify`] wrote, with the known changes.
 ///
-/// Fails where either cannot be read, or they are of two fleets.
+/// Fails if either cannot be read, or they belong to different fleets.
 pub fn score(found: &Path, truth: &Path) -> Result<String, FleetFault> {
     let results = read(&found.join("results.json"))?;
     let truth = read(truth)?;
@@ -54,7 +61,7 @@ pub fn score(found: &Path, truth: &Path) -> Result<String, FleetFault> {
         let (name, planted) = (text(&one["robot"]), &one["planted"]);
         let Some(robot) = robots.get(&name) else {
             return Err(FleetFault::new(format!(
-                "{} has no robot {name}; the truth is of another fleet",
+                "{} has no robot {name}; `truth.json` belongs to another fleet",
                 found.display()
             )));
         };
@@ -64,6 +71,7 @@ pub fn score(found: &Path, truth: &Path) -> Result<String, FleetFault> {
         let at = planted["place"]
             .as_u64()
             .and_then(|day| usize::try_from(day).ok());
+        // A day counts as right if it is at most one day off.
         let is_near = |day: &Value| {
             place(day)
                 .zip(at)
@@ -123,9 +131,9 @@ pub fn score(found: &Path, truth: &Path) -> Result<String, FleetFault> {
                 .flat_map(|one| list(&one["changes"]))
                 .map(|one| text(&one["says"]))
                 .collect::<Vec<_>>();
-            tally
-                .missed
-                .push(format!("{name} planted {planted}, found {days:?} {says:?}"));
+            tally.missed.push(format!(
+                "{name} simulated {planted}, found {days:?} {says:?}"
+            ));
         }
     }
     let mut says = score_text(&tallies, sound, &alarms);
@@ -145,21 +153,23 @@ fn has_change(changes: &Value, kind: &str, at: Option<&str>) -> bool {
     })
 }
 
+/// The elements of a JSON array; none for other values.
 fn list(value: &Value) -> Vec<Value> {
     value.as_array().cloned().unwrap_or_default()
 }
 
+/// The text of a JSON value; empty for other values.
 fn text(value: &Value) -> String {
     value.as_str().unwrap_or_default().to_owned()
 }
 
-/// What was found of each kind, and which sound robots raised an alarm.
+/// Detection rates of each kind, and the unchanged robots with a false alarm.
 fn score_text(tallies: &BTreeMap<String, ScoreTally>, sound: u32, alarms: &[String]) -> String {
     let mut says = String::new();
     for (kind, tally) in tallies.iter().filter(|(_, tally)| tally.planted > 0) {
         let _ = writeln!(
             says,
-            "{kind}: {} planted, {} found, {} with their day within a day, {} with the right name",
+            "{kind}: {} simulated, {} found, {} with the day within one day, {} with the right name",
             tally.planted, tally.found, tally.in_time, tally.named
         );
         for missed in &tally.missed {
@@ -168,7 +178,7 @@ fn score_text(tallies: &BTreeMap<String, ScoreTally>, sound: u32, alarms: &[Stri
     }
     let _ = writeln!(
         says,
-        "sound: {sound}, of which {} raised an alarm ({:.2} %)",
+        "unchanged robots: {sound}, of which {} raised an alarm ({:.2} %)",
         alarms.len(),
         100.0 * alarms.len() as f64 / f64::from(sound.max(1))
     );
@@ -178,7 +188,7 @@ fn score_text(tallies: &BTreeMap<String, ScoreTally>, sound: u32, alarms: &[Stri
     says
 }
 
-/// Which recordings were said to give no answer.
+/// How many of the recordings that were cut off are reported, and how many others.
 fn bad_recordings_text(results: &Value, truth: &Value) -> String {
     let mut bad: Vec<String> = list(&results["bad"])
         .iter()
@@ -190,7 +200,7 @@ fn bad_recordings_text(results: &Value, truth: &Value) -> String {
     let missed = planted.iter().filter(|one| !bad.contains(one)).count();
     let further = bad.iter().filter(|one| !planted.contains(one)).count();
     format!(
-        "bad recordings: {} planted, {missed} not named, {further} named that are sound\n",
+        "bad recordings: {} simulated, {missed} not reported, {further} others reported\n",
         planted.len()
     )
 }

@@ -1,5 +1,5 @@
-//! What is done, kept beside the results: a file for each robot, to which every recording's summary is added as soon as it is
-//! made. A job that is killed leaves at most a tail, which is cut off.
+//! Stored summaries, next to the results: one file per robot, to which the summary of each recording is appended at
+//! once. A job that is killed leaves at most an incomplete entry, which is cut off.
 
 use std::collections::HashMap;
 use std::fs::{self, File, OpenOptions};
@@ -9,15 +9,17 @@ use std::sync::Mutex;
 
 use modelmill_fleet::{FleetFault, FleetSummary};
 
-/// The summaries of a robot that are kept.
+/// The file with the summaries of a robot.
 pub(crate) struct SummaryStore {
+    /// Its path.
     path: PathBuf,
+    /// The file, open for appending.
     file: Mutex<File>,
 }
 
 impl SummaryStore {
-    /// Opens the file of a robot, with the summaries that it holds by the keys of their recordings; those of another plan do not
-    /// count.
+    /// Opens the file of a robot. Returns its summaries by the keys of their recordings; those of another plan are
+    /// ignored.
     pub(crate) fn open(
         folder: &Path,
         robot: &str,
@@ -33,14 +35,14 @@ impl SummaryStore {
                 }
             })
             .collect();
-        // Two names may become one; their numbers tell them apart.
+        // Different names may give the same file name; a checksum distinguishes them.
         let number = robot
             .bytes()
             .fold(0_u32, |n, b| n.wrapping_mul(31).wrapping_add(u32::from(b)));
         let path = folder.join(format!("{name}-{number:08x}.sums"));
         let fault = |error: std::io::Error| {
             FleetFault::new(format!(
-                "{} cannot be kept: {error}; choose another folder, or make room",
+                "{} cannot be opened or written: {error}; choose another folder, or free disk space",
                 path.display()
             ))
         };
@@ -50,6 +52,7 @@ impl SummaryStore {
             Err(error) => return Err(fault(error)),
         };
         let mut kept = HashMap::new();
+        // The file is valid up to here; the rest is an incomplete entry.
         let mut sound = 0;
         while let Some((key, summary, end)) = entry(&bytes, sound) {
             if summary.mark == mark {
@@ -69,7 +72,7 @@ impl SummaryStore {
         Ok((Self { path, file }, kept))
     }
 
-    /// Keeps the summary of a recording.
+    /// Appends the summary of a recording.
     pub(crate) fn append(&self, key: &str, summary: &FleetSummary) -> Result<(), FleetFault> {
         let bytes = summary.bytes();
         let mut entry = Vec::with_capacity(key.len() + bytes.len() + 16);
@@ -83,14 +86,15 @@ impl SummaryStore {
             .unwrap_or_else(std::sync::PoisonError::into_inner);
         file.write_all(&entry).map_err(|error| {
             FleetFault::new(format!(
-                "{} cannot be kept: {error}; make room and start again: it goes on",
+                "{} cannot be written: {error}; free disk space and start again; the job continues where it stopped",
                 self.path.display()
             ))
         })
     }
 }
 
-/// The entry at a place, and where it ends; `None` where there is none, or it is cut off.
+/// Key and summary of the entry at a position, and the position of its end; `None` if there is none or it is
+/// incomplete.
 fn entry(bytes: &[u8], at: usize) -> Option<(String, FleetSummary, usize)> {
     let part = |at: usize| -> Option<(&[u8], usize)> {
         let length = bytes.get(at..at.checked_add(8)?)?;

@@ -90,13 +90,13 @@ fn near(a: &FleetSummary, b: &FleetSummary, ground: &FleetModel) {
 fn what_was_planted_is_found_and_a_killed_job_goes_on() {
     let fleet = Fleet::new("planted", 10, 1);
     let says = fleet.identify("out");
-    assert!(says.contains("1 recordings gave no answer"), "{says}");
+    assert!(says.contains("1 recordings gave no result"), "{says}");
     let told = score(&fleet.at("out"), &fleet.at("truth.json")).expect("a score");
     for line in [
-        "dead_sensor: 1 planted, 1 found, 1 with their day within a day, 1 with the right name",
-        "payload: 1 planted, 1 found, 1 with their day within a day, 1 with the right name",
-        "wear: 1 planted, 1 found, 1 with their day within a day, 1 with the right name",
-        "bad recordings: 1 planted, 0 not named, 0 named that are sound",
+        "dead_sensor: 1 simulated, 1 found, 1 with the day within one day, 1 with the right name",
+        "payload: 1 simulated, 1 found, 1 with the day within one day, 1 with the right name",
+        "wear: 1 simulated, 1 found, 1 with the day within one day, 1 with the right name",
+        "bad recordings: 1 simulated, 0 not reported, 0 others reported",
     ] {
         assert!(told.contains(line), "{told}");
     }
