@@ -1,7 +1,7 @@
-//! The client: a query to a scheduler, or in this process, as CSV.
+//! The client: sends a query to a scheduler, or runs it in this process, and writes the result as CSV.
 //!
-//! What an executor keeps goes with it. The scheduler then ends the job, and the query is put again; so it is where a job was done
-//! and its results cannot be fetched any more.
+//! If an executor is lost, its intermediate results are lost too. The scheduler then cancels the job, and the client
+//! sends the query again. It also does so if a job is done and its results cannot be fetched any more.
 
 use std::sync::Arc;
 
@@ -26,22 +26,24 @@ use modelmill_fleet_datafusion::register;
 
 use crate::stores;
 
-/// A query is put so often at most.
+/// Largest number of times that a query is sent.
 const ATTEMPTS: usize = 4;
 
-/// What is asked, and of whom.
+/// A query and where it runs.
 pub(crate) struct QueryRequest<'a> {
+    /// The query.
     pub(crate) sql: &'a str,
-    /// `NAME=FOLDER` each.
+    /// Tables of samples, each as `NAME=FOLDER`.
     pub(crate) tables: &'a [String],
-    /// This process answers where there is none.
+    /// URL of the scheduler; without it the query runs in this process.
     pub(crate) scheduler: Option<&'a str>,
+    /// Number of partitions.
     pub(crate) partitions: usize,
 }
 
-/// Writes the answer to standard output.
+/// Runs a query and writes the result to standard output.
 ///
-/// Fails where the query has no meaning, or nobody can answer it.
+/// Fails if the query is invalid, or the scheduler does not answer.
 pub(crate) async fn run_query(ground: &Arc<Ground>, asked: &QueryRequest<'_>) -> Result<()> {
     let session = open_session(asked).await?;
     register(&session, ground);
@@ -64,6 +66,7 @@ pub(crate) async fn run_query(ground: &Arc<Ground>, asked: &QueryRequest<'_>) ->
     Ok(())
 }
 
+/// A session of the scheduler, or of this process.
 async fn open_session(asked: &QueryRequest<'_>) -> Result<SessionContext> {
     let Some(url) = asked.scheduler else {
         let config = SessionConfig::new().with_target_partitions(asked.partitions);
@@ -81,17 +84,19 @@ async fn open_session(asked: &QueryRequest<'_>) -> Result<SessionContext> {
     SessionContext::remote_with_state(url, state).await
 }
 
+/// Registers a folder of Parquet, given as `NAME=FOLDER`, as a table.
 async fn register_table(session: &SessionContext, table: &str) -> Result<()> {
     let Some((name, folder)) = table.split_once('=') else {
         return Err(DataFusionError::Plan(format!(
-            "`--table {table}` names no folder; write it as `--table samples=recordings/`"
+            "`--table {table}` has no folder; write it as `--table samples=recordings/`"
         )));
     };
     let external = format!(
         "CREATE EXTERNAL TABLE {name}_files STORED AS PARQUET PARTITIONED BY (robot, day, recording) LOCATION '{folder}'"
     );
     session.sql(&external).await?.collect().await?;
-    // Parts of paths are dictionaries, which shuffles between processes unpack: groups must be texts from the start.
+    // Partition columns have dictionary types, which shuffles between processes change to text; so they are cast to
+    // text here.
     let texts =
         ["robot", "day", "recording"].map(|part| format!("arrow_cast({part}, 'Utf8') AS {part}"));
     let view = format!(
@@ -102,7 +107,7 @@ async fn register_table(session: &SessionContext, table: &str) -> Result<()> {
     Ok(())
 }
 
-/// The fields of structs as columns, since a struct has no place in CSV.
+/// Replaces structs by their fields, because CSV has no structs.
 fn flatten_structs(frame: DataFrame) -> Result<DataFrame> {
     let schema = frame.schema().clone();
     let mut columns = Vec::new();
@@ -123,7 +128,7 @@ fn flatten_structs(frame: DataFrame) -> Result<DataFrame> {
     frame.select(columns)
 }
 
-/// The answer of executors, put again where one of them was lost.
+/// Runs a query on the executors, and sends it again if one of them was lost.
 async fn collect_answer(frame: &DataFrame, url: &str) -> Result<Vec<RecordBatch>> {
     let mut attempt = 1;
     loop {
@@ -135,7 +140,7 @@ async fn collect_answer(frame: &DataFrame, url: &str) -> Result<Vec<RecordBatch>
         let job = plan
             .downcast_ref::<DistributedQueryExec<LogicalPlanNode>>()
             .and_then(DistributedQueryExec::job_id);
-        // What has not become a job has no meaning, or there is no scheduler.
+        // Without a job the query is invalid or the scheduler does not answer; sending it again does not help.
         let Some(job) = job else {
             return Err(error);
         };
@@ -144,21 +149,21 @@ async fn collect_answer(frame: &DataFrame, url: &str) -> Result<Vec<RecordBatch>
         }
         if attempt == ATTEMPTS {
             return Err(DataFusionError::Execution(format!(
-                "executors were lost {ATTEMPTS} times while they were at this query; see what ends them, then put it again; at last: \
-                 {error}"
+                "executors were lost {ATTEMPTS} times during this query; find the reason in their logs, then run it again; last \
+                 error: {error}"
             )));
         }
-        log::warn!("the query is put again, since an executor was lost: {error}");
+        log::warn!("the query is sent again, because an executor was lost: {error}");
         attempt += 1;
     }
 }
 
-/// Whether a job of which there is no answer would have one if all executors had stayed: the scheduler ended it, for itself or since
-/// results of an earlier stage could not be fetched, or says that it is done.
+/// Whether a job failed because an executor was lost: the scheduler cancelled it, or results of an earlier stage could
+/// not be fetched, or the job is done and its results are lost.
 async fn was_executor_lost(url: &str, job_id: String) -> Result<bool> {
     let fault = |error: &dyn std::fmt::Display| {
         DataFusionError::Execution(format!(
-            "the scheduler does not say what became of the query: {error}; see whether it runs, then put the query again"
+            "the scheduler does not report the state of the query: {error}; check that it runs, then run the query again"
         ))
     };
     let http = url.replacen("df://", "http://", 1);

@@ -1,9 +1,9 @@
-//! The scheduler. Where an executor is lost, it ends the jobs that run, and clients put their queries again.
+//! The scheduler. If an executor is lost, it cancels all running jobs, and clients send their queries again.
 //!
-//! Ballista 55 would go on with such a job, and its answer may be wrong: a stage that is done anew, since it lost its input, leaves
-//! what it had handed on, so that groups are there twice. (Its adaptive planner does not go on at all: it "does not cover executor
-//! failure".) So no stage is ever done anew here. A job ends as soon as results cannot be fetched, and before Ballista hears of an
-//! executor that is taken for dead, or says that it stops.
+//! Ballista 55 would continue such a job, and its result may be wrong: a stage that is repeated because it lost its
+//! input does not remove what it had already delivered, so groups occur twice. (Its adaptive planner does not continue
+//! at all: it "does not cover executor failure".) So no stage is ever repeated here. A job is cancelled as soon as
+//! results cannot be fetched, and before Ballista removes an executor that is lost or stops.
 
 use std::collections::{HashMap, HashSet};
 use std::net::SocketAddr;
@@ -33,9 +33,9 @@ use modelmill_fleet_datafusion::aggregates;
 
 use crate::{LONGEST_MESSAGE, stores};
 
-/// Serves until the process ends. Executors that are not heard of for `timeout` seconds are taken for dead.
+/// Serves until the process ends. Executors without a message for `timeout` seconds count as lost.
 ///
-/// Fails where it cannot listen at the address.
+/// Fails if it cannot listen on the address.
 pub(crate) async fn serve(
     ground: &Arc<Ground>,
     host: &str,
@@ -56,21 +56,21 @@ pub(crate) async fn serve(
         bind_host: host.to_owned(),
         external_host: host.to_owned(),
         bind_port: port,
-        // Executors ask for work, and whoever asks is alive.
+        // Executors request work, and each request shows that they are alive.
         scheduling_policy: TaskSchedulingPolicy::PullStaged,
         executor_timeout_seconds: timeout,
         expire_dead_executor_interval_seconds: (timeout / 4).max(1),
         grpc_server_max_decoding_message_size: LONGEST_MESSAGE,
         grpc_server_max_encoding_message_size: LONGEST_MESSAGE,
         grpc_client_max_message_size: LONGEST_MESSAGE,
-        // Results that cannot be fetched end the job.
+        // A job is cancelled if results cannot be fetched.
         stage_max_failures: 1,
         override_session_builder: Some(Arc::new(session)),
         ..SchedulerConfig::default()
     };
     let address = format!("{host}:{port}").parse().map_err(|error| {
         Fault::new(format!(
-            "`{host}:{port}` is no address: {error}; give a number such as 127.0.0.1"
+            "`{host}:{port}` is not an address: {error}; give a numeric host such as 127.0.0.1"
         ))
     })?;
     let session = config.override_session_builder.clone();
@@ -93,16 +93,18 @@ pub(crate) async fn serve(
     .map_err(Fault::new)
 }
 
-/// Ballista's picture of the executors, with one that is lost ending what runs.
+/// Ballista's state of the executors, extended: the loss of an executor cancels all running jobs.
 struct ExecutorCluster {
+    /// Ballista's own state, to which all calls are forwarded.
     known: InMemoryClusterState,
+    /// The jobs of the scheduler.
     jobs: Arc<dyn JobState>,
-    /// Of the scheduler itself.
+    /// Address of the scheduler itself.
     address: SocketAddr,
 }
 
 impl ExecutorCluster {
-    /// Ends all jobs that run; the scheduler has taken note of it when this returns.
+    /// Cancels all running jobs and returns their number. The scheduler has processed the requests when this returns.
     async fn end_jobs(&self) -> std::result::Result<usize, Fault> {
         let mut running = Vec::new();
         let all = self.jobs.get_all_jobs().await.map_err(Fault::new)?;
@@ -135,12 +137,14 @@ impl ClusterState for ExecutorCluster {
     async fn remove_executor(&self, executor_id: &str) -> Result<()> {
         match self.end_jobs().await {
             Ok(ended) => {
-                log::warn!("executor {executor_id} is lost; {ended} jobs end, to be put again");
+                log::warn!(
+                    "executor {executor_id} is lost; {ended} jobs are cancelled, and clients send them again"
+                );
             }
-            // No answer is better than one that may be wrong.
+            // Without cancelling, a result could be wrong; it is better to give none.
             Err(fault) => {
                 log::error!(
-                    "executor {executor_id} is lost, and jobs cannot be ended: {fault}; the scheduler ends"
+                    "executor {executor_id} is lost, and jobs cannot be cancelled: {fault}; the scheduler stops"
                 );
                 std::process::exit(1);
             }

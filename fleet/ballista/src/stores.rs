@@ -1,4 +1,4 @@
-//! Where samples lie: paths of this computer, and buckets of S3 or what speaks as it does, by their URL.
+//! Access to samples: paths of this computer, and buckets of S3 or a compatible store, by their URL.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -10,19 +10,22 @@ use object_store::ObjectStore;
 use object_store::aws::AmazonS3Builder;
 use url::Url;
 
-/// What a process runs on: stores by URL, and a folder for what does not fit into memory, that of the system where none is given.
+/// The environment of a process: stores by URL, and a folder for data that do not fit into memory (that of the system
+/// if not given).
 pub(crate) fn runtime_environment(spilled: Option<&Path>) -> Result<Arc<RuntimeEnv>> {
-    let runtime = RuntimeEnvBuilder::new().with_object_store_registry(Arc::new(ObjectStores::default()));
+    let runtime =
+        RuntimeEnvBuilder::new().with_object_store_registry(Arc::new(ObjectStores::default()));
     match spilled {
         Some(folder) => runtime.with_temp_file_path(folder).build_arc(),
         None => runtime.build_arc(),
     }
 }
 
-/// Stores that were registered, and a bucket where it is first asked for: `AWS_ACCESS_KEY_ID`, `AWS_SECRET_ACCESS_KEY`,
-/// `AWS_REGION`, `AWS_ENDPOINT`, `AWS_ALLOW_HTTP` and their like say who asks and where it is.
+/// Registered stores. A bucket of S3 is registered at its first use, with the variables `AWS_ACCESS_KEY_ID`,
+/// `AWS_SECRET_ACCESS_KEY`, `AWS_REGION`, `AWS_ENDPOINT`, `AWS_ALLOW_HTTP` etc.
 #[derive(Debug, Default)]
 struct ObjectStores {
+    /// The stores so far.
     known: DefaultObjectStoreRegistry,
 }
 
@@ -46,7 +49,7 @@ impl ObjectStoreRegistry for ObjectStores {
         }
         let Some(bucket) = url.host_str() else {
             return Err(DataFusionError::Configuration(format!(
-                "{url} names no bucket; write it as s3://BUCKET/FOLDER/"
+                "{url} has no bucket; write it as s3://BUCKET/FOLDER/"
             )));
         };
         let bucket = AmazonS3Builder::from_env().with_bucket_name(bucket);

@@ -1,7 +1,8 @@
-//! Warnings of the engines on standard error, such as that of an executor that is lost; nothing else of what they tell.
+//! Prints warnings and errors of the engines on standard error, such as the loss of an executor, and no other messages.
 
 use log::{LevelFilter, Log, Metadata, Record};
 
+/// A logger that prints level and text.
 struct WarningLogger;
 
 impl Log for WarningLogger {
@@ -24,7 +25,7 @@ impl Log for WarningLogger {
 
 /// Shows warnings from now on.
 pub(crate) fn show_warnings() {
-    // A second logger could only come from a second call.
+    // Setting the logger fails only at a second call, and then it is set already.
     if log::set_logger(&WarningLogger).is_ok() {
         log::set_max_level(LevelFilter::Warn);
     }

@@ -1,4 +1,4 @@
-//! The aggregates.
+//! Aggregate functions of DataFusion over a plan: samples or summaries go in, summaries or parameters come out.
 
 use std::fmt;
 use std::hash::{Hash, Hasher};
@@ -18,18 +18,19 @@ use modelmill_fleet::{Ground, Summary};
 
 use crate::samples::{GroupSamples, external_error};
 
-/// What an aggregate gives.
+/// The result of an aggregate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum AggregateKind {
-    /// `modelmill_summarise`: of samples the summary, as bytes.
+    /// `modelmill_summarise`: the summary of samples, as bytes.
     Summary,
-    /// `modelmill_merge`: of summaries their sum, as bytes.
+    /// `modelmill_merge`: the sum of summaries, as bytes.
     Merged,
-    /// `modelmill_identify`: of either the parameters.
+    /// `modelmill_identify`: the parameters from samples or summaries.
     Parameters,
 }
 
 impl AggregateKind {
+    /// Name of the function in SQL.
     fn name(self) -> &'static str {
         match self {
             Self::Summary => "modelmill_summarise",
@@ -42,14 +43,18 @@ impl AggregateKind {
 /// An aggregate over a plan.
 #[derive(Clone)]
 pub struct FleetAggregate {
+    /// The plan with its derived model.
     ground: Arc<Ground>,
+    /// The result.
     answer: AggregateKind,
+    /// Types of the arguments.
     signature: Signature,
+    /// Names of the columns of samples, in the order of the arguments.
     columns: Vec<String>,
 }
 
 impl FleetAggregate {
-    /// The aggregate that gives such an answer.
+    /// The aggregate with a kind of result.
     pub fn new(ground: Arc<Ground>, answer: AggregateKind) -> Self {
         let columns = ground.columns();
         let numbers = vec![DataType::Float64; columns.len()];
@@ -68,8 +73,8 @@ impl FleetAggregate {
         }
     }
 
-    /// Fields of the answer: `recordings`, `bad`, then for each parameter its value and `_std`, which is null where the recordings
-    /// do not determine it.
+    /// Fields of the parameters: `recordings`, `bad`, then for each parameter its value and standard deviation `_std`,
+    /// null if the recordings do not determine it.
     fn fields(&self) -> Fields {
         let counts = ["recordings", "bad"].map(|name| Field::new(name, DataType::UInt64, true));
         let parameters = self.ground.parameters();
@@ -121,7 +126,7 @@ impl AggregateUDFImpl for FleetAggregate {
     fn accumulator(&self, args: AccumulatorArgs<'_>) -> Result<Box<dyn Accumulator>> {
         if args.is_distinct {
             return exec_err!(
-                "{}(DISTINCT ...) has no meaning: samples that are alike count as often as they are there",
+                "{}(DISTINCT ...) is not supported, because equal samples must all be used; remove DISTINCT",
                 self.name()
             );
         }
@@ -142,16 +147,21 @@ impl AggregateUDFImpl for FleetAggregate {
     }
 }
 
-/// A group on the way.
+/// The state of one group.
 #[derive(Debug)]
 struct SummaryAccumulator {
+    /// The aggregate.
     fleet: FleetAggregate,
+    /// Samples so far, if the arguments are samples.
     samples: GroupSamples,
+    /// Sum of the summaries so far, if the arguments are summaries.
     sum: Option<Summary>,
+    /// Whether the arguments are samples.
     of_samples: bool,
 }
 
 impl SummaryAccumulator {
+    /// Adds a summary; fails if it belongs to another plan.
     fn add(&mut self, bytes: &[u8]) -> Result<()> {
         let one = Summary::of_bytes(bytes).map_err(external_error)?;
         self.fleet.ground.check(&one).map_err(external_error)?;
@@ -162,17 +172,19 @@ impl SummaryAccumulator {
         Ok(())
     }
 
+    /// Calls `look` for each summary of a column; null values are skipped.
     fn for_each_summary(values: &[ArrayRef], look: impl FnMut(&[u8]) -> Result<()>) -> Result<()> {
         let Some(column) = values.first() else {
-            return exec_err!("a summary is missing; give a column of summaries");
+            return exec_err!("an argument is missing; give a column of summaries");
         };
         let column = cast(column, &DataType::Binary)?;
         let Some(column) = column.as_any().downcast_ref::<BinaryArray>() else {
-            return exec_err!("summaries are bytes; give what `modelmill_summarise` made");
+            return exec_err!("summaries are bytes; give the result of `modelmill_summarise`");
         };
         column.iter().flatten().try_for_each(look)
     }
 
+    /// The summary of the group. Samples are summarised only here, because all samples of a recording are needed.
     fn finish_sum(&mut self) -> Result<Option<Summary>> {
         if self.of_samples {
             let fleet = self.fleet.clone();
@@ -216,7 +228,9 @@ impl Accumulator for SummaryAccumulator {
     fn evaluate(&mut self) -> Result<ScalarValue> {
         let sum = self.finish_sum()?;
         match self.fleet.answer {
-            AggregateKind::Summary | AggregateKind::Merged => Ok(ScalarValue::Binary(sum.map(|sum| sum.bytes()))),
+            AggregateKind::Summary | AggregateKind::Merged => {
+                Ok(ScalarValue::Binary(sum.map(|sum| sum.bytes())))
+            }
             AggregateKind::Parameters => {
                 let sum = sum.unwrap_or_else(|| self.fleet.ground.empty());
                 // A group without a usable recording has counts and no parameters.

@@ -1,5 +1,5 @@
-//! A folder of recordings as a table of summaries, on disk or in an object store that the session knows: one file is in memory for
-//! each partition.
+//! A table function that reads a folder of recordings as a table of summaries. The folder is on disk or in an object
+//! store of the session. One file per partition is in memory.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -23,10 +23,11 @@ use modelmill_fleet::{Ground, Summary};
 
 use crate::samples::external_error;
 
-/// `modelmill_recordings('folder')`: `robot`, `day`, `recording`, `summary`, and `bad` with the reason where it gave no answer. The
-/// folder is a path or the URL of one, such as `s3://bucket/folder`, in a store that the session knows.
+/// `modelmill_recordings('folder')`: `robot`, `day`, `recording`, `summary`, and `bad` with the reason if the recording
+/// could not be evaluated. The folder is a path, or a URL such as `s3://bucket/folder` in a store of the session.
 #[derive(Clone)]
 pub struct RecordingsFunction {
+    /// The plan with its derived model.
     ground: Arc<Ground>,
 }
 
@@ -50,7 +51,7 @@ impl TableFunctionImpl for RecordingsFunction {
         ] = args.exprs()
         else {
             return plan_err!(
-                "modelmill_recordings takes one text, the folder above those of the robots"
+                "modelmill_recordings needs one text argument: the folder that contains those of the robots"
             );
         };
         let folder = if folder.contains("://") {
@@ -66,17 +67,25 @@ impl TableFunctionImpl for RecordingsFunction {
     }
 }
 
-/// Where the recordings lie.
+/// The folder of the recordings.
 enum RecordingsFolder {
+    /// A path on disk.
     Path(PathBuf),
+    /// A URL in an object store.
     Stored(ListingTableUrl),
 }
 
 impl RecordingsFolder {
-    /// All recordings, and what they are read from.
-    async fn files(&self, session: &dyn Session) -> Result<(RecordingsSource, Vec<(String, File)>)> {
+    /// The source of the files, and all recordings with their robots.
+    async fn files(
+        &self,
+        session: &dyn Session,
+    ) -> Result<(RecordingsSource, Vec<(String, File)>)> {
         let (source, robots) = match self {
-            Self::Path(folder) => (RecordingsSource::Disk, robots(folder).map_err(external_error)?),
+            Self::Path(folder) => (
+                RecordingsSource::Disk,
+                robots(folder).map_err(external_error)?,
+            ),
             Self::Stored(url) => {
                 let store = session.runtime_env().object_store(url)?;
                 let above = url.prefix();
@@ -109,15 +118,18 @@ impl RecordingsFolder {
     }
 }
 
-/// What files are read from.
+/// The source of files.
 #[derive(Clone)]
 enum RecordingsSource {
+    /// The disk of this computer.
     Disk,
+    /// An object store.
     Store(Arc<dyn ObjectStore>),
 }
 
 impl RecordingsSource {
-    /// The summary of a file. What is wrong with a recording stands in it; a store that does not answer is a fault.
+    /// The summary of a file. A fault of the recording is part of the summary; a store that does not answer is an
+    /// error.
     async fn summary(&self, ground: Arc<Ground>, file: File) -> Result<Summary> {
         let bytes = match self {
             Self::Disk => None,
@@ -136,10 +148,13 @@ impl RecordingsSource {
     }
 }
 
-/// The table. Files are listed when it is scanned, since only then a store may be asked.
+/// The table. Files are listed when it is scanned, because a store is only accessible then.
 struct RecordingsTable {
+    /// The plan with its derived model.
     ground: Arc<Ground>,
+    /// The folder of the recordings.
     folder: RecordingsFolder,
+    /// Columns of the table.
     schema: SchemaRef,
 }
 
@@ -170,6 +185,7 @@ impl TableProvider for RecordingsTable {
         limit: Option<usize>,
     ) -> Result<Arc<dyn ExecutionPlan>> {
         let (source, files) = self.folder.files(session).await?;
+        // One partition per core, with about the same number of files.
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         let each = files.len().div_ceil(cores).max(1);
         let partitions = files.chunks(each).map(|files| {
@@ -185,6 +201,7 @@ impl TableProvider for RecordingsTable {
     }
 }
 
+/// Columns of the table.
 fn schema() -> SchemaRef {
     let text = |name: &str, nullable: bool| Field::new(name, DataType::Utf8, nullable);
     Arc::new(Schema::new(vec![
@@ -196,11 +213,15 @@ fn schema() -> SchemaRef {
     ]))
 }
 
-/// Some of the files.
+/// A partition of the table: some of the files.
 struct RecordingsPartition {
+    /// The plan with its derived model.
     ground: Arc<Ground>,
+    /// Columns of the table.
     schema: SchemaRef,
+    /// The source of the files.
     source: RecordingsSource,
+    /// Robots with their files.
     files: Vec<(String, File)>,
 }
 
@@ -232,7 +253,13 @@ impl PartitionStream for RecordingsPartition {
     }
 }
 
-fn summary_row(schema: SchemaRef, robot: &str, file: &File, summary: &Summary) -> Result<RecordBatch> {
+/// The row of one recording.
+fn summary_row(
+    schema: SchemaRef,
+    robot: &str,
+    file: &File,
+    summary: &Summary,
+) -> Result<RecordBatch> {
     let text = |text: &str| Arc::new(StringArray::from(vec![text])) as ArrayRef;
     let bad = summary.bad.first().map(|bad| bad.says.as_str());
     let columns: Vec<ArrayRef> = vec![

@@ -1,4 +1,4 @@
-//! Samples of recordings as they come in, in any order, and as bytes between partitions.
+//! Collects samples of recordings, in any order, and converts them to bytes for the exchange between partitions.
 
 use std::collections::BTreeMap;
 
@@ -8,15 +8,16 @@ use datafusion::arrow::datatypes::DataType;
 use datafusion::common::{DataFusionError, Result, exec_err};
 use modelmill_fleet::{Ground, Summary};
 
-/// Samples by recording: column by column, in the order in which they came.
+/// Samples by recording, column by column, in the order of their arrival.
 #[derive(Debug, Default)]
 pub(crate) struct GroupSamples {
+    /// Name of the recording, and its columns.
     recordings: BTreeMap<String, Vec<Vec<f64>>>,
 }
 
 impl GroupSamples {
-    /// Takes rows: names of recordings, then numbers; what is missing becomes NaN, which the reader of recordings refuses or leaves
-    /// out as the plan says.
+    /// Adds rows: names of recordings, then numbers. Null values become NaN, which the reader of recordings refuses or
+    /// leaves out, depending on the plan.
     pub(crate) fn add(&mut self, values: &[ArrayRef]) -> Result<()> {
         let Some((names, columns)) = values.split_first() else {
             return exec_err!(
@@ -26,7 +27,7 @@ impl GroupSamples {
         let names = cast(names, &DataType::Utf8)?;
         let Some(names) = names.as_any().downcast_ref::<StringArray>() else {
             return exec_err!(
-                "the names of recordings are no texts; cast the first column to text"
+                "the names of recordings are not texts; cast the first column to text"
             );
         };
         let columns: Vec<Float64Array> = columns
@@ -36,7 +37,7 @@ impl GroupSamples {
                 let column = column.as_any().downcast_ref::<Float64Array>().cloned();
                 column.ok_or_else(|| {
                     DataFusionError::Execution(
-                        "a column of samples holds no numbers; cast it to double".to_owned(),
+                        "a column of samples is not numeric; cast it to double".to_owned(),
                     )
                 })
             })
@@ -50,7 +51,7 @@ impl GroupSamples {
         };
         let mut from = 0;
         while from < names.len() {
-            // Rows of one recording mostly come together.
+            // Consecutive rows mostly belong to one recording, so they are copied together.
             let this = name(from);
             let to = (from..names.len())
                 .find(|row| name(*row) != this)
@@ -80,7 +81,7 @@ impl GroupSamples {
         Ok(())
     }
 
-    /// The summary of all recordings.
+    /// The sum of the summaries of all recordings; the samples are consumed.
     pub(crate) fn summary(&mut self, ground: &Ground, names: &[String]) -> Result<Summary> {
         let mut sum = ground.empty();
         for (recording, columns) in std::mem::take(&mut self.recordings) {
@@ -91,7 +92,7 @@ impl GroupSamples {
         Ok(sum)
     }
 
-    /// Bytes that are held.
+    /// Memory of the samples, bytes.
     pub(crate) fn size(&self) -> usize {
         let columns = self.recordings.iter().map(|(name, columns)| {
             name.capacity() + columns.iter().map(|one| 8 * one.capacity()).sum::<usize>()
@@ -99,7 +100,7 @@ impl GroupSamples {
         columns.sum()
     }
 
-    /// All samples as bytes.
+    /// All samples as bytes: for each recording the lengths, the name, and the columns. The samples are consumed.
     pub(crate) fn bytes(&mut self) -> Vec<u8> {
         let mut bytes = Vec::with_capacity(self.size() + 64);
         for (name, columns) in std::mem::take(&mut self.recordings) {
@@ -117,24 +118,27 @@ impl GroupSamples {
         bytes
     }
 
-    /// Takes what [`Samples::bytes`] gave.
+    /// Adds samples from the bytes of [`GroupSamples::bytes`].
     pub(crate) fn add_bytes(&mut self, bytes: &[u8]) -> Result<()> {
         let mut left = bytes;
         while !left.is_empty() {
             self.add_one(&mut left).ok_or_else(|| {
                 DataFusionError::Execution(
-                    "samples from another partition are cut off; run the query again".to_owned(),
+                    "samples from another partition are incomplete; run the query again".to_owned(),
                 )
             })?;
         }
         Ok(())
     }
 
+    /// Adds the samples of one recording from the front of `left`; `None` if bytes are missing.
     fn add_one(&mut self, left: &mut &[u8]) -> Option<()> {
         let mut number =
             || usize::try_from(u64::from_le_bytes(take_bytes(left, 8)?.try_into().ok()?)).ok();
         let [length, columns, rows] = [number()?, number()?, number()?];
-        let name = std::str::from_utf8(take_bytes(left, length)?).ok()?.to_owned();
+        let name = std::str::from_utf8(take_bytes(left, length)?)
+            .ok()?
+            .to_owned();
         let all = take_bytes(left, columns.checked_mul(rows)?.checked_mul(8)?)?;
         let kept = self
             .recordings
@@ -150,12 +154,14 @@ impl GroupSamples {
     }
 }
 
+/// Removes the first `n` bytes from `left` and returns them.
 fn take_bytes<'a>(left: &mut &'a [u8], n: usize) -> Option<&'a [u8]> {
     let (taken, rest) = left.split_at_checked(n)?;
     *left = rest;
     Some(taken)
 }
 
+/// A fault of the library as an error of DataFusion.
 pub(crate) fn external_error(fault: modelmill_fleet::Fault) -> DataFusionError {
     DataFusionError::External(Box::new(fault))
 }
