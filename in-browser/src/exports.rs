@@ -1,8 +1,8 @@
-//! What the host calls by name, and what it lends. Bytes go in through memory that [`reserve`] gives; what is answered stays
-//! where it is until the next question.
+//! The functions that the host calls by name, and those that it provides. Bytes go in through the memory of
+//! [`reserve`]. A response stays in place until the next request.
 //!
-//! Decision: four functions that pass bytes replace a generator of bindings with its own tool. Ending a worker is
-//! the only way to stop a computation; a second worker for diagnoses keeps the text alive.
+//! Decision: four functions that pass bytes replace a generator of bindings with its own tool. Ending a worker is the
+//! only way to stop a computation; with a second worker for diagnoses the editor stays responsive.
 
 use std::cell::RefCell;
 
@@ -10,19 +10,24 @@ use modelmill_workbench::RequestHandler;
 
 #[link(wasm_import_module = "mill")]
 unsafe extern "C" {
-    /// Seconds since some moment.
+    /// Seconds since a fixed but unspecified moment.
     safe fn seconds() -> f64;
-    /// Hears how far long work is: JSON that begins there and is that long.
+    /// Receives the progress of long work: `length` bytes of JSON at `start`.
     safe fn goes(start: *const u8, length: usize);
 }
 
+/// The state between calls.
 struct BrowserState {
+    /// Answers requests; it has the files and the session.
     desk: RequestHandler,
+    /// Memory for the input of the next call.
     given: Vec<u8>,
+    /// The last response.
     answer: String,
 }
 
 thread_local! {
+    // A worker is single-threaded, so one state per thread is one state per module.
     static STATE: RefCell<BrowserState> = RefCell::new(BrowserState {
         desk: RequestHandler::new(|| seconds(), |told| {
             let told = told.to_string();
@@ -33,7 +38,7 @@ thread_local! {
     });
 }
 
-/// Where the host may write that many bytes before it asks.
+/// Reserves memory into which the host writes the input of the next call; returns its address.
 #[unsafe(no_mangle)]
 pub extern "C" fn reserve(length: usize) -> *mut u8 {
     STATE.with_borrow_mut(|state| {
@@ -42,7 +47,7 @@ pub extern "C" fn reserve(length: usize) -> *mut u8 {
     })
 }
 
-/// Puts a file on the desk: its name, which is that long, and its bytes.
+/// Adds a file. The input is its name, of `name` bytes, and its contents.
 #[unsafe(no_mangle)]
 pub extern "C" fn put(name: usize) {
     STATE.with_borrow_mut(|state| {
@@ -51,7 +56,8 @@ pub extern "C" fn put(name: usize) {
     });
 }
 
-/// Answers a question, which is that long, and has its body behind it; the length of the answer in bytes.
+/// Answers a request. The input is the name of the request, of `question` bytes, and its body. Returns the length of
+/// the response in bytes.
 #[unsafe(no_mangle)]
 pub extern "C" fn ask(question: usize) -> usize {
     STATE.with_borrow_mut(|state| {
@@ -61,12 +67,13 @@ pub extern "C" fn ask(question: usize) -> usize {
     })
 }
 
-/// Where the answer begins: JSON.
+/// The address of the response, as JSON.
 #[unsafe(no_mangle)]
 pub extern "C" fn answer() -> *const u8 {
     STATE.with_borrow(|state| state.answer.as_ptr())
 }
 
+/// Splits the input into its head of `head` bytes, as text, and the rest.
 fn split_input(given: &[u8], head: usize) -> (String, &[u8]) {
     let (head, rest) = given.split_at(head.min(given.len()));
     (String::from_utf8_lossy(head).into_owned(), rest)

@@ -1,4 +1,5 @@
-//! Arrays of numpy as the library reads them: where they lie, whether state by state or column by column.
+//! Access to arrays of numpy without copying: numbers and their order go to the library, state by state or column by
+//! column.
 
 use modelmill::states::Rows;
 use numpy::{PyReadonlyArray2, PyUntypedArrayMethods};
@@ -18,7 +19,7 @@ pub(crate) fn state_matrix<'a>(py: Python<'_>, array: &'a PyReadonlyArray2<'_, f
         }),
         _ => Err(input_error(
             py,
-            "an array lies in memory neither row by row nor column by column",
+            "an array is contiguous in memory neither by rows nor by columns; pass a copy, such as numpy.ascontiguousarray(x)",
         )),
     }
 }

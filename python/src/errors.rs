@@ -1,4 +1,4 @@
-//! Faults as exceptions of the package's own class, with diagnostics as data.
+//! Faults as exceptions of the class `ModelmillError` of the package, with diagnostics as data.
 
 use modelmill::{Error, print};
 use pyo3::exceptions::PyKeyboardInterrupt;
@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 
 use crate::spelling::PythonSpelling;
 
-/// An exception `modelmill.ModelmillError` that says `says`; `diagnostics` is a list of objects.
+/// An exception `modelmill.ModelmillError` with a text; `diagnostics` is a list of objects.
 pub(crate) fn modelmill_error(py: Python<'_>, says: &str, diagnostics: &Value) -> PyErr {
     static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
     let class = CLASS.import(py, "modelmill._errors", "ModelmillError");
@@ -20,7 +20,7 @@ pub(crate) fn modelmill_error(py: Python<'_>, says: &str, diagnostics: &Value) -
     }
 }
 
-/// An exception that says what is wrong with what was given.
+/// An exception for a fault of the input.
 pub(crate) fn input_error(py: Python<'_>, says: &str) -> PyErr {
     let diagnostics = json!([{ "severity": "error", "says": says }]);
     modelmill_error(py, says, &diagnostics)

@@ -1,4 +1,4 @@
-//! Summaries of recordings for engines that run Python: they take bytes, and give bytes.
+//! Summaries of recordings of a fleet, as bytes, for query engines that run Python.
 
 use std::path::{Path, PathBuf};
 
@@ -17,11 +17,12 @@ pub(crate) struct FleetGround {
     ground: Ground,
 }
 
+/// A fault of the library as an exception.
 fn fleet_error(py: Python<'_>, fault: &Fault) -> PyErr {
     input_error(py, &fault.message().spell(&PythonSpelling))
 }
 
-/// The plan that reference recordings make, as JSON.
+/// Makes a plan from reference recordings, as JSON.
 #[pyfunction]
 #[pyo3(signature = (model, reference, columns, cutoff_hz, decimate, skip_bad_samples))]
 pub(crate) fn fleet_plan(
@@ -111,7 +112,7 @@ impl FleetGround {
         PyBytes::new(py, &bytes)
     }
 
-    /// Parameters with deviations, as JSON, with what was wrong.
+    /// Parameters with standard deviations, and the number of bad recordings, as JSON.
     fn solve(&self, py: Python<'_>, summary: &[u8]) -> PyResult<String> {
         let solved = py.detach(|| {
             let summary = Summary::of_bytes(summary)?;
@@ -121,7 +122,7 @@ impl FleetGround {
         solved.map_err(|fault: Fault| fleet_error(py, &fault))
     }
 
-    /// The days of a robot in order, each with its summary, as JSON.
+    /// Changes and dead sensors of a robot, from the summaries of its days in order, as JSON.
     fn robot(&self, py: Python<'_>, name: &str, days: Vec<(String, Vec<u8>)>) -> PyResult<String> {
         let found = py.detach(|| {
             let days = days

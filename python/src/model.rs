@@ -1,4 +1,5 @@
-//! A model and its verbs.
+//! A model with its methods: arguments from Python go to the library; results come back as JSON, text, pages and
+//! arrays.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -26,14 +27,14 @@ use crate::results::{PythonExcitation, PythonResult, PythonRecording, RemarkList
 use crate::spelling::PythonSpelling;
 use crate::run_interruptible::{JobListener, run_blocking, run_interruptible};
 
-/// States whose functions are computed in this thread, without looking for interrupts.
+/// Largest number of states for which a function is computed in this thread, without a check for interrupts.
 const FEW: usize = 256;
-/// No robot description is longer, bytes.
+/// Largest robot description that is read, bytes.
 const LARGEST_DESCRIPTION: u64 = 16 << 20;
 
 pub(crate) type ProgressCallback<'a, 'py> = Option<&'a Bound<'py, PyAny>>;
 
-/// A host whose jobs the listener hears.
+/// A host, and a listener for its jobs.
 pub(crate) fn new_host(libraries: Vec<PathBuf>, at_values: bool) -> (Host, Arc<JobListener>) {
     let listener = Arc::new(JobListener::default());
     let host = Host::new()
@@ -43,7 +44,7 @@ pub(crate) fn new_host(libraries: Vec<PathBuf>, at_values: bool) -> (Host, Arc<J
     (host, listener)
 }
 
-/// Options that make sense, or an exception.
+/// Valid options, or an exception.
 fn valid_options<T>(py: Python<'_>, says: OptionResult<T>) -> PyResult<T> {
     says.map_err(|says| input_error(py, &says))
 }
@@ -62,7 +63,7 @@ pub(crate) fn load(
     Ok(CoreModel::new(model, listener))
 }
 
-/// Derives a model of the text of a model file.
+/// Derives a model from the text of a model file.
 #[pyfunction]
 pub(crate) fn load_text(
     py: Python<'_>,
@@ -79,7 +80,7 @@ pub(crate) fn load_text(
     Ok(CoreModel::new(model, listener))
 }
 
-/// The text of a model file of a robot description, given as its text or as a file, and remarks.
+/// Converts a robot description, given as text or as a file, into the text of a model file; also returns the remarks.
 #[pyfunction]
 #[allow(clippy::too_many_arguments, reason = "each is a keyword of Python")]
 pub(crate) fn import_text(
@@ -140,7 +141,7 @@ impl CoreModel {
         }
     }
 
-    /// A fit: its text with what messages call it, or a file.
+    /// Reads a fit from a text with a name, or from a file.
     fn fit(&self, text: Option<&str>, name: &str) -> Outcome<FitFile> {
         let host = self.model.host();
         match text {
@@ -253,7 +254,7 @@ impl CoreModel {
         of_file.chain(remarks(&self.model.notes)).collect()
     }
 
-    /// What there is to know about nominal values that are missing.
+    /// Remarks on missing nominal values.
     #[getter]
     fn nominal_notes(&self) -> RemarkList {
         remarks(&self.model.nominal_values().notes)
@@ -308,7 +309,7 @@ impl CoreModel {
         self.run_interruptible(py, None, || self.functions.reactions())
     }
 
-    /// A function at states, its numbers row by row and state by state, and its shape.
+    /// Evaluates a function at states. Returns its numbers state by state and row by row, and its shape.
     #[allow(clippy::too_many_arguments, reason = "each is an array of Python")]
     fn evaluate_at<'py>(
         &self,
@@ -341,7 +342,7 @@ impl CoreModel {
         Ok((PyArray1::from_vec(py, found), shape))
     }
 
-    /// A function as C for many states, and its shape.
+    /// The C source of a function for many states, and the shape of its result.
     fn vectors_c(&self, py: Python<'_>, function: &str) -> PyResult<(String, [usize; 2])> {
         let function = function_by_name(py, function)?;
         self.run_interruptible(py, None, || {
@@ -464,7 +465,7 @@ impl CoreModel {
         })
     }
 
-    /// Several runs against the first; `unread` are those that could not be read, with the place among all, name and reason.
+    /// Compares runs with the first one; `unread` are those that could not be read, with index, name and reason.
     fn runs(
         &self,
         py: Python<'_>,
@@ -569,7 +570,7 @@ impl CoreModel {
         })
     }
 
-    /// The model with a fit in its file, and remarks.
+    /// The model with the values of a fit in its file, and remarks.
     fn adopt(&self, py: Python<'_>, fit: Option<&str>, name: &str) -> PyResult<(Self, RemarkList)> {
         let (model, notes) = self.run_interruptible(py, None, || {
             let adoption = self.model.adopt(&self.fit(fit, name)?, name)?;
@@ -580,7 +581,7 @@ impl CoreModel {
         Ok((self.with_same_host(model), notes))
     }
 
-    /// A robot description of the model, with the physical parameters of a fit if there is one; and remarks.
+    /// A robot description of the model, with the physical parameters of a fit if given, and remarks.
     fn export(
         &self,
         py: Python<'_>,
@@ -601,7 +602,7 @@ impl CoreModel {
         })
     }
 
-    /// What another model changes; along recordings, as both read them, what that costs.
+    /// Changes from this model to another one; with recordings also changes of force, power and error along them.
     fn diff(
         &self,
         py: Python<'_>,
@@ -660,7 +661,7 @@ impl CoreModel {
     }
 }
 
-/// What a log holds, before a model reads it.
+/// Contents of a log, independent of a model.
 #[pyfunction]
 pub(crate) fn contents(py: Python<'_>, path: PathBuf) -> PyResult<PythonResult> {
     let (host, listener) = new_host(Vec::new(), false);

@@ -1,4 +1,4 @@
-//! Keywords of Python as options of the library, refused where they make no sense.
+//! Converts keywords of Python to options of the library, and refuses invalid values.
 
 use modelmill::diagnose::Named;
 use modelmill::excite::{Criterion, Limit, Options, Request, Separate};
@@ -7,7 +7,7 @@ use modelmill::recording::{DerivativeSource, MAX_FILTER_ORDER, Preparation, Read
 use modelmill::runs::{Asked, KnownLoad, PerRun};
 use pyo3::prelude::*;
 
-/// What is wrong with an option.
+/// An option, or a sentence with the fault of its value.
 pub(crate) type OptionResult<T> = Result<T, String>;
 
 /// How a recording is read and prepared; the keywords of every method that takes recordings.
@@ -39,7 +39,7 @@ impl ReadingOptions {
         }
         if self.decimate == 0 {
             return Err(
-                "decimate=0: expected a whole number from 1 on; 1 keeps all samples".to_owned(),
+                "decimate=0: expected a whole number of at least 1; 1 keeps all samples".to_owned(),
             );
         }
         if let Some((from, to)) = self.between
@@ -100,13 +100,13 @@ pub(crate) struct EstimationOptions {
 
 impl EstimationOptions {
     pub(crate) fn estimation(&self) -> OptionResult<Estimation> {
-        let prior = check_positive("prior", self.prior, "a relative deviation such as 0.2")?;
+        let prior = check_positive("prior", self.prior, "a relative standard deviation such as 0.2")?;
         let refinement = match (prior, self.physical, self.essential) {
             (None, false, false) => Refinement::None,
             (Some(sigma), false, false) => Refinement::Prior(sigma),
             (None, true, false) => Refinement::Physical,
             (None, false, true) => Refinement::Essential,
-            _ => return Err("prior, physical and essential exclude each other".to_owned()),
+            _ => return Err("prior, physical and essential exclude each other; give one of them".to_owned()),
         };
         if self
             .standstill
@@ -135,7 +135,7 @@ impl EstimationOptions {
     }
 }
 
-/// What is asked of an excitation.
+/// Options of an excitation.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 pub(crate) struct ExcitationOptions {
@@ -184,7 +184,7 @@ impl ExcitationOptions {
             None => None,
             Some(_) if self.apart_from.is_empty() => {
                 return Err(
-                    "separate: say from what, as in apart_from=[\"viscous_friction@motor\"]"
+                    "separate: the other effects are missing; give them, as in apart_from=[\"viscous_friction@motor\"]"
                         .to_owned(),
                 );
             }
@@ -220,7 +220,7 @@ impl ExcitationOptions {
     }
 }
 
-/// What is asked of runs beside what changed.
+/// Options for the joint fit of several runs.
 pub(crate) fn runs_options(per_run: &[String], loads: &[String]) -> OptionResult<Asked> {
     Ok(Asked {
         per_run: per_run
@@ -234,6 +234,7 @@ pub(crate) fn runs_options(per_run: &[String], loads: &[String]) -> OptionResult
     })
 }
 
+/// An optional number, which must be finite and above 0.
 fn check_positive(name: &str, value: Option<f64>, expected: &str) -> OptionResult<Option<f64>> {
     match value {
         Some(value) if !(value > 0.0 && value.is_finite()) => {
@@ -243,6 +244,7 @@ fn check_positive(name: &str, value: Option<f64>, expected: &str) -> OptionResul
     }
 }
 
+/// The fault of a text that is not one of the known values.
 fn expected_one_of(name: &str, given: &str, known: &[&str]) -> String {
     format!("{name}={given:?}: expected one of {}", known.join(", "))
 }

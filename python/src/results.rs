@@ -1,4 +1,4 @@
-//! What verbs found: JSON as the program writes it, text, pages; and recordings that were read.
+//! Results of methods as JSON (the same as the program prints), text and pages; and prepared recordings.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -12,7 +12,7 @@ use serde_json::Value;
 use crate::model::CoreModel;
 use crate::spelling::PythonSpelling;
 
-/// Remarks: severity and text.
+/// Remarks, each with severity and text.
 pub(crate) type RemarkList = Vec<(&'static str, String)>;
 
 pub(crate) fn remarks<'a>(notes: impl IntoIterator<Item = &'a Note>) -> RemarkList {
@@ -26,7 +26,7 @@ pub(crate) fn remarks<'a>(notes: impl IntoIterator<Item = &'a Note>) -> RemarkLi
     notes.into_iter().map(one).collect()
 }
 
-/// Where a recording comes from: files of one run, or columns with their names.
+/// The source of a recording: files of one run, or named columns.
 #[derive(FromPyObject)]
 pub(crate) enum PythonSource<'py> {
     Files(Vec<PathBuf>),
@@ -80,18 +80,21 @@ type PreparedArrays<'py> = (
     ArrayColumns<'py>,
 );
 
-/// What a verb found.
+/// The result of a method.
 #[pyclass(frozen)]
 #[derive(Default)]
 pub(crate) struct PythonResult {
-    /// As the program prints it with `--json`.
+    /// The JSON that the program prints with `--json`.
     json: String,
+    /// The text that the program prints.
     text: String,
-    /// One page of it, where there is one.
+    /// The HTML page, if the method has one.
     page: Option<String>,
+    /// Remarks.
     notes: RemarkList,
+    /// Values of the base parameters, if there are any.
     values: Vec<f64>,
-    /// The model with what was found.
+    /// The model with the result, for example with the effects that a diagnosis found.
     model: Option<CoreModel>,
 }
 
@@ -154,7 +157,7 @@ impl PythonResult {
     }
 }
 
-/// A trajectory that was found.
+/// A planned trajectory.
 #[pyclass(frozen)]
 pub(crate) struct PythonExcitation {
     pub(crate) found: modelmill::excite::Excited,

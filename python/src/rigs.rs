@@ -1,4 +1,4 @@
-//! Whole machines in numbers: their recordings, and the models that they reduce to.
+//! Rigs, numeric models of complete machines: simulated recordings, and the reduction to planar models.
 
 use std::path::PathBuf;
 
@@ -11,7 +11,7 @@ use crate::model::new_host;
 use crate::results::{PythonResult, RemarkList};
 use crate::work::run_interruptible;
 
-/// What the sensors of a rig read.
+/// The recording of a simulated rig.
 #[pyclass(frozen)]
 pub(crate) struct PythonSimulation {
     made: modelmill::simulate::Simulated,
@@ -61,7 +61,7 @@ impl PythonSimulation {
     }
 }
 
-/// Drives a rig along a trajectory.
+/// Simulates a rig along a trajectory.
 #[pyfunction]
 pub(crate) fn simulate(
     py: Python<'_>,
@@ -78,7 +78,7 @@ pub(crate) fn simulate(
     Ok(PythonSimulation { made })
 }
 
-/// Reduces a rig to a planar model: what was assumed, and the text of the model file.
+/// Reduces a rig to a planar model. Returns the report on all assumptions, and the text of the model file.
 #[pyfunction]
 pub(crate) fn reduce(
     py: Python<'_>,

@@ -1,4 +1,4 @@
-//! How a notebook asks for what the library advises.
+//! Spelling of the library's advice for Python: options as keywords, commands as methods.
 
 use std::fmt::Write as _;
 
@@ -8,7 +8,7 @@ use modelmill::edit::NewEffect;
 use modelmill::print::{CommandName, OptionName, OptionSetting, RemedySpelling, StepSpelling};
 use pyo3::prelude::*;
 
-/// Keywords, and calls of methods of a model `m`.
+/// Spells advice as keywords and as calls of methods of a model `m`.
 pub(crate) struct PythonSpelling;
 
 impl RemedySpelling for PythonSpelling {
@@ -67,7 +67,7 @@ fn places(at: &[String]) -> String {
     }
 }
 
-/// An effect as `excite` takes it: `kind@place,place:name=value`.
+/// An effect as an argument of `excite`: `kind@place,place:name=value`.
 fn effect_argument(effect: &Named) -> String {
     let mut text = format!("{}@{}", effect.effect.kind, effect.effect.at.join(","));
     for (name, value) in &effect.values {
@@ -76,11 +76,11 @@ fn effect_argument(effect: &Named) -> String {
     text
 }
 
-/// What an option of the library is in NotebookAdvice.
+/// The name of an option of the library in Python.
 enum PythonName {
     /// A keyword of a function or method.
     Keyword(&'static str),
-    /// A method of its own, which takes the value.
+    /// A separate method, with the value as argument.
     Method(&'static str),
 }
 

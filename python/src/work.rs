@@ -1,5 +1,5 @@
-//! Long work beside Python: the interpreter lock is given back, an interrupt stops the work, progress is told, and a panic becomes
-//! an exception.
+//! Runs long work in a separate thread: the interpreter lock is released, an interrupt stops the work, progress is
+//! reported, and a panic becomes an exception.
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -14,10 +14,10 @@ use pyo3::prelude::*;
 
 use crate::errors::{library_error, input_error};
 
-/// How often an interrupt is looked for and progress is told.
+/// Interval at which interrupts are checked and progress is reported.
 const TICK: Duration = Duration::from_millis(50);
 
-/// Hears which jobs of a model go on, and stops them.
+/// Listens to the running jobs of a model, and cancels them on request.
 #[derive(Default)]
 pub(crate) struct JobListener(Mutex<ListenerState>);
 
@@ -43,7 +43,7 @@ impl Progress for JobListener {
 
 impl JobListener {
     fn lock_state(&self) -> MutexGuard<'_, ListenerState> {
-        // What a panic leaves behind is a list of jobs, which is as good as before.
+        // A panic of another thread leaves a valid list of jobs.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -59,7 +59,7 @@ impl JobListener {
         *self.lock_state() = ListenerState::default();
     }
 
-    /// The job that began last: what it is, steps done, steps in all (0 if nobody knows).
+    /// The job that started last: its name, steps done, number of steps (0 if unknown).
     fn current_job(&self) -> Option<(String, u64, usize)> {
         let heard = self.lock_state();
         let (what, total, job) = heard.jobs.last()?;
@@ -67,8 +67,8 @@ impl JobListener {
     }
 }
 
-/// Does work in a thread of its own while this one listens for interrupts and tells `progress` what goes on:
-/// `progress(what, done, total)`.
+/// Runs work in a separate thread, while this one checks for interrupts and reports progress by `progress(what, done,
+/// total)`.
 pub(crate) fn run_interruptible<T: Send>(
     py: Python<'_>,
     listener: &JobListener,
@@ -78,7 +78,7 @@ pub(crate) fn run_interruptible<T: Send>(
     let (sender, mut receiver) = channel::<()>();
     let (found, stopped) = thread::scope(|scope| {
         let worker = scope.spawn(move || {
-            // Dropped at the end, however it comes.
+            // Dropped when the work ends, also by a panic; this wakes the waiting thread.
             let _ends = sender;
             work()
         });
@@ -110,7 +110,7 @@ pub(crate) fn run_interruptible<T: Send>(
     }
 }
 
-/// Does short work in this thread.
+/// Runs short work in this thread.
 pub(crate) fn run_blocking<T: Send>(
     py: Python<'_>,
     work: impl FnOnce() -> Outcome<T> + Send,
@@ -121,12 +121,12 @@ pub(crate) fn run_blocking<T: Send>(
     }
 }
 
-/// A panic is a defect of the library.
+/// The exception for a panic, which is a defect of the library.
 fn panic_error(py: Python<'_>, panic: &(dyn Any + Send)) -> PyErr {
     let said = panic.downcast_ref::<&str>().copied();
     let said = said.or_else(|| panic.downcast_ref::<String>().map(String::as_str));
     let says = format!(
-        "modelmill met a defect of its own: {}. Please report it with the model file and the call.",
+        "internal error of modelmill: {}. Please report it with the model file and the call.",
         said.unwrap_or("no message")
     );
     input_error(py, &says)
