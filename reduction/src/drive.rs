@@ -1,4 +1,5 @@
-//! Step 4: drives of the rig on the reduced model, and how far their lengths and directions are from the true ones.
+//! Step 4: compares the linear drives of the reduced model with those of the rig. Contact points go in; the errors of
+//! length and direction along the samples come out.
 
 use modelmill_rig::BodyAnchor;
 use nalgebra::Vector2;
@@ -7,14 +8,17 @@ use crate::part::SubstitutionPart;
 use crate::report::{AssumptionSize, ReductionReport};
 use crate::samples::{MotionPlane, MotionSample, MotionSamples};
 
-/// A place as the model has it: on a part, in its frame, or in the plane.
+/// A point of the model.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ContactPlace {
+    /// Index of its part; none is the base.
     pub(crate) part: Option<usize>,
+    /// Position in the frame of the part, or in the plane, m.
     pub(crate) at: Vector2<f64>,
 }
 
 impl ContactPlace {
+    /// Its position in the plane at a sample, m.
     pub(crate) fn plane_position(
         &self,
         parts: &[SubstitutionPart],
@@ -27,7 +31,8 @@ impl ContactPlace {
         })
     }
 
-    /// The nearest place on the longitudinal axis at the same distance from the joint.
+    /// The nearest point on the longitudinal axis of its part at the same distance from the joint; points of the base
+    /// stay.
     pub(crate) fn projected_on_axis(self) -> Self {
         let at = Vector2::new(self.at.norm().copysign(self.at.x), 0.0);
         if self.part.is_some() {
@@ -38,7 +43,7 @@ impl ContactPlace {
     }
 }
 
-/// Compares a linear drive of the model with the rig's along the samples.
+/// Compares a linear drive of the model with the rig's along the samples, and reports the largest errors.
 pub(crate) fn check_linear(
     name: &str,
     ends: [BodyAnchor; 2],
@@ -48,6 +53,7 @@ pub(crate) fn check_linear(
     samples: &MotionSamples,
     report: &mut ReductionReport,
 ) {
+    // Vector from the first to the second contact: projected truth, and model.
     let vectors = |moment: &MotionSample| {
         let truth = plane.plane_position(&moment.place(&ends[1]))
             - plane.plane_position(&moment.place(&ends[0]));
@@ -73,9 +79,9 @@ pub(crate) fn check_linear(
         name,
         "acts between the same points",
         vec![
-            AssumptionSize::new("length is off by", length, "m"),
-            AssumptionSize::new("direction by", direction, "rad"),
-            AssumptionSize::new("leans out of the plane by", out, "m"),
+            AssumptionSize::new("error of the length", length, "m"),
+            AssumptionSize::new("error of the direction", direction, "rad"),
+            AssumptionSize::new("component out of the plane", out, "m"),
         ],
     );
 }

@@ -1,22 +1,26 @@
-//! Names of a plan looked up in its rig: bodies, groups, points, parts. All findings are collected.
+//! Resolves the names of a plan in its rig: bodies, groups, points and parts. Names go in, indices and anchors come
+//! out; all faults are collected in a log.
 
 use modelmill_rig::{BodyAnchor, Rig, RigLog, source_span};
 
 use crate::part::SubstitutionPart;
 use crate::plan::{PlanEntry, PlanName};
 
-/// A name that leads nowhere, which was reported.
+/// A name that does not exist; the log has the fault.
 pub(crate) struct UnknownName;
 
 /// Names that a plan may use.
 pub(crate) struct PlanNames<'a> {
+    /// The rig.
     pub(crate) rig: &'a Rig,
+    /// The plan.
     pub(crate) plan: &'a PlanEntry,
-    /// Groups with their bodies; a body that no group names is one by itself.
+    /// Groups with the indices of their bodies; a body without a group is a group by itself.
     pub(crate) groups: Vec<(String, Vec<usize>)>,
 }
 
 impl<'a> PlanNames<'a> {
+    /// Resolves the groups of a plan. Reports bodies that do not exist or are in two groups.
     pub(crate) fn new(rig: &'a Rig, plan: &'a PlanEntry, log: &mut RigLog) -> Self {
         let bodies: Vec<&str> = rig.bodies.iter().map(|body| body.name.as_str()).collect();
         let mut groups: Vec<(String, Vec<usize>)> = Vec::new();
@@ -43,7 +47,7 @@ impl<'a> PlanNames<'a> {
         Self { rig, plan, groups }
     }
 
-    /// Bodies of groups; each group may be used once.
+    /// The bodies of some groups. Adds the groups to `used`, and reports groups that were used before or do not exist.
     pub(crate) fn bodies(
         &self,
         names: &[PlanName],
@@ -71,7 +75,7 @@ impl<'a> PlanNames<'a> {
         bodies
     }
 
-    /// A point by its name in the model or, where `[points]` does not have it, in the rig.
+    /// A point by its name in `[points]` of the plan or, if it is not there, in the rig.
     pub(crate) fn point(&self, name: &PlanName, log: &mut RigLog) -> Option<BodyAnchor> {
         let renamed = self
             .plan
@@ -96,7 +100,7 @@ impl<'a> PlanNames<'a> {
         found.map(|point| point.anchor)
     }
 
-    /// What the model calls a point of the rig.
+    /// The name in the model of a point of the rig; none if the point has no name.
     pub(crate) fn point_name(&self, anchor: &BodyAnchor) -> Option<String> {
         let here = |name: &str| {
             self.rig
@@ -105,7 +109,7 @@ impl<'a> PlanNames<'a> {
                 .any(|point| point.name == name && &point.anchor == anchor)
         };
         let renamed = self.plan.points.iter().find(|(_, rig)| here(rig.get_ref()));
-        // A rig's own name may be taken by another point of the model.
+        // The name in the rig can be used only if no other point of the model has it.
         let free = |name: &str| self.plan.points.keys().all(|model| model.get_ref() != name);
         renamed
             .map(|(model, _)| model.get_ref().clone())
@@ -119,7 +123,7 @@ impl<'a> PlanNames<'a> {
             })
     }
 
-    /// The part that a point is on, none for the base; only leading bodies have a place in the model.
+    /// The index of the part of a point; none for the base. Only points of leading bodies are in the model.
     pub(crate) fn owner(
         &self,
         parts: &[SubstitutionPart],
@@ -145,23 +149,24 @@ impl<'a> PlanNames<'a> {
             log.error(
                 source_span(0, &name.span()),
                 format!(
-                    "`{}` is on `{}`, which leads no part",
+                    "`{}` is on `{}`, which is not the leading body of a part",
                     name.get_ref(),
                     self.rig.bodies[body].name
                 ),
-                "expected a point of the base or of a body that leads a part",
-                &format!("bodies that lead a part are {}", leads.join(", ")),
+                "expected a point of the base or of a leading body",
+                &format!("leading bodies are {}", leads.join(", ")),
             );
         }
         part.map(Some).ok_or(UnknownName)
     }
 }
 
+/// Reports a body or group that is used twice.
 fn report_duplicate(name: &PlanName, what: &str, log: &mut RigLog) {
     log.error(
         source_span(0, &name.span()),
         format!("`{}` is in more than one {what}", name.get_ref()),
         "this is the second time",
-        "its mass would count twice; delete one of them",
+        "its mass would be counted twice; delete one of them",
     );
 }

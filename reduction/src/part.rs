@@ -1,8 +1,8 @@
 //! Step 2: groups that move alike become one substitution part; groups that only translate become point masses.
 //!
-//! That they move alike is not taken on trust: along sampled motions the bodies of a part must keep their distances
-//! up to a shift that is constant in the plane, which changes no force. Then eq. (1) of the paper gives mass, centre
-//! and inertia of all together.
+//! The motion is checked along samples: the bodies of a part must keep their positions relative to each other, up to a
+//! constant shift in the plane, which changes no force. Then eq. (1) of the paper gives mass, centre and inertia of the
+//! part.
 
 use modelmill_rig::{BodyAnchor, Rig};
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
@@ -11,19 +11,20 @@ use crate::planar::{PlanarBody, planar_body};
 use crate::report::{AssumptionSize, ReductionReport};
 use crate::samples::{MotionPlane, MotionSample, MotionSamples};
 
-/// A substitution part in the making.
+/// A substitution part: several bodies of the rig as one body of the model.
 #[derive(Clone, Debug)]
 pub(crate) struct SubstitutionPart {
+    /// Name of the part.
     pub(crate) name: String,
-    /// Bodies of all its groups, the leading one first.
+    /// Indices of the bodies of all its groups, the leading one first.
     pub(crate) bodies: Vec<usize>,
-    /// The part that carries it.
+    /// Index of the part that carries it; none is the base.
     pub(crate) parent: Option<usize>,
-    /// Where its joint is: on its carrier, and on its leading body.
+    /// Its joint, as a point of its carrier and of its leading body.
     pub(crate) joint: [BodyAnchor; 2],
-    /// The end of its longitudinal axis.
+    /// The end of its longitudinal axis, on the leading body.
     pub(crate) to: BodyAnchor,
-    /// By how much the model shifts it in the plane.
+    /// Constant shift of the part in the model relative to the rig, m.
     pub(crate) shift: Vector2<f64>,
 }
 
@@ -36,7 +37,7 @@ impl SubstitutionPart {
         axis.y.atan2(axis.x)
     }
 
-    /// By how much it has turned since then, rad, within half a turn.
+    /// Its rotation since the nominal configuration, rad, between -pi and pi.
     pub(crate) fn rotation_angle(
         &self,
         moment: &MotionSample,
@@ -46,7 +47,7 @@ impl SubstitutionPart {
         body_rotation(self.bodies[0], moment, plane, samples)
     }
 
-    /// A place of its leading body, in the part's frame.
+    /// A point of its leading body in the frame of the part, m.
     pub(crate) fn local_position(
         &self,
         anchor: &BodyAnchor,
@@ -59,7 +60,7 @@ impl SubstitutionPart {
         rotation(-self.nominal_angle(plane, samples)) * d
     }
 
-    /// Where the model has a place of its frame.
+    /// The position in the plane, in the model, of a point of its frame at a sample, m.
     pub(crate) fn model_position(
         &self,
         local: &Vector2<f64>,
@@ -73,13 +74,13 @@ impl SubstitutionPart {
     }
 }
 
-/// A rotation in the plane.
+/// The rotation matrix of the plane for an angle in rad.
 pub(crate) fn rotation(angle: f64) -> Matrix2<f64> {
     let (s, c) = angle.sin_cos();
     Matrix2::new(c, -s, s, c)
 }
 
-/// By how much a body has turned about the normal since the nominal configuration.
+/// The rotation of a body about the normal since the nominal configuration, rad.
 fn body_rotation(
     body: usize,
     moment: &MotionSample,
@@ -91,13 +92,13 @@ fn body_rotation(
     now.y.atan2(now.x)
 }
 
-/// An angle within half a turn.
+/// An angle between -pi and pi.
 fn wrap_angle(angle: f64) -> f64 {
     let turn = 2.0 * std::f64::consts::PI;
     angle - turn * (angle / turn).round()
 }
 
-/// Mass, centre in the part's frame and inertia of all its bodies, eq. (1); how well they move alike is reported.
+/// Mass, centre in the part's frame and inertia of all its bodies, eq. (1). Reports how closely the bodies move alike.
 pub(crate) fn substitute(
     rig: &Rig,
     part: &SubstitutionPart,
@@ -135,7 +136,7 @@ pub(crate) fn substitute(
                 ),
                 vec![
                     AssumptionSize::new("angle between them changes by", twist, "rad"),
-                    AssumptionSize::new("place strays by", strays, "m"),
+                    AssumptionSize::new("position changes by", strays, "m"),
                 ],
             );
         }
@@ -147,14 +148,15 @@ pub(crate) fn substitute(
     merge_bodies(&flats)
 }
 
-/// A place rides on a part if it is `joint + turn * arm + shift` at all times: arm and shift by least squares, and
-/// the largest distance from that.
+/// Fits the motion of a point that is carried by a part, `joint + rotation * arm + shift`, by least squares. Returns
+/// arm, shift and the largest residual, m.
 fn fit_carried_point(
     part: &SubstitutionPart,
     at: &BodyAnchor,
     plane: &MotionPlane,
     samples: &MotionSamples,
 ) -> (Vector2<f64>, Vector2<f64>, f64) {
+    // Two rows per sample; the nominal configuration is the last one.
     let n = samples.moments.len() + 1;
     let mut matrix = DMatrix::zeros(2 * n, 4);
     let mut right = DVector::zeros(2 * n);
@@ -170,7 +172,8 @@ fn fit_carried_point(
             right[row] = d[row % 2];
         }
     }
-    // A place on the leading body rides without any shift, also on a part that never turns.
+    // A point of the leading body has no shift; for a part that never rotates the fit could not distinguish arm and
+    // shift.
     let solved = if at.body == Some(part.bodies[0]) {
         None
     } else {
@@ -182,7 +185,7 @@ fn fit_carried_point(
     (Vector2::new(x[0], x[1]), Vector2::new(x[2], x[3]), strays)
 }
 
-/// Eq. (1): total mass, common centre, inertia about it.
+/// Eq. (1): total mass, common centre of mass, and inertia about it (Steiner).
 pub(crate) fn merge_bodies(flats: &[PlanarBody]) -> PlanarBody {
     let mass: f64 = flats.iter().map(|flat| flat.mass).sum();
     let moment: Vector2<f64> = flats.iter().map(|flat| flat.mass * flat.centre).sum();
@@ -202,7 +205,7 @@ pub(crate) fn merge_bodies(flats: &[PlanarBody]) -> PlanarBody {
     }
 }
 
-/// The three residuals of eq. (1) between what a part is and what the model says.
+/// The three residuals of eq. (1) between the exact values of a part and those of the model.
 pub(crate) fn part_residuals(whole: &PlanarBody, said: &PlanarBody) -> Vec<AssumptionSize> {
     vec![
         AssumptionSize::new("eq. (1): mass", whole.mass - said.mass, "kg"),
@@ -211,9 +214,10 @@ pub(crate) fn part_residuals(whole: &PlanarBody, said: &PlanarBody) -> Vec<Assum
     ]
 }
 
-/// A point mass in place of groups: residuals of eq. (1) in the nominal configuration, and whether they matter.
+/// Replaces groups by point masses, and returns the mass in kg. Reports the residuals of eq. (1) in the nominal
+/// configuration, and whether they have an effect on the forces.
 ///
-/// `points` are the places of the masses, in equal shares, on the bodies of the rig that they ride on.
+/// `points` are the positions of the masses, in equal shares, on bodies of the rig.
 pub(crate) fn lump_mass(
     rig: &Rig,
     name: &str,
@@ -236,6 +240,7 @@ pub(crate) fn lump_mass(
             inertia: 0.0,
         })
         .collect();
+    // Residuals have no effect if the bodies do not rotate and accelerate like the points.
     let turns = samples.largest(|moment| {
         bodies.iter().fold(0.0, |most: f64, b| {
             most.max(moment.motion.bodies[*b].w_WB_W.dot(&plane.normal).abs())
@@ -256,16 +261,20 @@ pub(crate) fn lump_mass(
         most
     });
     let mut sizes = part_residuals(&whole, &merge_bodies(&masses));
-    sizes.push(AssumptionSize::new("turns at up to", turns, "rad/s"));
     sizes.push(AssumptionSize::new(
-        "accelerates otherwise by up to",
+        "largest rate of rotation",
+        turns,
+        "rad/s",
+    ));
+    sizes.push(AssumptionSize::new(
+        "largest difference of acceleration",
         strays,
         "m/s^2",
     ));
     let says = if sizes[3].is_significant() || sizes[4].is_significant() {
-        "becomes a point mass; it turns or moves otherwise than the point, so that the residuals are felt"
+        "becomes a point mass; it rotates or moves differently from the point, so the residuals have an effect on the forces"
     } else {
-        "becomes a point mass; it only translates, with the point, so that its centre and inertia change no force"
+        "becomes a point mass; it only translates with the point, so its centre and inertia change no force"
     };
     report.add(2, name, says, sizes);
     whole.mass

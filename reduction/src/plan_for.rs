@@ -1,8 +1,8 @@
-//! A plan for a rig that has none: every body is a part, hung on the first revolute joint that reaches it from the
-//! base; joints that are left over close loops.
+//! Generates a plan for a rig: every body becomes a part, connected by the first revolute joint that reaches it from
+//! the base. The remaining joints close loops.
 //!
-//! The plan is written as the text of a plan file over points that are added to a copy of the rig, so that it goes
-//! the same way as a plan by hand.
+//! The plan is written as the text of a plan file, with points that are added to a copy of the rig. It is then read
+//! like any plan.
 
 use std::fmt::Write as _;
 
@@ -13,9 +13,9 @@ use nalgebra::Vector3;
 
 use crate::plan::{ReductionPlan, plan};
 
-/// Makes a plan in which every body is a part of its own.
+/// Generates a plan in which every body is a separate part.
 ///
-/// Fails when a body cannot be reached by revolute joints; such rigs need a plan by hand.
+/// Fails if a body cannot be reached by revolute joints; such rigs need a plan written by hand.
 pub fn default_plan(rig: &Rig) -> Result<ReductionPlan, Message> {
     let mut rig = rig.clone();
     let hinges: Vec<(usize, [BodyAnchor; 2])> = (0..rig.joints.len())
@@ -23,8 +23,8 @@ pub fn default_plan(rig: &Rig) -> Result<ReductionPlan, Message> {
         .collect();
     if let Some(other) = (0..rig.joints.len()).find(|j| rig.hinge(*j).is_none()) {
         return Err(message!(
-            "`{}` is no revolute joint: reducing this rig takes a plan ({}), in which parts and lumped masses stand \
-             for what other joints hold",
+            "`{}` is not a revolute joint, so this rig needs a plan ({}), in which parts and lumped masses replace the \
+             bodies at other joints",
             rig.joints[other].name,
             Remedy::option(OptionName::Plan)
         ));
@@ -33,6 +33,7 @@ pub fn default_plan(rig: &Rig) -> Result<ReductionPlan, Message> {
     let mut loops = String::new();
     let mut carried = vec![false; rig.bodies.len()];
     let is_carried = |carried: &[bool], body: Option<usize>| body.is_none_or(|body| carried[body]);
+    // Grow the tree from the base: take the next joint with at least one end on a body that is already carried.
     let mut waiting = hinges.clone();
     while let Some(next) = waiting
         .iter()
@@ -41,6 +42,7 @@ pub fn default_plan(rig: &Rig) -> Result<ReductionPlan, Message> {
         let (joint, [a, b]) = waiting.remove(next);
         let name = rig.joints[joint].name.clone();
         if is_carried(&carried, a.body) && is_carried(&carried, b.body) {
+            // Both ends are in the tree already, so this joint closes a loop.
             let ends = [a, b].map(|anchor| add_point(&mut rig, &name, anchor));
             let _ = writeln!(
                 loops,
@@ -75,18 +77,18 @@ pub fn default_plan(rig: &Rig) -> Result<ReductionPlan, Message> {
     }
     if let Some(body) = carried.iter().position(|reached| !reached) {
         return Err(message!(
-            "no revolute joint reaches `{}` from the base",
+            "`{}` is not connected to the base by revolute joints",
             rig.bodies[body].name
         ));
     }
     text.push_str(&loops);
     let mut plan =
-        plan("the plan made for this rig", &text).map_err(|failure| failure.render(false))?;
+        plan("the plan generated for this rig", &text).map_err(|failure| failure.render(false))?;
     plan.rig = Some(Box::new(rig));
     Ok(plan)
 }
 
-/// The end of a body's longitudinal axis: its farthest other joint, else its centre of mass, else along x.
+/// The end of a body's longitudinal axis: its farthest other joint, else its centre of mass, else a point along x.
 fn far_end(
     rig: &Rig,
     hinges: &[(usize, [BodyAnchor; 2])],
@@ -107,7 +109,7 @@ fn far_end(
         .unwrap_or(from + Vector3::x())
 }
 
-/// The name of a point at a place: one that is there, or a new one.
+/// The name of the point at an anchor; adds a new point if there is none.
 fn add_point(rig: &mut Rig, stem: &str, anchor: BodyAnchor) -> String {
     if let Some(point) = rig.points.iter().find(|point| point.anchor == anchor) {
         return point.name.clone();

@@ -1,7 +1,7 @@
-//! Step 1: bodies as they are in the plane of motion, and the checks that they may be seen so.
+//! Step 1: projects bodies onto the plane of motion, and checks that this is permitted.
 //!
-//! Bodies of a rig go in; mass, centre and inertia in the plane come out, with how far each group's centre of mass is
-//! from the plane and its principal axis from the normal.
+//! Bodies of a rig go in; mass, centre and inertia in the plane come out, with the distance of each group's centre of
+//! mass from the plane and the angle between its principal axis and the normal.
 
 use modelmill_rig::Rig;
 use nalgebra::{Matrix3, Vector2, Vector3};
@@ -12,10 +12,11 @@ use crate::samples::{MotionPlane, MotionSamples};
 /// A body with all masses that are fixed to it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SpatialBody {
+    /// Mass, kg.
     pub(crate) mass: f64,
-    /// Centre of mass in the body's frame.
+    /// Centre of mass in the body's frame, m.
     pub(crate) centre: Vector3<f64>,
-    /// Inertia about the centre along the body's axes.
+    /// Inertia about the centre along the body's axes, kg m^2.
     pub(crate) inertia: Matrix3<f64>,
 }
 
@@ -41,6 +42,7 @@ pub(crate) fn spatial_body(rig: &Rig, body: usize) -> SpatialBody {
     merge_spatial(&parts)
 }
 
+/// Several rigidly connected bodies as one: total mass, common centre of mass, and inertia about it (Steiner).
 fn merge_spatial(parts: &[SpatialBody]) -> SpatialBody {
     let mass: f64 = parts.iter().map(|part| part.mass).sum();
     let moment: Vector3<f64> = parts.iter().map(|part| part.mass * part.centre).sum();
@@ -63,14 +65,15 @@ fn merge_spatial(parts: &[SpatialBody]) -> SpatialBody {
 /// A body in the plane, nominal configuration.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PlanarBody {
+    /// Mass, kg.
     pub(crate) mass: f64,
-    /// Centre of mass in the plane.
+    /// Centre of mass in the plane, m.
     pub(crate) centre: Vector2<f64>,
-    /// Inertia about the normal through the centre.
+    /// Inertia about the normal through the centre, kg m^2.
     pub(crate) inertia: f64,
 }
 
-/// One body as the plane sees it.
+/// The projection of a body onto the plane, in the nominal configuration.
 pub(crate) fn planar_body(
     rig: &Rig,
     body: usize,
@@ -87,7 +90,7 @@ pub(crate) fn planar_body(
     }
 }
 
-/// Checks that all bodies move in the plane; the largest rate out of it, with the rates of the samples up to 1.
+/// The largest rate of any body out of the plane, m/s or rad/s, while coordinates have rates up to 1.
 pub(crate) fn out_of_plane_rate(plane: &MotionPlane, samples: &MotionSamples) -> f64 {
     samples.largest(|moment| {
         let bodies = moment.motion.bodies.iter();
@@ -99,7 +102,8 @@ pub(crate) fn out_of_plane_rate(plane: &MotionPlane, samples: &MotionSamples) ->
     })
 }
 
-/// How far a group is from one that the plane halves.
+/// Reports how far a group is from symmetry about the plane: distance of its centre of mass, tilt of its principal
+/// axis, and product of inertia.
 pub(crate) fn check_group(
     rig: &Rig,
     name: &str,
@@ -122,6 +126,7 @@ pub(crate) fn check_group(
         .collect();
     let whole = merge_spatial(&in_base);
     let offset = plane.normal.dot(&(whole.centre - plane.at));
+    // The part of `I n` that is not along n is the product of inertia, which loads bearings only.
     let turned = whole.inertia * plane.normal;
     let moment = plane.normal.dot(&turned);
     let product = (turned - moment * plane.normal).norm();
@@ -136,11 +141,11 @@ pub(crate) fn check_group(
     };
     let sizes = vec![
         AssumptionSize::new("centre of mass out of the plane", offset, "m"),
-        AssumptionSize::new("principal axis off the normal", tilt, "rad"),
+        AssumptionSize::new("angle of the principal axis to the normal", tilt, "rad"),
         AssumptionSize::new("product of inertia", product, "kg m^2"),
     ];
     let says = if sizes.iter().any(AssumptionSize::is_significant) {
-        "is not halved by the plane; bearings feel it, planar motion and its drives do not"
+        "is not halved by the plane; this loads bearings, but has no effect on planar motion and drives"
     } else {
         "centre of mass in the plane, principal axis perpendicular"
     };

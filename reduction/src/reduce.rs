@@ -1,4 +1,4 @@
-//! The four steps in a row: a rig and a plan go in, the text of a model file and the report come out.
+//! Runs the four steps of a reduction: a rig and a plan go in, the text of a model file and the report come out.
 
 use crate::draft::PlanarDraft;
 use crate::names::PlanNames;
@@ -11,31 +11,31 @@ use crate::write::{model_file, significant_digits};
 use modelmill_boundary::files::MemoryFiles;
 use modelmill_rig::{LoadFailure, Rig, RigLog, plain_error};
 
-/// What a reduction gives.
+/// The result of a reduction.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlanarReduction {
     /// The text of the model file.
     pub model: String,
-    /// What was assumed.
+    /// All assumptions with their sizes.
     pub report: ReductionReport,
 }
 
-/// Rates out of the plane, gaps of joints and changes of shifts above this are no rounding.
+/// Rates out of the plane, gaps of joints and changes of shifts above this are faults, not rounding.
 pub(crate) const TOLERANCE: f64 = 1e-6;
-/// Lengths and angles below this are zero.
+/// Lengths (m), angles (rad) and accelerations (m/s^2) below this count as zero.
 pub(crate) const ZERO: f64 = 1e-12;
 
 /// Reduces a rig by a plan.
 ///
-/// Fails with every fault of the plan, each with its place: unknown names, bodies that are forgotten or used twice,
-/// bodies that leave the plane, joints that do not meet.
+/// Fails with every fault of the plan, each with its position: unknown names, bodies that are missing or used twice,
+/// bodies that leave the plane, joints that do not coincide.
 pub fn reduce(rig: &Rig, plan: &ReductionPlan) -> Result<PlanarReduction, LoadFailure> {
     let mut log = RigLog::default();
     let outcome = run(rig, plan, &mut log);
     match outcome {
         Some((draft, report)) if log.0.is_empty() => {
             let model = model_file(&draft);
-            // What comes out is a sound model file, or the plan asks for something that is none.
+            // The result is loaded like any model file; its faults come from the plan.
             let path = format!("{}.toml (reduced)", draft.name);
             modelmill_spec::load(&path, &model, &MemoryFiles::default())?;
             Ok(PlanarReduction { model, report })
@@ -50,6 +50,7 @@ pub fn reduce(rig: &Rig, plan: &ReductionPlan) -> Result<PlanarReduction, LoadFa
     }
 }
 
+/// Runs all steps; `None` if the log has faults after which the others make no sense.
 fn run(
     rig: &Rig,
     plan: &ReductionPlan,
@@ -62,7 +63,7 @@ fn run(
         Ok(samples) if samples.moments.len() >= 4 => samples,
         Ok(samples) => {
             let says = format!(
-                "{} of {} sampled poses are out of the rig's reach; lower `range` in `[samples]`",
+                "{} of {} sampled poses cannot be reached by the rig; reduce `range` in `[samples]`",
                 samples.n_out_of_reach, entry.samples.number
             );
             log.0.push(plain_error(None, says));
@@ -71,7 +72,7 @@ fn run(
         Err(error) => {
             log.0.push(plain_error(
                 None,
-                format!("the rig does not stand: {error}"),
+                format!("the rig cannot be assembled in its nominal configuration: {error}"),
             ));
             return None;
         }
@@ -119,22 +120,28 @@ fn run(
     Some((draft, report))
 }
 
-/// A reduction in the making.
+/// The state of a reduction between its steps.
 pub(crate) struct ReductionState<'a> {
+    /// Names of the plan and the rig.
     pub(crate) names: PlanNames<'a>,
+    /// The plane of motion.
     pub(crate) plane: MotionPlane,
+    /// Sampled motions of the rig.
     pub(crate) samples: MotionSamples,
+    /// Parts so far; carriers stand before what they carry.
     pub(crate) parts: Vec<SubstitutionPart>,
+    /// The model so far.
     pub(crate) draft: PlanarDraft,
+    /// The report so far.
     pub(crate) report: ReductionReport,
-    /// Groups that have a place in the model.
+    /// Groups that are in the model or left out by name.
     pub(crate) used_groups: Vec<String>,
-    /// What each part of the draft stands for, in words and exactly.
+    /// For each part of the draft a description, and its exact mass, centre and inertia.
     pub(crate) part_totals: Vec<(String, PlanarBody)>,
 }
 
 impl ReductionState<'_> {
-    /// Step 1.
+    /// Step 1: checks that motion is planar, and writes gravity in the plane.
     fn planar_reduction(&mut self, log: &mut RigLog) {
         let rig = self.names.rig;
         let out = out_of_plane_rate(&self.plane, &self.samples);
@@ -142,15 +149,15 @@ impl ReductionState<'_> {
             log.0.push(plain_error(
                 None,
                 format!(
-                    "bodies leave the plane at up to {} m/s or rad/s; give the plane of motion in `[plane]`, or model \
-                     this rig in space",
+                    "bodies leave the plane with up to {} m/s or rad/s; correct the plane of motion in `[plane]`, or write a \
+                     spatial model of this rig",
                     significant_digits(out, 3)
                 ),
             ));
         }
         let reach = match self.samples.n_out_of_reach {
             0 => String::new(),
-            n => format!(" ({n} more are out of reach)"),
+            n => format!(" ({n} others cannot be reached)"),
         };
         let poses = self.samples.moments.len();
         self.report.add(
@@ -169,7 +176,11 @@ impl ReductionState<'_> {
             1,
             "gravity",
             "acts in the plane",
-            vec![AssumptionSize::new("across it", across, "m/s^2")],
+            vec![AssumptionSize::new(
+                "component out of the plane",
+                across,
+                "m/s^2",
+            )],
         );
         self.draft.gravity = match (flat.x.abs() > ZERO, flat.y.abs() > ZERO) {
             (false, false) => ["0", "0"].map(str::to_owned),
@@ -196,6 +207,7 @@ impl ReductionState<'_> {
         }
     }
 
+    /// Adds a constant for gravity, and returns its name.
     fn gravity_constant(&mut self, name: &str, value: f64) -> String {
         self.draft
             .constants
@@ -204,6 +216,7 @@ impl ReductionState<'_> {
     }
 }
 
+/// The name with the sign of a value.
 fn signed_name(name: String, value: f64) -> String {
     if value < 0.0 {
         format!("-{name}")

@@ -98,7 +98,7 @@ fn sizes_are_those_worked_out_by_hand() {
     close(one.sizes[2].value, 0.0);
     close(finding(&reduction, "m", "one and two").sizes[0].value, 0.1);
     // A rod halved into its ends has three times its inertia, and here it is felt: the arm turns.
-    let rod = finding(&reduction, "rod", "residuals are felt");
+    let rod = finding(&reduction, "rod", "residuals have an effect");
     close(rod.sizes[0].value, 0.0);
     close(rod.sizes[1].value, 0.0);
     close(rod.sizes[2].value, 0.6 * 0.25 - 0.05);
@@ -192,7 +192,7 @@ fn a_rig_without_a_plan() {
         .expect_err("a weld")
         .in_library_words();
     assert!(
-        says.contains("`weld` is no revolute joint") && says.contains("option `plan`"),
+        says.contains("`weld` is not a revolute joint") && says.contains("option `plan`"),
         "{says}"
     );
 }
