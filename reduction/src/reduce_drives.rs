@@ -1,4 +1,5 @@
-//! Loops, step 4 and what remains: drives and effects go over, and nothing is forgotten.
+//! Loops and step 4 of the reduction: adds loops, drives and effects to the draft, and checks that no group of the rig
+//! is missing.
 
 use modelmill_rig::{RigLog, source_span};
 
@@ -10,6 +11,7 @@ use crate::report::AssumptionSize;
 use crate::write::significant_digits;
 
 impl ReductionState<'_> {
+    /// Adds the loops of the plan. Reports points that do not coincide along the samples as faults.
     pub(crate) fn loops(&mut self, log: &mut RigLog) {
         let plan = self.names.plan;
         for entry in &plan.loops {
@@ -39,14 +41,14 @@ impl ReductionState<'_> {
                         entry.name.get_ref(),
                         significant_digits(gap, 3)
                     ),
-                    "expected a place that stays at the first point, once parts are shifted",
+                    "expected a point that coincides with the first one in the model",
                     "",
                 );
             }
             self.report.add(
                 2,
                 entry.name.get_ref(),
-                format!("closes where {first} meets {second}"),
+                format!("closes where {first} coincides with {second}"),
                 vec![AssumptionSize::new("gap", gap, "m")],
             );
             self.draft
@@ -55,10 +57,12 @@ impl ReductionState<'_> {
         }
     }
 
-    /// Step 4.
+    /// Step 4: adds the drives of the rig. A drive of a joint acts on the coordinate of a part; a linear drive gets two
+    /// contact points.
     pub(crate) fn drives(&mut self, log: &mut RigLog) {
         let (rig, plan) = (self.names.rig, self.names.plan);
         let known: Vec<&str> = rig.drives.iter().map(|drive| drive.name.as_str()).collect();
+        // Entries of drives that the rig does not have.
         for entry in plan
             .drive
             .iter()
@@ -85,17 +89,17 @@ impl ReductionState<'_> {
                 match active {
                     Some(coordinate) => {
                         self.report
-                            .add(4, &drive.name, format!("turns {coordinate}"), Vec::new());
+                            .add(4, &drive.name, format!("drives {coordinate}"), Vec::new());
                         self.draft.drives.push((drive.name.clone(), Ok(coordinate)));
                     }
                     None => log.error(
                         source_span(0, &here.span()),
                         format!(
-                            "the joint of the drive `{}` is the joint of no part",
+                            "the joint of the drive `{}` is not the joint of a part",
                             drive.name
                         ),
                         "",
-                        "give the part that hangs in this joint the joint's coordinate",
+                        "write the joint's coordinate as `coordinate` of the part at this joint",
                     ),
                 }
                 continue;
@@ -137,7 +141,7 @@ impl ReductionState<'_> {
         }
     }
 
-    /// Effects at drives go over into the model; others are left out and named.
+    /// Adds the effects at drives to the draft; other effects are left out and reported.
     pub(crate) fn effects(&mut self) {
         let rig = self.names.rig;
         for effect in &rig.effects {
@@ -161,7 +165,7 @@ impl ReductionState<'_> {
                 continue;
             };
             let is_parameter = |symbol: &str| known.parameters.iter().any(|p| p.symbol == symbol);
-            // A model's parameters are linear: moments of the rod's mass about its pivot.
+            // Parameters of a model are linear: zeroth, first and second moment of the rod's mass about its pivot.
             let values = match effect.law {
                 modelmill_rig::RigLaw::RodInertia { m, c, I } => {
                     vec![("Jr", I + m * c * c), ("Sr", m * c), ("mr", m)]
@@ -187,7 +191,8 @@ impl ReductionState<'_> {
         }
     }
 
-    /// Every group is in the model, or left out by name.
+    /// Checks that every group is in the model or in `leave_out`, and reports lumped masses that the model places
+    /// differently.
     pub(crate) fn check_completeness(&mut self, log: &mut RigLog) {
         let (rig, plan) = (self.names.rig, self.names.plan);
         let left = self
@@ -215,11 +220,13 @@ impl ReductionState<'_> {
         if !forgotten.is_empty() {
             log.error(
                 source_span(0, &plan.name.span()),
-                format!("the plan forgets {}", forgotten.join(", ")),
+                format!("the plan does not mention {}", forgotten.join(", ")),
                 "",
-                "put each into a `[[part]]` or a `[[lumped_mass]]`, or name it in `leave_out`",
+                "add each to a `[[part]]` or a `[[lumped_mass]]`, or list it in `leave_out`",
             );
         }
+        // A rig can place a mass differently in the balances of forces and of moments, as the paper does; a model has
+        // one place.
         let split = rig
             .lumped_masses
             .iter()
@@ -229,7 +236,8 @@ impl ReductionState<'_> {
                 .at
                 .body
                 .map_or("base", |body| rig.bodies[body].name.as_str());
-            let says = "has a mass that moments see elsewhere; the model has it at one place";
+            let says = "has a mass with a different position in the balance of moments; the model uses the position of the \
+                        balance of forces";
             self.report.add(
                 2,
                 about,
@@ -243,7 +251,7 @@ impl ReductionState<'_> {
         }
     }
 
-    /// Constants of the plan must stand for something.
+    /// Reports constants of the plan for quantities that the model does not have.
     pub(crate) fn check_constants(&self, log: &mut RigLog) {
         for is in self
             .names

@@ -1,5 +1,5 @@
-//! Step 2 of the reduction: parts hung where they belong, with frame, coordinate, mass, centre and inertia; point
-//! masses where they ride.
+//! Step 2 of the reduction: adds parts to the draft, with frame, coordinate, mass, centre and inertia, and point masses
+//! with their points.
 
 use modelmill_rig::{BodyAnchor, RigLog, source_span};
 use nalgebra::Vector2;
@@ -14,7 +14,7 @@ use crate::samples::MotionSample;
 use crate::write::significant_digits;
 
 impl ReductionState<'_> {
-    /// Step 2, parts.
+    /// Step 2, parts: adds each part of the plan with its frame and body.
     pub(crate) fn parts(&mut self, log: &mut RigLog) {
         let plan = self.names.plan;
         for entry in &plan.part {
@@ -25,7 +25,7 @@ impl ReductionState<'_> {
             {
                 log.error(
                     source_span(0, &entry.name.span()),
-                    "there are two parts of this name".to_owned(),
+                    "two parts have this name".to_owned(),
                     "",
                     "rename one",
                 );
@@ -41,12 +41,13 @@ impl ReductionState<'_> {
                 source_span(0, &plan.name.span()),
                 "this plan has no part".to_owned(),
                 "",
-                "write a `[[part]]` for each body that the model is to have",
+                "write a `[[part]]` for each body of the model",
             );
         }
     }
 
-    /// A part hung where it belongs.
+    /// Resolves a part and its shift. Reports points on wrong bodies, a part without length, and a joint that does not
+    /// coincide up to a constant shift.
     pub(crate) fn part(&self, entry: &PlanPartEntry, log: &mut RigLog) -> Option<SubstitutionPart> {
         let names = &self.names;
         let mut used = self.used_groups.clone();
@@ -62,7 +63,7 @@ impl ReductionState<'_> {
                     .collect();
                 let found = self.parts.iter().position(|part| part.name == on);
                 if found.is_none() {
-                    log.unknown_name(0, &entry.on, "part above this one", &known);
+                    log.unknown_name(0, &entry.on, "part before this one", &known);
                     return None;
                 }
                 found
@@ -83,7 +84,7 @@ impl ReductionState<'_> {
                     source_span(0, &name.span()),
                     format!("`{}` is not on {wanted}", name.get_ref()),
                     "expected a point of this body",
-                    "`at` is on what carries the part, `from` and `to` are on the first body of its first group",
+                    "`at` is a point of the carrier, `from` and `to` are points of the first body of its first group",
                 );
                 return None;
             }
@@ -106,7 +107,7 @@ impl ReductionState<'_> {
             );
             return None;
         }
-        // What the model moves in the plane: the carrier's own shift, and the gap at the joint.
+        // The shift of a part is the shift of its carrier plus the gap at the joint, which must be constant.
         let carried = parent.map_or_else(Vector2::zeros, |parent| self.parts[parent].shift);
         let gap = |moment: &MotionSample| {
             self.plane.plane_position(&moment.place(&at))
@@ -121,12 +122,12 @@ impl ReductionState<'_> {
             log.error(
                 source_span(0, &entry.from.span()),
                 format!(
-                    "`{}` does not hang at `{}`: their distance changes by {} m",
+                    "`{}` is not connected at `{}`: their distance changes by {} m",
                     part.name,
                     entry.at.get_ref(),
                     significant_digits(strays, 3)
                 ),
-                "expected a place that keeps its distance to `at`",
+                "expected a point with a constant distance to `at`",
                 "",
             );
             return None;
@@ -134,13 +135,15 @@ impl ReductionState<'_> {
         Some(part)
     }
 
-    /// Frame and coordinate of the part that was added last.
+    /// Adds frame and coordinate of the last part. A coordinate with a name of the rig is active and must be the angle
+    /// of the part up to sign and offset; others are passive.
     pub(crate) fn frame(&mut self, entry: &PlanPartEntry, log: &mut RigLog) {
         let Some(part) = self.parts.last().cloned() else {
             return;
         };
         let carrier = part.parent.map(|parent| self.parts[parent].clone());
         let (plane, samples) = (self.plane, &self.samples);
+        // Angle of the part relative to its carrier.
         let angle = |moment: &MotionSample| {
             let of = |part: &SubstitutionPart| {
                 part.nominal_angle(&plane, samples) + part.rotation_angle(moment, &plane, samples)
@@ -157,6 +160,7 @@ impl ReductionState<'_> {
             .position(|c| &c.name == coordinate);
         let mut expression = coordinate.clone();
         if let Some(k) = active {
+            // Largest difference between the angle and the coordinate of the rig, for each sign.
             let strays = |sign: f64| {
                 samples.largest(|moment| {
                     wrap_angle(
@@ -175,7 +179,7 @@ impl ReductionState<'_> {
                         part.name
                     ),
                     "expected the coordinate of its joint",
-                    "another name makes a passive coordinate",
+                    "a name that the rig does not have gives a passive coordinate",
                 );
             }
             let sign = if ahead <= back { 1.0 } else { -1.0 };
@@ -228,7 +232,7 @@ impl ReductionState<'_> {
         });
     }
 
-    /// A constant angle behind a coordinate, as an expression with its sign.
+    /// A constant angle after a coordinate, as an expression with its sign: empty, a multiple of pi/12, or a constant.
     pub(crate) fn angle_offset(&mut self, coordinate: &str, offset: f64) -> String {
         if offset.abs() < 1e-9 {
             return String::new();
@@ -249,7 +253,7 @@ impl ReductionState<'_> {
         format!(" + {name}")
     }
 
-    /// Expressions of a point's components: constants of the plan, or constants of their own.
+    /// Expressions of a point's components: zero, a constant of the plan, or a new constant.
     pub(crate) fn components(&mut self, point: &str, at: &Vector2<f64>) -> [String; 2] {
         let mut expressions = ["x", "y"].map(str::to_owned);
         for (axis, value) in expressions.iter_mut().zip([at.x, at.y]) {
@@ -289,7 +293,7 @@ impl ReductionState<'_> {
         expressions
     }
 
-    /// Mass properties of the part that was added last.
+    /// Adds the body of the last part, with symbols for mass, centre and inertia.
     pub(crate) fn body(&mut self, entry: &PlanPartEntry, log: &mut RigLog) {
         let Some(part) = self.parts.last() else {
             return;
@@ -316,7 +320,7 @@ impl ReductionState<'_> {
                 let range = entry.off_axis.as_ref().map_or(0..0, toml::Spanned::span);
                 log.error(
                     source_span(0, &range),
-                    "this is no way to treat an offset".to_owned(),
+                    "the value of `off_axis` is unknown".to_owned(),
                     "expected `keep` or `drop`",
                     "",
                 );
@@ -351,7 +355,7 @@ impl ReductionState<'_> {
             draft.centres.add_value(
                 &across,
                 "m",
-                &about("centre of mass beside the axis"),
+                &about("centre of mass across the axis"),
                 &name,
                 whole.centre.y,
             );
@@ -388,7 +392,8 @@ impl ReductionState<'_> {
         });
     }
 
-    /// Eq. (1) for every part, once all parts that share a symbol have given it their values.
+    /// Reports the residuals of eq. (1) for every part. This is possible only when all parts that share a symbol have
+    /// added their values.
     pub(crate) fn check_equation_1(&mut self) {
         let draft = &self.draft;
         for (part, (says, whole)) in draft.parts.iter().zip(&self.part_totals) {
@@ -406,7 +411,7 @@ impl ReductionState<'_> {
         }
     }
 
-    /// Step 2, lumped masses.
+    /// Step 2, lumped masses: replaces groups by point masses in equal shares.
     pub(crate) fn lumped_masses(&mut self, log: &mut RigLog) {
         let plan = self.names.plan;
         for entry in &plan.lumped_mass {
@@ -425,7 +430,7 @@ impl ReductionState<'_> {
             if points.is_empty() {
                 log.error(
                     source_span(0, &entry.at.span()),
-                    "this mass is nowhere".to_owned(),
+                    "this mass has no point".to_owned(),
                     "expected at least one point",
                     "",
                 );
@@ -464,7 +469,7 @@ impl ReductionState<'_> {
         }
     }
 
-    /// A point of the model, declared when it is first used.
+    /// Name and anchor of a point of the model; adds the point to the draft at its first use. None after a fault.
     pub(crate) fn model_point(
         &mut self,
         name: &PlanName,
@@ -477,6 +482,7 @@ impl ReductionState<'_> {
         Some((name.get_ref().clone(), anchor))
     }
 
+    /// The position of an anchor in the frame of its part, or in the plane.
     pub(crate) fn contact_place(&self, anchor: &BodyAnchor, part: Option<usize>) -> ContactPlace {
         let at = match part {
             None => self
@@ -487,6 +493,7 @@ impl ReductionState<'_> {
         ContactPlace { part, at }
     }
 
+    /// Adds a point to the draft, unless it is there already.
     pub(crate) fn declare(&mut self, name: &str, contact: ContactPlace) {
         if self.draft.points.iter().any(|point| point.name == name) {
             return;
@@ -503,7 +510,8 @@ impl ReductionState<'_> {
     }
 }
 
-/// Names of a part's mass, centre along and beside its axis, and inertia.
+/// Symbols of a part: mass, centre along and across its axis, inertia. Without a name in the plan they are made from
+/// the part's name.
 fn symbols_of(entry: &PlanPartEntry) -> [String; 4] {
     let symbols = &entry.symbols;
     let all = [
@@ -519,7 +527,7 @@ fn symbols_of(entry: &PlanPartEntry) -> [String; 4] {
     })
 }
 
-/// An angle within half a turn.
+/// An angle between -pi and pi.
 fn wrap_angle(angle: f64) -> f64 {
     let turn = 2.0 * std::f64::consts::PI;
     angle - turn * (angle / turn).round()

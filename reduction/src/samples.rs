@@ -1,27 +1,32 @@
-//! Poses and motions of the full robot, at which every claim of a reduction is checked.
+//! Sampled poses and motions of the full robot, along which every assumption of a reduction is checked. A rig, a number
+//! and a range go in; states with the motion of all bodies come out.
 //!
-//! Coordinates, rates and accelerations come from a low-discrepancy sequence (M. Roberts 2018, after H. Weyl), so
-//! that few samples fill the space evenly and every run has the same ones.
+//! Coordinates, rates and accelerations come from a low-discrepancy sequence (M. Roberts 2018, after H. Weyl): few
+//! samples fill the space evenly, and every run has the same samples.
 //!
-//! Decision: claims of a plan ("these move alike", "this only translates", "this loop closes") are measured and
-//! never assumed. Shifts that are constant in the plane change no force and are found by least squares. A claim
-//! that contradicts the motion is a fault with its place in the plan; an inexact one is a size in the report. At
-//! the end the forces of the model are compared with the rig's.
+//! Decision: assumptions of a plan ("these move alike", "this only translates", "this loop closes") are always
+//! measured. Shifts that are constant in the plane change no force and are found by least squares. An assumption that
+//! contradicts the motion is a fault with its position in the plan; an inexact one is a size in the report. At the end
+//! the forces of the model are compared with the rig's.
 
 use modelmill_rig::{BodyAnchor, BodyMotion, Rig, RigMotion, RigPoseError, RigState, RigTracker};
 use nalgebra::{Vector2, Vector3};
 
-/// The plane of motion.
+/// The plane of motion, in the rig's base frame.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct MotionPlane {
+    /// Origin of the model, m.
     pub(crate) at: Vector3<f64>,
+    /// Unit vector of the model's x axis.
     pub(crate) x: Vector3<f64>,
+    /// Unit vector of the model's y axis.
     pub(crate) y: Vector3<f64>,
+    /// Unit normal.
     pub(crate) normal: Vector3<f64>,
 }
 
 impl MotionPlane {
-    /// From two directions that span it with its normal; they need not be normal to each other.
+    /// The plane with a normal and an x direction, which need not be perpendicular to each other.
     pub(crate) fn new(at: [f64; 3], normal: [f64; 3], x: [f64; 3]) -> Self {
         let normal = Vector3::from(normal).normalize();
         let x = Vector3::from(x);
@@ -34,12 +39,12 @@ impl MotionPlane {
         }
     }
 
-    /// Components of a direction.
+    /// Components of a vector along x and y.
     pub(crate) fn components(&self, v: &Vector3<f64>) -> Vector2<f64> {
         Vector2::new(self.x.dot(v), self.y.dot(v))
     }
 
-    /// Where a place is in the plane.
+    /// The projection of a position onto the plane, m.
     pub(crate) fn plane_position(&self, p: &Vector3<f64>) -> Vector2<f64> {
         self.components(&(p - self.at))
     }
@@ -48,23 +53,25 @@ impl MotionPlane {
 /// A state with the motion of all bodies.
 #[derive(Clone, Debug)]
 pub(crate) struct MotionSample {
+    /// Coordinates, rates and accelerations.
     pub(crate) state: RigState,
+    /// Motion of all bodies.
     pub(crate) motion: RigMotion,
 }
 
 impl MotionSample {
-    /// How a body moves; the base rests.
+    /// The motion of a body; none for the base.
     pub(crate) fn body(&self, body: Option<usize>) -> Option<&BodyMotion> {
         body.and_then(|b| self.motion.bodies.get(b))
     }
 
-    /// Where an anchor is.
+    /// The position of an anchor in the base frame, m.
     pub(crate) fn place(&self, anchor: &BodyAnchor) -> Vector3<f64> {
         self.body(anchor.body)
             .map_or(anchor.at, |body| body.point_position(&anchor.at))
     }
 
-    /// How an anchor accelerates.
+    /// The acceleration of an anchor in the base frame, m/s^2.
     pub(crate) fn acceleration(&self, anchor: &BodyAnchor) -> Vector3<f64> {
         self.body(anchor.body)
             .map_or_else(Vector3::zeros, |body| body.point_acceleration(&anchor.at))
@@ -73,16 +80,18 @@ impl MotionSample {
 
 /// The nominal configuration and motions around it.
 pub(crate) struct MotionSamples {
+    /// The nominal configuration at standstill.
     pub(crate) nominal: MotionSample,
+    /// The samples.
     pub(crate) moments: Vec<MotionSample>,
-    /// How many states could not be reached.
+    /// Number of states that could not be reached.
     pub(crate) n_out_of_reach: usize,
 }
 
 impl MotionSamples {
-    /// Motions with coordinates up to `range` from nominal, rates and accelerations up to 1.
+    /// Samples with coordinates up to `range` (rad or m) from nominal, and rates and accelerations up to 1.
     ///
-    /// Fails when the rig does not stand in its nominal configuration.
+    /// Fails if the rig cannot be assembled in its nominal configuration.
     pub(crate) fn new(rig: &Rig, number: usize, range: f64) -> Result<Self, RigPoseError> {
         let mut tracker = RigTracker::new(rig)?;
         let q0 = tracker.coordinates().to_vec();
@@ -99,7 +108,7 @@ impl MotionSamples {
         let mut moments = Vec::new();
         let mut n_out_of_reach = 0;
         for state in sampled_states(&q0, number, range) {
-            // Each from the nominal configuration, so that all are assembled alike.
+            // Each pose is solved from the nominal configuration, so that all have the same assembly mode.
             let mut from_nominal = tracker.clone();
             match from_nominal.follow(&state) {
                 Ok(motion) => moments.push(MotionSample { state, motion }),
@@ -113,7 +122,7 @@ impl MotionSamples {
         })
     }
 
-    /// The largest of a quantity over all motions.
+    /// The largest magnitude of a quantity over all samples; NaN if any is NaN.
     pub(crate) fn largest(&self, of: impl Fn(&MotionSample) -> f64) -> f64 {
         self.moments.iter().map(of).fold(
             0.0,
@@ -122,10 +131,10 @@ impl MotionSamples {
     }
 }
 
-/// The rig's own forces at motions around its nominal configuration, for a model to be held against: one state and
-/// one force per drive each; poses out of reach are left out.
+/// The rig's forces at sampled motions around its nominal configuration, for a comparison with a model: pairs of a
+/// state and one force per drive (N or N m). Poses that cannot be reached are left out.
 ///
-/// Fails when the rig does not stand, or its drives cannot balance a load.
+/// Fails if the rig cannot be assembled, or its drives cannot balance a load.
 pub fn sampled_forces(
     rig: &Rig,
     number: usize,
@@ -138,10 +147,11 @@ pub fn sampled_forces(
         .collect()
 }
 
+/// The states of a low-discrepancy sequence in 3n dimensions, around the coordinates `q0`.
 fn sampled_states(q0: &[f64], number: usize, range: f64) -> impl Iterator<Item = RigState> {
     let n = q0.len();
     let dimension = 3 * n;
-    // The positive root of x^(d+1) = x + 1.
+    // The positive root of x^(d+1) = x + 1, by fixed-point iteration; its powers are the steps of the sequence.
     let mut root: f64 = 1.5;
     for _ in 0..60 {
         root = (1.0 + root).powf(1.0 / (dimension as f64 + 1.0));

@@ -1,4 +1,4 @@
-//! The draft of a planar model as the text of a model file.
+//! Writes the draft of a planar model as the text of a model file, and formats numbers and texts for TOML.
 
 use std::fmt::Write as _;
 
@@ -50,6 +50,7 @@ pub(crate) fn model_file(draft: &PlanarDraft) -> String {
     text
 }
 
+/// Tables `[[frame]]` and `[[point]]`. A frame with an offset along x only is written with modified DH parameters.
 fn frames_and_points(text: &mut String, draft: &PlanarDraft) {
     for frame in &draft.frames {
         let _ = writeln!(
@@ -90,6 +91,7 @@ fn frames_and_points(text: &mut String, draft: &PlanarDraft) {
     }
 }
 
+/// Tables `[[part]]` and `[[lumped_mass]]`.
 fn masses(text: &mut String, draft: &PlanarDraft) {
     for part in &draft.parts {
         let _ = writeln!(
@@ -115,6 +117,7 @@ fn masses(text: &mut String, draft: &PlanarDraft) {
     }
 }
 
+/// Tables `[[loop]]`, `[[drive]]` and `[[effect]]`.
 fn loops_and_drives(text: &mut String, draft: &PlanarDraft) {
     for (name, [one, two]) in &draft.loops {
         let _ = writeln!(
@@ -160,6 +163,7 @@ fn loops_and_drives(text: &mut String, draft: &PlanarDraft) {
     }
 }
 
+/// A table of symbols with values, units and notes; `key` is the name of the value. Nothing without symbols.
 fn symbol_table(text: &mut String, name: &str, key: &str, symbols: &[&DraftSymbol]) {
     if symbols.is_empty() {
         return;
@@ -181,7 +185,7 @@ fn symbol_table(text: &mut String, name: &str, key: &str, symbols: &[&DraftSymbo
     }
 }
 
-/// Symbols by their names, numbers in them by size: m2 before m10.
+/// Symbols sorted by name, with numbers in names sorted by size: m2 before m10.
 fn sorted_by_name(symbols: &DraftSymbols) -> Vec<&DraftSymbol> {
     let mut sorted: Vec<&DraftSymbol> = symbols.0.iter().collect();
     sorted.sort_by_cached_key(|symbol| {
@@ -203,7 +207,7 @@ fn sorted_by_name(symbols: &DraftSymbols) -> Vec<&DraftSymbol> {
     sorted
 }
 
-/// A value of a vector: a bare zero, or an expression.
+/// A component of a vector in TOML: a zero without quotes, or an expression in quotes.
 fn vector_value(expression: &str) -> String {
     if expression == "0" {
         "0".to_owned()
@@ -212,12 +216,12 @@ fn vector_value(expression: &str) -> String {
     }
 }
 
-/// A number that TOML takes for a float.
+/// A number in the notation of a TOML float.
 pub(crate) fn toml_float(x: f64) -> String {
     format!("{x:?}")
 }
 
-/// A number with some significant digits.
+/// A number with `n` significant digits, in decimal or exponential notation.
 pub(crate) fn significant_digits(x: f64, n: usize) -> String {
     if x == 0.0 || !x.is_finite() {
         return format!("{x}");
@@ -230,7 +234,7 @@ pub(crate) fn significant_digits(x: f64, n: usize) -> String {
     }
 }
 
-/// Text as TOML has it.
+/// A text as a TOML string, with escapes.
 pub(crate) fn toml_string(text: &str) -> String {
     toml::Value::from(text).to_string()
 }

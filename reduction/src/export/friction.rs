@@ -1,5 +1,5 @@
-//! Effects that descriptions of robots know: friction, inertia of drives and springs of joints and tendons, and elements
-//! between two points.
+//! Converts effects of a model to properties that robot descriptions have: friction, inertia of drives and springs of
+//! joints and tendons, and elements between two points. Other effects are reported.
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::Message;
@@ -7,33 +7,33 @@ use modelmill_spec::{DriveKind, EffectPlace, Mechanics, Mechanism, ModelEffect, 
 
 use super::DescriptionFormat;
 
-/// What a joint or tendon has by itself.
+/// Passive properties of a joint or tendon.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct PassiveProperties {
-    /// N s/m or N m s/rad
+    /// Viscous friction, N s/m or N m s/rad.
     pub(super) damping: f64,
-    /// N or N m
+    /// Coulomb friction, N or N m.
     pub(super) friction: f64,
-    /// kg or kg m^2
+    /// Inertia of the drive, kg or kg m^2.
     pub(super) armature: f64,
-    /// N/m or N m/rad
+    /// Stiffness, N/m or N m/rad.
     pub(super) stiffness: f64,
-    /// Where the spring is at rest, m or rad.
+    /// Position or length at which the spring is relaxed, m or rad.
     pub(super) rest: f64,
 }
 
-/// Effects by what has them.
+/// The passive properties of a mechanism.
 #[derive(Clone, Debug)]
 pub(super) struct PassiveEffects {
-    /// Of each coordinate.
+    /// For each coordinate.
     pub(super) joints: Vec<PassiveProperties>,
-    /// Of each drive that is a line between two points.
+    /// For each drive; used for drives between two points.
     pub(super) drives: Vec<PassiveProperties>,
     /// Elements between two points.
     pub(super) elements: Vec<([PointIdx; 2], PassiveProperties)>,
 }
 
-/// Sorts the effects of a mechanism; those that a format does not know become remarks.
+/// Converts the effects of a mechanism; adds a remark for each effect that the format does not have.
 pub(super) fn passive_effects(
     mechanism: &Mechanism,
     format: DescriptionFormat,
@@ -45,6 +45,7 @@ pub(super) fn passive_effects(
         elements: Vec::new(),
     };
     for effect in &mechanism.effects {
+        // Effects with zero values change nothing.
         let is_zero = |p: &usize| mechanism.parameters[*p].nominal == 0.0;
         if !effect.terms.is_empty() && effect.terms.iter().all(|term| is_zero(&term.parameter.0)) {
             continue;
@@ -56,7 +57,7 @@ pub(super) fn passive_effects(
                 .map(|p| place_text(mechanism, *p))
                 .collect();
             remarks.push(message!(
-                "`{}` at {} is left out: {} has nothing like it",
+                "`{}` at {} is left out: {} has no such effect",
                 effect.kind,
                 places.join(", "),
                 format.name().to_uppercase()
@@ -66,7 +67,7 @@ pub(super) fn passive_effects(
     found
 }
 
-/// Takes an effect in; false if the format has nothing like it.
+/// Adds an effect to the properties; false if the format does not have it.
 fn add_effect(
     mechanism: &Mechanism,
     effect: &ModelEffect,
@@ -88,7 +89,7 @@ fn add_effect(
         let [EffectPlace::Point(from), EffectPlace::Point(to)] = effect.places[..] else {
             return false;
         };
-        // A pull of `F0 + k l` is a spring with the length at rest of `-F0/k`, which must be one.
+        // A pull of `F0 + k l` is a spring with the relaxed length `-F0/k`, which must be a valid length.
         let rest = if constant == 0.0 {
             0.0
         } else {
@@ -106,7 +107,7 @@ fn add_effect(
         found.elements.push(([from, to], passive));
         return true;
     }
-    // Bodies are added up with those of the links, and gravity is turned already.
+    // Effects that are bodies are added to the links elsewhere, and a tilt of the base is in gravity already.
     let is_body = effect
         .places
         .iter()
@@ -124,6 +125,7 @@ fn add_effect(
         "drive_inertia" if format == DescriptionFormat::Mjcf => &|one| one.armature += value("Ia"),
         "spring" if format == DescriptionFormat::Mjcf => &|one| {
             let (k, rest) = (value("k"), constant("rest"));
+            // Two springs act as one, with the sum of the stiffnesses and the weighted mean of the relaxed positions.
             let sum = one.stiffness + k;
             one.rest = (one.stiffness * one.rest + k * rest) / sum;
             one.stiffness = sum;
@@ -149,6 +151,7 @@ fn add_effect(
     true
 }
 
+/// The name of the place of an effect, in quotes.
 fn place_text(mechanism: &Mechanism, place: EffectPlace) -> String {
     match place {
         EffectPlace::Drive(d) => format!("`{}`", mechanism.drives[d.0].name),

@@ -1,4 +1,5 @@
-//! What links carry: the inertia of parts, lumped masses and such effects as are bodies, added up.
+//! The inertia of links: parts, lumped masses and effects that are bodies go in, their sums per link come out. Also
+//! completes and checks inertias for simulators.
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{CommandName, Message, OptionName, Remedy};
@@ -10,33 +11,35 @@ use nalgebra::{Matrix3, Vector3};
 use super::ExportError;
 use super::tree::{LinkPlacement, LinkTree};
 
-/// Below this share of a link's own size, numbers are rounding.
+/// Numbers below this share of a link's own size are rounding.
 const ROUNDING: f64 = 1e-12;
 
-/// Radius of gyration of a link that never turns, m.
+/// Radius of gyration that is assumed for a link that never rotates, m.
 const DEFAULT_RADIUS_OF_GYRATION: f64 = 0.05;
-/// Moments across the direction about which a link turns, as parts of that about it: a body somewhat thicker than a plate.
+/// Transverse moments of a link that rotates about one axis, relative to the moment about that axis: slightly more than
+/// for a plate.
 const TRANSVERSE_RATIO: f64 = 0.6;
 
-/// Ten numbers about the origin of a link, in its axes.
+/// The ten inertial parameters of a link about its origin, in its axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct LinkInertia {
-    /// kg
+    /// Mass, kg.
     pub(super) mass: f64,
-    /// kg m
+    /// First moment, kg m.
     pub(super) first: Vector3<f64>,
-    /// About the origin, kg m^2.
+    /// Inertia about the origin, kg m^2.
     pub(super) inertia: Matrix3<f64>,
 }
 
 impl LinkInertia {
+    /// A link without mass.
     const NONE: Self = Self {
         mass: 0.0,
         first: Vector3::new(0.0, 0.0, 0.0),
         inertia: Matrix3::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
     };
 
-    /// Centre of mass, m; the origin where there is no mass.
+    /// Centre of mass, m; the origin if the mass is zero.
     pub(super) fn centre_of_mass(&self) -> Vector3<f64> {
         if self.mass == 0.0 {
             return Vector3::zeros();
@@ -44,18 +47,18 @@ impl LinkInertia {
         self.first / self.mass
     }
 
-    /// About the centre of mass, kg m^2.
+    /// Inertia about the centre of mass, kg m^2.
     pub(super) fn central_inertia(&self) -> Matrix3<f64> {
         let c = self.centre_of_mass();
         self.inertia - self.mass * (c.norm_squared() * Matrix3::identity() - c * c.transpose())
     }
 
-    /// Whether there is nothing.
+    /// Whether all ten parameters are zero.
     pub(super) fn is_zero(&self) -> bool {
         *self == Self::NONE
     }
 
-    /// The same body about the origin of a frame in which its own one is placed.
+    /// The same body about the origin of the outer frame, in which its own frame has the pose `placed`.
     fn in_outer_frame(&self, placed: &LinkPlacement) -> Self {
         let (r, t) = (placed.rotation, placed.origin);
         let turned = r * self.first;
@@ -71,6 +74,7 @@ impl LinkInertia {
         }
     }
 
+    /// Adds a body given about the same origin.
     fn add(&mut self, other: &Self) {
         self.mass += other.mass;
         self.first += other.first;
@@ -78,7 +82,9 @@ impl LinkInertia {
     }
 }
 
-/// What each link carries.
+/// The inertia of each link, with the nominal values of the parameters.
+///
+/// Fails if a lumped mass has different positions in the balances of forces and of moments.
 pub(super) fn bodies(
     mechanism: &Mechanism,
     tree: &LinkTree,
@@ -104,14 +110,15 @@ pub(super) fn bodies(
         let (forces, moments) = (vector(&lump.force_at), vector(&lump.moment_at));
         if (forces - moments).norm() > ROUNDING * (forces.norm() + moments.norm()) {
             return Err(ExportError(format!(
-                "a lumped mass on `{}` stands at different places for the balances of forces and of moments, which no body \
-                 does; export a model whose `moment_at` are where its `force_at` are",
+                "a lumped mass on `{}` has different places in the balances of forces and of moments, which is impossible for a \
+                 body; export a model in which `moment_at` equals `force_at`",
                 mechanism.frames[lump.frame.0].name
             )));
         }
         let share = lump_share(lump);
         add(lump.frame, &point_mass(share * value(&lump.mass), forces));
     }
+    // Effects at points are point masses.
     for effect in mechanism.effects.iter().filter(|e| e.mechanics.is_none()) {
         for place in &effect.places {
             let EffectPlace::Point(at) = place else {
@@ -127,10 +134,12 @@ pub(super) fn bodies(
     Ok(bodies)
 }
 
+/// The share of a lumped mass at its point.
 fn lump_share(lump: &LumpedMass) -> f64 {
     ExactExpression::Rational(lump.share.clone()).evaluate(&|_| 0.0)
 }
 
+/// The inertia of a point mass.
 fn point_mass(mass: f64, at: Vector3<f64>) -> LinkInertia {
     LinkInertia {
         mass,
@@ -139,6 +148,7 @@ fn point_mass(mass: f64, at: Vector3<f64>) -> LinkInertia {
     }
 }
 
+/// The inertia of a part about the origin of its frame.
 fn from_part(
     part: &ModelPart,
     value: &dyn Fn(&ExactExpression) -> f64,
@@ -170,8 +180,8 @@ fn from_part(
     }
 }
 
-/// Gives links that only slide, or turn about one direction, moments of inertia that a body can have: those that the model
-/// does not say are not felt.
+/// Completes the inertia of links that only translate, or rotate about one direction only, so that it is physically
+/// possible. The moments that a model lacks have no effect on the motion of such links.
 pub(super) fn complete_inertias(
     tree: &LinkTree,
     bodies: &mut [LinkInertia],
@@ -206,19 +216,23 @@ pub(super) fn complete_inertias(
     }
     if !completed.is_empty() {
         remarks.push(message!(
-            "moments of inertia that no motion feels are chosen so that a body can have them: of {}",
+            "moments of inertia without effect on any motion are set to physically possible values: {}",
             completed.join(", ")
         ));
     }
 }
 
-/// How a link turns against the base.
+/// How a link rotates relative to the base.
 enum LinkRotation {
+    /// It only translates.
     Never,
+    /// About one direction, a unit vector in the axes of the base.
     OneAxis(Vector3<f64>),
+    /// About several directions.
     AnyAxis,
 }
 
+/// How a link rotates, by the axes of all joints between it and the base.
 fn link_rotation(tree: &LinkTree, mut link: usize) -> LinkRotation {
     let mut turns = LinkRotation::Never;
     while link != 0 {
@@ -240,7 +254,7 @@ fn link_rotation(tree: &LinkTree, mut link: usize) -> LinkRotation {
     turns
 }
 
-/// Why nothing can be such a body.
+/// Why an inertia is physically impossible; none if it is possible.
 fn inertia_fault(body: &LinkInertia) -> Option<&'static str> {
     let moments = body.central_inertia().symmetric_eigenvalues();
     let size = body.inertia.norm();
@@ -256,7 +270,7 @@ fn inertia_fault(body: &LinkInertia) -> Option<&'static str> {
     }
 }
 
-/// Tells of links that no body can be: simulators refuse them, or move them as nothing moves.
+/// Adds a remark for each link with an impossible inertia; simulators refuse such links or become unstable.
 pub(super) fn report_impossible(
     tree: &LinkTree,
     bodies: &[LinkInertia],
@@ -267,7 +281,8 @@ pub(super) fn report_impossible(
             continue;
         };
         remarks.push(message!(
-            "`{}` {fault}, which no body does: simulators refuse it or go astray; identify with {} and let {} write that fit",
+            "`{}` {fault}, which is impossible for a body. Simulators refuse it or become unstable. Identify with {} and write \
+             the fit with {}",
             link.name,
             Remedy::option(OptionName::Physical),
             Remedy::command(CommandName::Adopt)

@@ -1,4 +1,5 @@
-//! MJCF: bodies within bodies, loops as `connect`, drives between two points as tendons.
+//! Writes MJCF: a tree of links with inertias and passive properties goes in; XML comes out, with loops as `connect`
+//! and drives between two points as tendons.
 
 use std::fmt::Write as _;
 
@@ -13,9 +14,10 @@ use super::tree::{ExportedJoint, LinkTree};
 use super::urdf::{clean, orthonormal};
 use super::{number_list, number_text};
 
-/// MuJoCo moves no body without mass: what one gets that has none, kg.
+/// Mass of a moving body that has none in the model, kg; MuJoCo requires one.
 const NEGLIGIBLE_MASS: f64 = 1e-9;
 
+/// The MJCF of a mechanism; `at` are the coordinates at which the bodies are drawn.
 pub(super) fn write(
     mechanism: &Mechanism,
     tree: &LinkTree,
@@ -38,26 +40,35 @@ pub(super) fn write(
     writer.text
 }
 
+/// The text as it is written, and its inputs.
 struct MjcfWriter<'a> {
+    /// The mechanism.
     mechanism: &'a Mechanism,
+    /// Its links and joints.
     tree: &'a LinkTree,
+    /// Inertia of each link.
     bodies: &'a [LinkInertia],
+    /// Passive properties of joints, tendons and elements.
     friction: &'a PassiveEffects,
-    /// Coordinates at which the bodies are drawn.
+    /// Coordinates at which the bodies are drawn, rad or m.
     at: &'a [f64],
+    /// Remarks on what MJCF states differently.
     remarks: &'a mut Vec<Message>,
+    /// The XML so far.
     text: String,
+    /// Depth of the present element, for its indentation.
     depth: usize,
 }
 
 impl MjcfWriter<'_> {
+    /// A line with the present indentation.
     fn line(&mut self, text: &str) {
         self.text += &"  ".repeat(self.depth);
         self.text += text;
         self.text += "\n";
     }
 
-    /// An element with others in it.
+    /// An element with contents.
     fn write_element(&mut self, tag: &str, attributes: &str, inside: impl FnOnce(&mut Self)) {
         self.line(&format!("<{tag}{attributes}>"));
         self.depth += 1;
@@ -66,6 +77,7 @@ impl MjcfWriter<'_> {
         self.line(&format!("</{tag}>"));
     }
 
+    /// The complete file.
     fn write_all(&mut self) {
         let name = format!(" model=\"{}\"", self.mechanism.name);
         self.write_element("mujoco", &name, |w| {
@@ -81,7 +93,7 @@ impl MjcfWriter<'_> {
         });
     }
 
-    /// What is on a link, and the links behind it.
+    /// The contents of a link: its sites and its child bodies.
     fn write_link(&mut self, link: usize) {
         for p in 0..self.mechanism.points.len() {
             let (on, at) = self.tree.point(self.mechanism, PointIdx(p));
@@ -100,6 +112,7 @@ impl MjcfWriter<'_> {
         }
     }
 
+    /// Whether a loop, a drive or an element uses a point, so that it needs a site.
     fn is_used(&self, point: PointIdx) -> bool {
         let m = self.mechanism;
         let is_end = |drive: &ModelDrive| match drive.kind {
@@ -111,6 +124,7 @@ impl MjcfWriter<'_> {
             || (self.friction.elements.iter()).any(|(ends, _)| ends.contains(&point))
     }
 
+    /// A body with its joints, its inertia and its contents.
     fn body(&mut self, at: usize) {
         let link = &self.tree.links[at];
         let placed = self.tree.links[link.parent]
@@ -138,6 +152,7 @@ impl MjcfWriter<'_> {
         });
     }
 
+    /// A joint. Limits and passive properties belong to the joint that has the name of its coordinate.
     fn joint(&self, joint: &ExportedJoint, link: usize) -> String {
         let placed = &self.tree.links[link].placed;
         let coordinate = &self.mechanism.coordinates[joint.coordinate];
@@ -168,11 +183,12 @@ impl MjcfWriter<'_> {
         text + "/>"
     }
 
+    /// The inertia of a body; a negligible one if it has no mass.
     fn inertial(&mut self, at: usize) -> String {
         let body = &self.bodies[at];
         if body.mass == 0.0 {
             self.remarks.push(message!(
-                "`{}` has no mass, and MuJoCo moves no body without: it gets {NEGLIGIBLE_MASS:e} kg",
+                "`{}` has no mass, but MuJoCo requires one for a moving body; it gets {NEGLIGIBLE_MASS:e} kg",
                 self.tree.links[at].name
             ));
             let inertia = number_text(1e-3 * NEGLIGIBLE_MASS);
@@ -197,7 +213,7 @@ impl MjcfWriter<'_> {
         )
     }
 
-    /// Loops, and joints that move with others.
+    /// Equalities: loops, and joints that follow others.
     fn equalities(&mut self) {
         let m = self.mechanism;
         let mut lines = Vec::new();
@@ -211,7 +227,7 @@ impl MjcfWriter<'_> {
         for joint in self.tree.links.iter().flat_map(|link| &link.joints) {
             let owner = &m.coordinates[joint.coordinate].name;
             if joint.name != *owner {
-                // Both are seen from where the bodies are drawn.
+                // MuJoCo's polynomial relates deviations from the drawn pose, where both joints have their references.
                 lines.push(format!(
                     "<joint joint1=\"{}\" joint2=\"{owner}\" polycoef=\"0 {} 0 0 0\"/>",
                     joint.name,
@@ -220,7 +236,7 @@ impl MjcfWriter<'_> {
             }
         }
         for one in &self.tree.followed {
-            // Seen from where the bodies are drawn.
+            // The same for coordinates with `follows`: the constant term is the difference at the drawn pose.
             let [own, other] = [one.coordinate, one.leader].map(|i| self.at[i]);
             lines.push(format!(
                 "<joint joint1=\"{}\" joint2=\"{}\" polycoef=\"{} {} 0 0 0\"/>",
@@ -234,8 +250,8 @@ impl MjcfWriter<'_> {
             return;
         }
         self.remarks.push(
-            "MuJoCo holds loops and coupled joints by soft constraints: forces of its inverse dynamics agree as far as these \
-             are held (`solref`, `solimp`)"
+            "MuJoCo closes loops and couples joints by soft constraints: forces of its inverse dynamics agree only as well as \
+             these are satisfied (`solref`, `solimp`)"
                 .into(),
         );
         self.write_element("equality", "", |w| {
@@ -245,7 +261,7 @@ impl MjcfWriter<'_> {
         });
     }
 
-    /// Drives and passive elements between two points.
+    /// Tendons: drives and passive elements between two points.
     fn tendons(&mut self) {
         let m = self.mechanism;
         let mut lines: Vec<(String, [PointIdx; 2])> = Vec::new();
@@ -276,6 +292,7 @@ impl MjcfWriter<'_> {
         });
     }
 
+    /// Actuators: a motor for each drive that has a joint or a tendon, with its force limits.
     fn actuators(&mut self) {
         let m = self.mechanism;
         let drives = m.drives.iter().enumerate().map(|(d, one)| (Some(d), one));
@@ -312,13 +329,15 @@ impl MjcfWriter<'_> {
         });
     }
 
+    /// Whether a joint moves with a coordinate.
     fn has_joint(&self, coordinate: usize) -> bool {
         let mut joints = self.tree.links.iter().flat_map(|link| &link.joints);
         joints.any(|joint| joint.coordinate == coordinate)
     }
 }
 
-/// Attributes of what a joint or tendon has by itself.
+/// Attributes of the passive properties of a joint or tendon; `rest` is the name of the attribute for the relaxed
+/// position.
 fn passive_attributes(one: &PassiveProperties, rest: &str) -> String {
     let mut text = String::new();
     for (name, value) in [

@@ -1,8 +1,9 @@
-//! A model as a robot description of other programs, URDF or MJCF: the way back of [`import`](fn@crate::import).
+//! Exports a model as a robot description of other programs, URDF or MJCF; the inverse of [`import`](fn@crate::import).
 //!
-//! A mechanism with the nominal values of its parameters goes in. `tree` makes one link of all frames that move as one, with
-//! joints between links; `inertia` adds up what they carry; `mjcf` and `urdf` write both down. What a format cannot say is a
-//! remark, never dropped; what would give other forces without a word is an error.
+//! A mechanism with the nominal values of its parameters goes in, text and remarks come out. `tree` merges frames that
+//! move together into links, with joints between them; `inertia` adds up masses and inertias of links; `mjcf` and
+//! `urdf` write the text. A remark reports everything that a format cannot express. If the description would give other
+//! forces without a remark, export fails.
 
 mod friction;
 mod inertia;
@@ -19,9 +20,9 @@ use modelmill_spec::{ExactExpression, Mechanism};
 /// A format of robot descriptions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DescriptionFormat {
-    /// Of ROS: trees without loops.
+    /// The format of ROS: trees without loops.
     Urdf,
-    /// Of MuJoCo: loops, linear drives as tendons, inertia of drives, springs.
+    /// The format of MuJoCo: loops, linear drives as tendons, inertia of drives, springs.
     Mjcf,
 }
 
@@ -37,7 +38,7 @@ impl DescriptionFormat {
         }
     }
 
-    /// The format that an ending of a file's name (without the dot) stands for.
+    /// The format for the ending of a file name, without the dot.
     pub fn from_extension(ending: &str) -> Option<Self> {
         match ending {
             "urdf" => Some(Self::Urdf),
@@ -47,16 +48,16 @@ impl DescriptionFormat {
     }
 }
 
-/// A robot description that was made of a model.
+/// A robot description of a model.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DescriptionExport {
     /// Its text.
     pub text: String,
-    /// What the format does not say, or says otherwise.
+    /// What the format lacks or states differently; one sentence each.
     pub remarks: Vec<Message>,
 }
 
-/// Why a model cannot be written down in a format.
+/// Why a model cannot be exported in a format: one sentence with a remedy.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ExportError(String);
 
@@ -70,14 +71,14 @@ impl std::error::Error for ExportError {}
 
 /// Writes a mechanism with its nominal values as a robot description.
 ///
-/// Fails where a joint moves in a way that the format does not know, or a mass sits at different places for the balances of
-/// forces and of moments.
+/// Fails if a coordinate moves its joints only by ratios other than one, or a mass has different places in the balances
+/// of forces and of moments.
 pub fn export(
     mechanism: &Mechanism,
     format: DescriptionFormat,
 ) -> Result<DescriptionExport, ExportError> {
     let mut remarks = Vec::new();
-    // Closed loops are shown as they stand; the zeros of a tree are its own.
+    // With loops, bodies are drawn at the nominal pose, where loops are closed; without loops at zero.
     let at: Vec<f64> = match format {
         DescriptionFormat::Mjcf if !mechanism.loops.is_empty() => {
             mechanism.coordinates.iter().map(|c| c.nominal).collect()
@@ -91,8 +92,8 @@ pub fn export(
     inertia::report_impossible(&tree, &bodies, &mut remarks);
     if !mechanism.identified_base.is_empty() {
         remarks.push(message!(
-            "the values under `[identified]` are those of base parameters, which say nothing of single bodies: bodies have \
-             their nominal values here; identify with {} and let {} write that fit for a description of the real machine",
+            "the values under `[identified]` are those of base parameters, which do not determine single bodies, so bodies have \
+             their nominal values. For a description of the real machine, identify with {} and write the fit with {}",
             Remedy::option(OptionName::Physical),
             Remedy::command(CommandName::Adopt)
         ));
@@ -110,13 +111,17 @@ pub fn export(
 /// A coordinate that follows a single other one.
 #[derive(Clone, Debug)]
 struct FollowedCoordinate {
+    /// Index of the coordinate.
     coordinate: usize,
+    /// Index of the coordinate that it follows.
     leader: usize,
+    /// Factor of the leader.
     factor: f64,
+    /// Constant part, rad or m.
     offset: f64,
 }
 
-/// Couplings that formats have; those to several coordinates they have not, which is said.
+/// Couplings to a single coordinate, with numeric values. Formats have no others, so a remark reports them.
 fn followed_coordinates(
     mechanism: &Mechanism,
     remarks: &mut Vec<Message>,
@@ -134,7 +139,7 @@ fn followed_coordinates(
             });
         } else {
             remarks.push(message!(
-                "`{}` follows several joints, which the format has no word for: it moves by itself",
+                "`{}` follows several joints, which the format cannot express; it is independent in the description",
                 mechanism.coordinates[coupling.coordinate.0].name
             ));
         }
@@ -142,13 +147,13 @@ fn followed_coordinates(
     found
 }
 
-/// Numbers with spaces between them, each with as many digits as it needs.
+/// Numbers separated by spaces, with all digits.
 fn number_list(values: &[f64]) -> String {
     let words: Vec<String> = values.iter().map(|x| number_text(*x)).collect();
     words.join(" ")
 }
 
-/// A number with as many digits as it needs; rounding below 1e-15 is zero.
+/// A number with all digits; magnitudes below 1e-15 are rounding and become zero.
 fn number_text(value: f64) -> String {
     if value.abs() < 1e-15 {
         return "0".to_owned();

@@ -1,4 +1,5 @@
-//! URDF: a tree of links; a coordinate that moves several joints moves one, which the others mimic.
+//! Writes URDF: a tree of links with inertias and friction goes in, XML comes out. A coordinate that moves several
+//! joints moves one of them, and the others mimic it.
 
 use std::fmt::Write as _;
 
@@ -12,9 +13,10 @@ use super::inertia::LinkInertia;
 use super::tree::{ExportedJoint, ExportedLink, LinkPlacement, LinkTree};
 use super::{FollowedCoordinate, number_list, number_text};
 
-/// How far a joint may go that has no limits, m.
+/// Limit that is written for a joint without limits, in SI units; the format requires a number.
 const UNLIMITED_RANGE: f64 = 1000.0;
 
+/// The URDF of a mechanism.
 pub(super) fn write(
     mechanism: &Mechanism,
     tree: &LinkTree,
@@ -35,7 +37,7 @@ pub(super) fn write(
     text
 }
 
-/// What URDF has no words for.
+/// Adds remarks on parts of the model that URDF cannot express: loops, drives between two points, gravity.
 fn report_unsupported(mechanism: &Mechanism, remarks: &mut Vec<Message>) {
     if !mechanism.loops.is_empty() {
         let names: Vec<&str> = mechanism
@@ -44,7 +46,7 @@ fn report_unsupported(mechanism: &Mechanism, remarks: &mut Vec<Message>) {
             .map(|one| one.name.as_str())
             .collect();
         remarks.push(message!(
-            "URDF has no loops: {} left open, and passive joints move by themselves; MJCF has loops",
+            "URDF has no loops: {} left open, and passive joints are independent; use MJCF for loops",
             names.join(", ")
         ));
     }
@@ -56,20 +58,20 @@ fn report_unsupported(mechanism: &Mechanism, remarks: &mut Vec<Message>) {
         .collect();
     if !lines.is_empty() {
         remarks.push(message!(
-            "URDF has no drives between two points: {} left out; MJCF has tendons",
+            "URDF has no drives between two points: {} left out; use MJCF, which has tendons",
             lines.join(", ")
         ));
     }
     let gravity: [f64; 3] =
         std::array::from_fn(|k| mechanism.gravity[k].evaluate(&|s| mechanism.symbol_nominal(s)));
     remarks.push(message!(
-        "URDF does not say gravity: it is {} m/s^2 along x, y and z of `{}`",
+        "URDF does not specify gravity; set it in the simulator: {} m/s^2 along x, y and z of `{}`",
         number_list(&gravity),
         mechanism.frames[0].name
     ));
 }
 
-/// A link with the joints that lead to it; between several of them stand links without mass.
+/// A link with the joints from its parent. Between several joints there are links without mass.
 fn link_with_joints(
     mechanism: &Mechanism,
     tree: &LinkTree,
@@ -116,6 +118,7 @@ fn link_with_joints(
     text + &link_element(&one.name, Some(body))
 }
 
+/// A joint with its pose, axis, limits, mimic and friction. Limits are scaled by the ratio of the joint.
 fn joint_element(
     mechanism: &Mechanism,
     moving: &ExportedJoint,
@@ -197,6 +200,7 @@ fn joint_element(
     text + "  </joint>\n"
 }
 
+/// A link with its inertia; without one if it has no mass.
 fn link_element(name: &str, body: Option<&LinkInertia>) -> String {
     let Some(body) = body.filter(|body| !body.is_zero()) else {
         return format!("  <link name=\"{name}\"/>\n");
@@ -216,7 +220,7 @@ fn link_element(name: &str, body: Option<&LinkInertia>) -> String {
     )
 }
 
-/// Fixed axes x, y, z: roll, pitch and yaw.
+/// The `<origin>` of a pose: position, and roll, pitch and yaw about fixed axes.
 fn origin_element(placed: &LinkPlacement) -> String {
     let (roll, pitch, yaw) = Rotation3::from_matrix_unchecked(placed.rotation).euler_angles();
     format!(
@@ -226,13 +230,13 @@ fn origin_element(placed: &LinkPlacement) -> String {
     )
 }
 
-/// Components of rounding size beside the others are zero.
+/// A vector with zeros for components that are rounding relative to its norm.
 pub(super) fn clean(v: Vector3<f64>) -> Vector3<f64> {
     let size = v.norm();
     v.map(|x| if x.abs() < 1e-14 * size { 0.0 } else { x })
 }
 
-/// A rotation that is exact to rounding again.
+/// The nearest rotation to a rotation matrix with rounding errors.
 pub(super) fn orthonormal(rotation: &Matrix3<f64>) -> Rotation3<f64> {
     Rotation3::from_matrix_eps(
         rotation,
