@@ -51,6 +51,7 @@ impl CommandLineSpelling {
                 );
             }
         }
+        // Validation runs follow the fit runs on the command line, but `excite` does not take them.
         all.extend(named("--check", check));
         Self {
             recordings: all.join(" "),
@@ -65,12 +66,14 @@ impl CommandLineSpelling {
 }
 
 impl StepSpelling for CommandLineSpelling {
+    /// `modelmill add ...`, with the libraries of the model.
     fn spell_effect(&self, model: &Model, effect: &NewEffect) -> String {
         let mut add_command = add_command(&model.path, effect);
         add_command.push_str(&library_flags_of_model(model));
         add_command
     }
 
+    /// The same with one more library, which defines the kind.
     fn spell_effect_of_library(&self, model: &Model, effect: &NewEffect, library: &str) -> String {
         let effect = self.spell_effect(model, effect);
         format!("{effect} --library {}", quote_word(library))
@@ -84,12 +87,14 @@ impl StepSpelling for CommandLineSpelling {
         )
     }
 
+    /// `modelmill excite --separate ...` for a motion that distinguishes the effects.
     fn spell_separation(&self, model: &Model, separation: &SeparationProposal) -> Option<String> {
         let mut command = format!(
             "modelmill excite {} --separate {}",
             quote_word(&model.path),
             quote_word(&effect_argument(&separation.effect))
         );
+        // Rivals have no values: `excite` estimates them.
         for rival in &separation.rivals {
             let rival = NamedEffect {
                 effect: rival.clone(),
@@ -174,6 +179,7 @@ fn add_command(model: &str, effect: &NewEffect) -> String {
         effect.kind,
         quote_word(&effect.at.join(","))
     );
+    // Parameters without a nominal value and constants keep their defaults.
     let parameters = effect.parameters.iter();
     let values = parameters.filter_map(|p| Some((p.symbol.as_str(), p.nominal?)));
     let constants = effect.constants.iter().map(|(s, v)| (s.as_str(), *v));

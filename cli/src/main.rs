@@ -19,6 +19,7 @@ use failure::{CommandFailure, CommandOutcome};
 use flags::FlagSpelling;
 use terminal::progress::TerminalProgress;
 
+/// Reads the command line, runs the command, and turns a failure into a message and an exit status.
 fn main() -> ExitCode {
     let cli = match CommandLine::try_parse() {
         Ok(cli) => cli,
@@ -29,6 +30,7 @@ fn main() -> ExitCode {
             return ExitCode::from(status);
         }
     };
+    // All files of the library are read through the disk of this run, which remembers them.
     let host = Host::new()
         .with_files(Arc::new(output::disk().clone()))
         .with_libraries(cli.library)
@@ -37,8 +39,10 @@ fn main() -> ExitCode {
     match run(&host, &cli.command) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
+            // Faults of a model file are shown with the lines of the file; other errors are one message.
             match &failure {
                 CommandFailure::Library(Error::Model(faults)) => {
+                    // Each fault has its line, what was expected, and a remedy.
                     let in_colour = terminal::is_stderr_coloured();
                     terminal::print_to_stderr(
                         faults.render_spelled(in_colour, &FlagSpelling).trim_end(),

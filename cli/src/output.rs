@@ -34,6 +34,7 @@ impl OutputFile {
         inputs: impl IntoIterator<Item = &'a Path>,
     ) -> CommandOutcome<Self> {
         refuse_dash(flag, path)?;
+        // A folder would be an obscure error of the operating system later.
         if path.is_dir() {
             return Err(CommandFailure::Usage(format!(
                 "{flag} {}: this is a folder; give the name of a file in it",

@@ -52,6 +52,7 @@ impl ParameterSource {
                 model.values_of(&fit, &path.display().to_string())?
             }
         };
+        // For example a parameter without a nominal value.
         for note in &values.notes {
             terminal::remark(note);
         }

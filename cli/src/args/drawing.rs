@@ -48,6 +48,7 @@ impl DrawingArgs {
         model: &Model,
         before: Option<&Model>,
     ) -> CommandOutcome {
+        // Angles are in degrees on the command line and in rad in the library.
         let drawing = PictureOptions {
             at: self.at.clone(),
             from: self

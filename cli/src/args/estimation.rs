@@ -76,6 +76,7 @@ impl EstimatorArgs {
                 WeightsArg::Variance => EquationWeights::Variance,
             },
             robust: self.robust,
+            // The command line excludes combinations of these three.
             refinement: match self.prior {
                 Some(sigma) => EstimateRefinement::Prior(sigma),
                 None if self.physical => EstimateRefinement::Physical,

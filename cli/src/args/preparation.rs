@@ -118,6 +118,7 @@ impl PreparationArgs {
             "decimate",
             (self.decimate > 1).then(|| self.decimate.to_string()),
         );
+        // Values of enumerations by their names, except the defaults.
         let choice = |value: Option<clap::builder::PossibleValue>, usual: &str| {
             let name = value.map(|value| value.get_name().to_owned());
             name.filter(|name| name != usual)
@@ -158,6 +159,7 @@ impl PreparationArgs {
                 DerivativesArg::Positions => DerivativeSource::Positions,
             },
             smoothing: match self.smoothing {
+                // A given period implies a Fourier series.
                 SmoothingArg::Auto => match self.period {
                     None => SmoothingMethod::Automatic,
                     period => SmoothingMethod::Fourier { period },

@@ -37,6 +37,7 @@ pub(crate) struct SeparateArgs {
 impl SeparateArgs {
     /// The effects to distinguish, if `--separate` is given.
     pub(crate) fn separation_request(&self) -> Option<SeparationRequest> {
+        // Without --separate the command excites the base parameters.
         Some(SeparationRequest {
             effect: self.separate.clone()?,
             from: self.from.clone(),

@@ -16,6 +16,7 @@ use crate::{commands, terminal};
 /// Edits the model file, prints the difference, and writes the result to `--out` or, with `--in-place`, to the model
 /// file.
 pub(crate) fn run(host: &Host, args: &AddArgs) -> CommandOutcome {
+    // The file is read without printing its warnings; those of the result are printed below.
     let before = commands::load_quietly(host, &args.model)?;
     let target = args
         .out
@@ -37,6 +38,7 @@ pub(crate) fn run(host: &Host, args: &AddArgs) -> CommandOutcome {
     }
     // As in `check`: a valid file can still fail in the derivation.
     let derived = commands::derive_model(host, &path, edited.loaded)?;
+    // Nothing is written without --out or --in-place, so the command can be used to preview a change.
     let written = match (&target, args.in_place) {
         (Some(target), _) => {
             target.write(&edited.text)?;
@@ -49,8 +51,10 @@ pub(crate) fn run(host: &Host, args: &AddArgs) -> CommandOutcome {
         (None, false) => None,
     };
     let name = written.as_deref().unwrap_or(&path);
+    // The difference has the names of the file before and after.
     let difference = edit::difference(old, &edited.text, [&path, name]);
     if args.json {
+        // With --json nothing else is printed on standard output.
         return terminal::print_json(&json!({
             "model": derived.name,
             "effect": edit::effect_json(&edited.effect),

@@ -23,6 +23,7 @@ pub(crate) fn run(host: &Host, args: &AdoptArgs) -> CommandOutcome {
         .as_ref()
         .map(|path| OutputFile::new(path, inputs))
         .transpose()?;
+    // The fit is matched to the model by the expressions of its base parameters.
     let fit = host.fit(&args.fit)?;
     let adoption = model.adopt(&fit, &args.fit.display().to_string())?;
     for note in &adoption.notes {
@@ -35,6 +36,7 @@ pub(crate) fn run(host: &Host, args: &AdoptArgs) -> CommandOutcome {
         None => adoption.loaded,
     };
     commands::derive_model(host, &path, loaded)?;
+    // Nothing is written without --out or --in-place, so the command can be used to preview a change.
     let written = match (&target, args.in_place) {
         (Some(target), _) => {
             target.write(&adoption.text)?;
@@ -47,6 +49,7 @@ pub(crate) fn run(host: &Host, args: &AdoptArgs) -> CommandOutcome {
         (None, false) => None,
     };
     let name = written.as_deref().unwrap_or(&path);
+    // The difference has the names of the file before and after.
     let difference = edit::difference(model.text(), &adoption.text, [&path, name]);
     if args.json {
         return terminal::print_json(&json!({

@@ -32,6 +32,7 @@ pub(crate) fn run(host: &Host, args: &AtlasArgs) -> CommandOutcome {
     let mut names = BTreeSet::new();
     let mut entries = Vec::new();
     let mut mechanisms = Vec::new();
+    // Derive each model and write its picture and page; table and overview follow at the end.
     for path in &args.models {
         let is_imported = import::is_description(path);
         let loaded = if is_imported {
@@ -42,6 +43,7 @@ pub(crate) fn run(host: &Host, args: &AtlasArgs) -> CommandOutcome {
         let start = Instant::now();
         let model = commands::derive_model(host, &path.display().to_string(), loaded)?;
         let seconds = start.elapsed().as_secs_f64();
+        // Files of the atlas have the names of the models, so these must be unique.
         if !names.insert(model.name.clone()) {
             return Err(CommandFailure::Input(format!(
                 "{}: another model of the atlas is also called `{}`; give one of the files another name",
@@ -57,8 +59,10 @@ pub(crate) fn run(host: &Host, args: &AtlasArgs) -> CommandOutcome {
             let file = folder.join(format!("{}.{ending}", model.name));
             OutputFile::new(&file, args.models.iter().map(PathBuf::as_path))
         };
+        // The picture is a file of its own and part of the overview page.
         let picture = model.picture(&PictureOptions::default(), None)?;
         file("svg")?.write(&picture)?;
+        // Imported robots have no page of expressions.
         if !is_imported {
             file("md")?.write(&model.atlas_page(&entry))?;
         }

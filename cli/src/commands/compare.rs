@@ -13,6 +13,7 @@ pub(crate) fn run(host: &Host, args: &CompareArgs) -> CommandOutcome {
     let values = args.parameters.values(host, &model)?;
     let data = commands::recordings(&model, &args.data, &args.preparation.reading())?;
     let compared = model.compare(&data.iter().collect::<Vec<_>>(), &values)?;
+    // The name states in the output which values were used.
     let name = args.parameters.name();
     if args.json {
         return terminal::print_json(&compared.json(&name, &FlagSpelling)?);

@@ -25,6 +25,7 @@ pub(crate) fn run(host: &Host, args: &DiffArgs) -> CommandOutcome {
     if let Some(target) = args.drawing.target(inputs)? {
         args.drawing.draw(&target, &after, Some(&before))?;
     }
+    // Changes of the models themselves need no recording.
     let changes = ModelChanges::from_models(&before, &after);
     let variants = variants(args, &before, &after)?;
     if args.json {
@@ -62,6 +63,7 @@ fn variants(
             terminal::remark(note);
         }
     }
+    // Both models follow the same motion, each with its own prepared recordings.
     let [first, second] = [&first, &second].map(|runs| runs.iter().collect::<Vec<_>>());
     let variants = VariantComparison::along_recordings([before, after], [&first, &second])?;
     for note in &variants.notes {

@@ -9,6 +9,7 @@ use crate::{commands, terminal};
 
 /// Prints all kinds as a table, or one kind with its equation and parameters.
 pub(crate) fn run(host: &Host, args: &EffectsArgs) -> CommandOutcome {
+    // A model file can define kinds in addition to those of the libraries.
     let mut kinds = match &args.model {
         Some(path) => commands::load(host, path)?.kinds,
         None => host.kinds()?,

@@ -21,6 +21,7 @@ pub(crate) fn run(host: &Host, args: &EquationsArgs) -> CommandOutcome {
     } else {
         args.format
     };
+    // Long expressions can take seconds.
     let written = match format {
         EquationsFormat::Text => model.equations(PageFormat::Text),
         EquationsFormat::Markdown => model.equations(PageFormat::Markdown),

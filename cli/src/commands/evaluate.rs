@@ -22,6 +22,7 @@ pub(crate) fn run(host: &Host, args: &EvaluateArgs) -> CommandOutcome {
         ));
     }
     let model = commands::model(host, &args.model)?;
+    // The target must not be one of the files that this command reads.
     let mut inputs: Vec<&Path> = model.files().collect();
     inputs.push(&args.data);
     inputs.extend(args.parameters.file().map(AsRef::<Path>::as_ref));
@@ -46,6 +47,7 @@ pub(crate) fn run(host: &Host, args: &EvaluateArgs) -> CommandOutcome {
     match target {
         Some(target) => {
             target.write(&found.csv())?;
+            // The note lists the columns that were written.
             let names: Vec<&str> = found
                 .columns
                 .iter()

@@ -14,6 +14,7 @@ const PAGE: &str = "experiment.html";
 /// Runs the experiment and writes the page.
 pub(crate) fn run(host: &Host, args: &ExperimentArgs) -> CommandOutcome {
     output::make_folder(&args.out)?;
+    // Excitation, simulation, identification and comparison run here; this takes most of the time.
     let experiment = PaperExperiment::new(
         host,
         &ExperimentRequest {

@@ -12,6 +12,7 @@ use crate::{commands, terminal};
 
 /// Writes the description and prints notes on what the format cannot express.
 pub(crate) fn run(host: &Host, args: &ExportArgs) -> CommandOutcome {
+    // --format has priority over the ending of the file name.
     let ending = args.out.extension().and_then(|ending| ending.to_str());
     let format = args
         .format
@@ -22,6 +23,7 @@ pub(crate) fn run(host: &Host, args: &ExportArgs) -> CommandOutcome {
             args.out.display()
         )));
     };
+    // Inputs must not be written over.
     let loaded = commands::load(host, &args.model)?;
     let fits = args.parameters.iter().map(PathBuf::as_path);
     let inputs = loaded.sources.paths().chain(fits);

@@ -19,6 +19,7 @@ pub(crate) fn run(host: &Host, args: &GenerateArgs) -> CommandOutcome {
         ("--reactions", args.reactions),
         ("--self-test", args.self_test),
     ];
+    // Some parts of the code exist for Rust only.
     if let Some((flag, _)) = more.iter().find(|(_, asked)| *asked)
         && !args.language.has_all()
     {
@@ -35,12 +36,14 @@ pub(crate) fn run(host: &Host, args: &GenerateArgs) -> CommandOutcome {
         (Some(path), LanguageForm::Module) => Some(OutputFile::new(path, model.files())?),
         _ => None,
     };
+    // The library returns files as texts; this command only decides where they go.
     let files = model.generate(&CodeOptions {
         language: args.language,
         dynamics: args.dynamics,
         reactions: args.reactions,
         self_test: args.self_test,
     })?;
+    // A module goes to a file or to standard output, sources and crates go to a folder.
     let makes = match form {
         LanguageForm::Module => return write_module(target.as_ref(), &files),
         LanguageForm::Sources => {
@@ -114,6 +117,7 @@ fn write_crate(folder: &Path, files: &[EmittedFile]) -> CommandOutcome {
     let ours = DiskFiles::default()
         .read_text(&manifest, 1 << 20)
         .is_ok_and(|text| text.starts_with(MANIFEST_HEADER));
+    // A new or empty folder is accepted, and one with a manifest of this program.
     let occupied = folder.is_file()
         || std::fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some());
     if occupied && !ours {
@@ -122,6 +126,7 @@ fn write_crate(folder: &Path, files: &[EmittedFile]) -> CommandOutcome {
             folder.display()
         )));
     }
+    // Files of a crate may be in subfolders, which are created as needed.
     for file in files {
         let path = folder.join(&file.path);
         let parent = path.parent().unwrap_or(folder);

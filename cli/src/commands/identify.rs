@@ -29,6 +29,7 @@ pub(crate) fn run(host: &Host, args: &IdentifyArgs) -> CommandOutcome {
     let reading = args.preparation.reading();
     let data = commands::recordings(&model, &args.data, &reading)?;
     let check = commands::recordings(&model, &args.check, &reading)?;
+    // The options of the estimator are separate from those for reading.
     let options = args.estimators.options(&args.standstill);
     let reading = RecordingOptions {
         columns: args.estimators.instrument_map.clone(),
@@ -56,6 +57,7 @@ pub(crate) fn run(host: &Host, args: &IdentifyArgs) -> CommandOutcome {
     };
     let [data, check] = [&data, &check].map(|all| all.iter().collect::<Vec<_>>());
     let found = model.identify_with(&data, &instruments, &check, &options)?;
+    // The file and --json have the same object.
     let object = found.json(&model, &FlagSpelling)?;
     if let Some(target) = &target {
         target.write(&format!("{object:#}\n"))?;

@@ -18,6 +18,7 @@ const LARGEST_DESCRIPTION: u64 = 16 << 20;
 pub(crate) fn run(host: &Host, args: &ImportArgs) -> CommandOutcome {
     let file = args.description.as_path();
     let closures = closures_of(file, args.closures.as_deref());
+    // Neither the description nor the file of closures may be written over.
     let target = OutputFile::new(&args.out, [file].into_iter().chain(closures.as_deref()))?;
     let options = Options {
         floating: args.floating,
@@ -26,6 +27,7 @@ pub(crate) fn run(host: &Host, args: &ImportArgs) -> CommandOutcome {
         pose: &args.at,
     };
     let imported = import_description(host, file, closures.as_deref(), options)?;
+    // A `robot.yaml` that was found automatically is mentioned, because it changes the result.
     if let (None, Some(path)) = (&args.closures, closures) {
         terminal::note(&format!(
             "loop closures and drives are read from {}, which is in the folder of the description",
@@ -70,6 +72,7 @@ pub(crate) fn import_description(
         file,
         "a robot description (URDF, MJCF or SDF, all XML)",
     )?;
+    // The file of closures is read as text; the library parses it together with the URDF.
     let closures = closures
         .map(|path| read(host, path, "a file of closures (YAML)"))
         .transpose()?;

@@ -72,6 +72,7 @@ pub(crate) fn load_quietly(host: &Host, path: &Path) -> CommandOutcome<LoadedMod
             nearby_models_hint(path)
         )));
     }
+    // The error lists model files nearby, because a wrong folder is the usual reason.
     if !path.exists() {
         return Err(CommandFailure::Input(format!(
             "there is no file {}; the path of a model file (TOML) is expected{}{}",
@@ -90,6 +91,7 @@ pub(crate) fn load_quietly(host: &Host, path: &Path) -> CommandOutcome<LoadedMod
 /// The files of one run: a path, or several with `+` between them.
 pub(crate) fn files_of(path: &Path) -> Vec<PathBuf> {
     match path.to_str() {
+        // A file whose name contains a plus is one file.
         Some(text) if text.contains('+') && !path.exists() => {
             text.split('+').map(PathBuf::from).collect()
         }
@@ -128,6 +130,7 @@ pub(crate) fn diagnose(
         .parameters
         .apply_to(host, self::model(host, &args.model)?)?;
     let reading = args.preparation.reading();
+    // Reads recordings and prepares them for a diagnosis.
     let read = |paths: &[PathBuf]| -> CommandOutcome<Vec<PreparedRecording>> {
         let each = paths.iter().map(|path| {
             let read = recording(&model, path, &reading)?;
@@ -160,6 +163,7 @@ fn nearby_models_hint(path: &Path) -> String {
     } else {
         path.parent().unwrap_or(Path::new(""))
     };
+    // The folder of the path first, then the usual folders of a project, then the current one.
     let folders = [
         own,
         Path::new("models"),
@@ -184,6 +188,7 @@ fn nearby_models_hint(path: &Path) -> String {
             continue;
         }
         found.sort();
+        // A long list is cut off.
         let more = found.len().saturating_sub(24);
         found.truncate(24);
         let more = if more > 0 {

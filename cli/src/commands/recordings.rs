@@ -10,6 +10,7 @@ use crate::terminal;
 
 /// Prints tables and topics with their columns.
 pub(crate) fn run(host: &Host, args: &RecordingsArgs) -> CommandOutcome {
+    // All files are read first, so that an error is not mixed with output.
     let mut found = Vec::new();
     for path in &args.files {
         found.push(host.recordings(path)?);

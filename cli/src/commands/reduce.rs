@@ -16,6 +16,7 @@ pub(crate) fn run(host: &Host, args: &ReduceArgs) -> CommandOutcome {
     inputs.extend(args.plan.as_deref());
     let target = OutputFile::new(&args.out, inputs)?;
     let reduced = host.reduce(&args.rig, args.plan.as_deref())?;
+    // The model is written before the report, so that it exists even if standard output is closed.
     target.write(&reduced.reduction.model)?;
     if args.json {
         return terminal::print_json(&reduced.json(&args.out.display().to_string()));

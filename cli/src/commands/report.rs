@@ -21,6 +21,7 @@ pub(crate) fn run(host: &Host, args: &ReportArgs) -> CommandOutcome {
     output::make_folder(&args.out)?;
     let path = args.out.join(PAGE);
     let ask = &args.diagnosis;
+    // The page must not be written over an input.
     let inputs = [&ask.model].into_iter().chain(&ask.data).chain(&ask.check);
     let target = OutputFile::new(&path, inputs.map(PathBuf::as_path))?;
     let question = DiagnosisOptions {

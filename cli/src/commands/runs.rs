@@ -28,6 +28,7 @@ enum RunsFileFormat {
 pub(crate) fn run(host: &Host, args: &RunsArgs) -> CommandOutcome {
     let data = expand_paths(&args.data)?;
     let inputs = || [&args.model].into_iter().chain(&data).map(PathBuf::as_path);
+    // The ending of --out decides between JSON and a page; the target is checked before the long computation.
     let written = match &args.out {
         Some(out)
             if out
@@ -82,6 +83,7 @@ fn expand_paths(paths: &[PathBuf]) -> CommandOutcome<Vec<PathBuf>> {
     let mut all = Vec::new();
     for path in paths {
         let text = path.to_string_lossy();
+        // A folder gives its files with the ending of a recording, a pattern gives all files that match.
         let mut found: Vec<PathBuf> = if path.is_dir() {
             let entries = std::fs::read_dir(path).map_err(|error| {
                 CommandFailure::Input(format!("the folder {text} cannot be read: {error}"))
@@ -115,6 +117,7 @@ fn natural_sort_key(name: &str) -> Vec<(String, u64)> {
     let mut pieces = Vec::new();
     let mut rest = name;
     while !rest.is_empty() {
+        // Each piece is a text without digits and the number after it.
         let text = rest
             .find(|c: char| c.is_ascii_digit())
             .unwrap_or(rest.len());

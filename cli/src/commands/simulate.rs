@@ -17,6 +17,7 @@ pub(crate) fn run(host: &Host, args: &SimulateArgs) -> CommandOutcome {
     let mut inputs: Vec<&Path> = loaded.sources.paths().collect();
     inputs.push(&args.trajectory);
     let target = OutputFile::new(&args.out, inputs)?;
+    // The seed of the rig file is used without --seed.
     let made = host.simulate(&args.rig, &args.trajectory, &args.map, args.seed)?;
     target.write(&made.csv())?;
     if args.json {

@@ -31,6 +31,7 @@ pub(crate) fn run(host: &Host, args: &WorkArgs) -> CommandOutcome {
     let files = |paths: &[PathBuf]| -> CommandOutcome<Vec<Vec<PathBuf>>> {
         let runs = paths.iter().map(|path| commands::files_of(path));
         let is_there = |file: &PathBuf| {
+            // Recordings are read again after each edit, so pipes and devices cannot be used.
             let says = match host.files().kind(file) {
                 PathKind::File | PathKind::Folder => return Ok(()),
                 PathKind::Missing => "there is no such file; the path of a recording is expected",
@@ -109,6 +110,7 @@ fn quoted_path(path: &Path) -> String {
 }
 
 impl WorkbenchCommands for WorkbenchAdvice {
+    /// The command of a pane, on the recordings of the workbench.
     fn step_command(&self, step: WorkbenchStep) -> Option<String> {
         let Self {
             model,
@@ -137,6 +139,7 @@ impl WorkbenchCommands for WorkbenchAdvice {
         })
     }
 
+    /// `modelmill diff`; all recordings are given as --data, because both models only follow their motion.
     fn variant_command(&self, before: &Path) -> Option<String> {
         let Self {
             model,
@@ -151,9 +154,11 @@ impl WorkbenchCommands for WorkbenchAdvice {
         ))
     }
 
+    /// `modelmill excite` with the settings of the page.
     fn excite_command(&self, asked: &ExcitationSettings) -> Option<String> {
         let usual = ExcitationSettings::default();
         let mut words = format!("modelmill excite {}", self.model);
+        // Name, value, and default of each setting.
         let options = [
             (
                 "harmonics",

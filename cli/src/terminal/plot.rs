@@ -21,9 +21,11 @@ const DOTS: [[u8; 4]; 2] = [[0x01, 0x02, 0x04, 0x40], [0x08, 0x10, 0x20, 0x80]];
 impl TerminalCurve<'_> {
     /// The curve with its scale, line by line. Each column of dots spans the least and the largest of its values.
     pub(crate) fn lines(&self) -> Vec<String> {
+        // The scale is symmetric about zero; the limit avoids a division by zero for a curve of zeros.
         let own = self.values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
         let limit = self.limit.unwrap_or(own).max(f64::MIN_POSITIVE);
         let (dots_x, dots_y) = (2 * WIDTH, 4 * self.height);
+        // One byte per character: a bit for each of its eight dots.
         let mut cells = vec![vec![0_u8; WIDTH]; self.height];
         let n = self.values.len();
         // Zero has a separate row of dots, so that a curve around zero does not jump between two rows.
@@ -38,6 +40,7 @@ impl TerminalCurve<'_> {
             let row = 1 + (share * (half - 1) as f64).round() as usize;
             row.min(dots_y - 1)
         };
+        // Mark the dots between the least and the largest value of each column.
         for x in 0..dots_x {
             let (from, to) = (x * n / dots_x, (x + 1) * n / dots_x);
             // One more value on the left connects a steep curve to the column before.
@@ -56,6 +59,7 @@ impl TerminalCurve<'_> {
                 cells[y / 4][x / 2] |= DOTS[x % 2][y % 4];
             }
         }
+        // Labels at the top, at zero and at the bottom.
         let middle = self.height / 2;
         cells
             .iter()
@@ -67,6 +71,7 @@ impl TerminalCurve<'_> {
                     y if y == middle => "0".to_owned(),
                     _ => String::new(),
                 };
+                // Long numbers are written in exponential notation.
                 let scale = if scale.len() > SCALE {
                     format!("{:.2e}", if y == 0 { limit } else { -limit })
                 } else {

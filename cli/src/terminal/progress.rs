@@ -57,11 +57,13 @@ impl ProgressListener for TerminalProgress {
             watchers.push(None);
             return;
         }
+        // The first job waits for the rest of the program's patience, later ones only for the short one.
         let first_look = PATIENCE
             .saturating_sub(self.start.elapsed())
             .max(SHORT_PATIENCE);
         let (going_on, waiting) = channel::<()>();
         let (what, job) = (what.to_owned(), Arc::clone(job));
+        // The thread polls the job; the end of the channel is the end of the job.
         let thread = std::thread::spawn(move || {
             let mut bar: Option<ProgressBar> = None;
             loop {

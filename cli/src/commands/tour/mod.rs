@@ -93,6 +93,7 @@ impl TourFolder {
         let place = Self {
             folder: folder.to_owned(),
         };
+        // All bundled models, because some of them include others.
         for (name, text) in bundled::MODELS {
             place.write(name, text)?;
         }

@@ -96,8 +96,10 @@ impl TourText {
              rms of the error divided by rms of the measured force). First the force of one screw, then the error:",
             percent(seen.compared.figures.nrms)
         ));
+        // The curves of the first drive are an example; the table below lists where all errors are largest.
         let drive = model.drives().first().cloned().unwrap_or_default();
         if let (Some(measured), Some(error)) = (seen.measured.first(), seen.errors.first()) {
+            // Measured force and error have separate scales, because the error is much smaller.
             for (title, values, height) in [
                 (format!("{drive}, measured, N"), measured, 5),
                 (format!("{drive}, measured minus model, N"), error, 5),
@@ -162,6 +164,7 @@ impl TourText {
         ];
         self.lines(&table(2, &columns, &rows));
         self.line("");
+        // Each effect is described in the words of its kind, with the effects that explain the data equally well.
         for found in &findings.diagnosis.effects {
             let kinds = &findings.before.model.loaded.kinds;
             if let Some(kind) = kinds.iter().find(|k| k.name == found.effect.kind) {
@@ -196,6 +199,7 @@ impl TourText {
         let lines: Vec<String> = difference.lines().map(|line| format!("  {line}")).collect();
         self.lines(&lines);
         self.line("");
+        // The commands that write the same lines.
         for command in commands {
             let line = self.style.cyan(&format!("  $ {command}"));
             self.line(&line);
@@ -227,6 +231,7 @@ impl TourText {
     /// Errors on the validation run as logarithmic bars, down to the noise floor.
     fn bars(&mut self, ladder: &[SelectionStep], noise: f64) {
         let largest = ladder.iter().map(|rung| rung.check).fold(noise, f64::max);
+        // The axis includes the noise floor, if it is above zero.
         let least = ladder.iter().map(|rung| rung.check);
         let least = least.chain([noise]).filter(|e| *e > 0.0);
         // The axis begins below the smallest error, so that its bar has a length.
