@@ -16,10 +16,12 @@ impl ReductionState<'_> {
         let plan = self.names.plan;
         for entry in &plan.loops {
             let [one, two] = &entry.joins;
+            // Points of the model at both ends.
             let ends = (self.model_point(one, log), self.model_point(two, log));
             let (Some((first, a)), Some((second, b))) = ends else {
                 continue;
             };
+            // Positions of both points along the samples, as the model has them.
             let places = [a, b].map(|anchor| {
                 let part = self
                     .parts
@@ -33,6 +35,7 @@ impl ReductionState<'_> {
                 });
                 (p - r).norm()
             });
+            // Points that do not coincide in the samples are no loop.
             if gap > TOLERANCE || gap.is_nan() {
                 log.error(
                     source_span(0, &two.span()),
@@ -75,11 +78,13 @@ impl ReductionState<'_> {
                 .drive
                 .iter()
                 .find(|entry| entry.name.get_ref() == &drive.name);
+            // Place for messages, and the ends of a linear drive; other drives act at a joint.
             let here = entry.map_or_else(|| &plan.name, |entry| &entry.name);
             let Some(ends) = rig.ends_of_drive(d) else {
                 let coordinate = rig
                     .coordinate_of_drive(d)
                     .map(|c| rig.coordinates[c].name.clone());
+                // The coordinate must be an active one of the model.
                 let active = coordinate.filter(|name| {
                     self.draft
                         .coordinates
@@ -104,6 +109,7 @@ impl ReductionState<'_> {
                 }
                 continue;
             };
+            // A linear drive acts between two contact points.
             let on_axis = entry.is_some_and(|entry| entry.contact_on_axis);
             let mut contacts = Vec::new();
             let mut names = Vec::new();
@@ -117,12 +123,14 @@ impl ReductionState<'_> {
                 };
                 let mut contact = self.contact_place(&end, part);
                 if on_axis {
+                    // The plan places the contact on the axis of its part.
                     contact = contact.projected_on_axis();
                 }
                 self.declare(&name, contact);
                 contacts.push(contact);
                 names.push(name);
             }
+            // Both ends were found: report the errors of the drive.
             if let (&[from, to], [one, two]) = (contacts.as_slice(), names.as_slice()) {
                 let (plane, samples) = (&self.plane, &self.samples);
                 check_linear(
@@ -146,6 +154,7 @@ impl ReductionState<'_> {
         let rig = self.names.rig;
         for effect in &rig.effects {
             let (kind, values) = effect.law.kind_and_values();
+            // Only effects at drives have the same place in the model.
             let drive = |place: &modelmill_rig::RigPlace| match place {
                 modelmill_rig::RigPlace::Drive(d) => {
                     rig.drives.get(*d).map(|drive| drive.name.clone())
@@ -154,6 +163,7 @@ impl ReductionState<'_> {
             };
             let at: Vec<String> = effect.places.iter().filter_map(drive).collect();
             let library = modelmill_spec::library();
+            // The model needs the same kind of effect, with all its places.
             let known = library.iter().find(|known| known.name == kind);
             let Some(known) = known.filter(|_| at.len() == effect.places.len()) else {
                 self.report.add(
@@ -172,6 +182,7 @@ impl ReductionState<'_> {
                 }
                 _ => values,
             };
+            // Some values of the rig are constants of the model and not parameters.
             let (parameters, constants) = values
                 .into_iter()
                 .map(|(symbol, value)| (symbol.to_owned(), value))
@@ -195,6 +206,7 @@ impl ReductionState<'_> {
     /// differently.
     pub(crate) fn check_completeness(&mut self, log: &mut RigLog) {
         let (rig, plan) = (self.names.rig, self.names.plan);
+        // Bodies that the plan leaves out on purpose, with the size of what is neglected.
         let left = self
             .names
             .bodies(&plan.leave_out, &mut self.used_groups, log);
@@ -210,6 +222,7 @@ impl ReductionState<'_> {
                 ],
             );
         }
+        // Groups that the plan does not mention at all.
         let forgotten: Vec<&str> = self
             .names
             .groups
@@ -260,6 +273,7 @@ impl ReductionState<'_> {
             .values()
             .flat_map(|constant| &constant.is)
         {
+            // The quantity must occur in the model.
             let symbols = &self.draft.constants.0;
             if !symbols.iter().any(|symbol| {
                 symbol

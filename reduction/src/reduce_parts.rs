@@ -16,6 +16,7 @@ use crate::write::significant_digits;
 impl ReductionState<'_> {
     /// Step 2, parts: adds each part of the plan with its frame and body.
     pub(crate) fn parts(&mut self, log: &mut RigLog) {
+        // A part may be carried by parts before it only, so that one pass is enough.
         let plan = self.names.plan;
         for entry in &plan.part {
             if self
@@ -49,6 +50,7 @@ impl ReductionState<'_> {
     /// Resolves a part and its shift. Reports points on wrong bodies, a part without length, and a joint that does not
     /// coincide up to a constant shift.
     pub(crate) fn part(&self, entry: &PlanPartEntry, log: &mut RigLog) -> Option<SubstitutionPart> {
+        // Bodies of the part, and the part that carries it.
         let names = &self.names;
         let mut used = self.used_groups.clone();
         let bodies = names.bodies(entry.groups.get_ref(), &mut used, log);
@@ -69,6 +71,7 @@ impl ReductionState<'_> {
                 found
             }
         };
+        // Its joint and the end of its axis, each on the right body.
         let [at, from, to] = [&entry.at, &entry.from, &entry.to].map(|name| names.point(name, log));
         let (at, from, to) = (at?, from?, to?);
         let lead = *bodies.first()?;
@@ -97,6 +100,7 @@ impl ReductionState<'_> {
             to,
             shift: Vector2::zeros(),
         };
+        // Without a length the axis has no direction.
         let length = (from.at - to.at).norm();
         if length < 1e-9 {
             log.error(
@@ -115,6 +119,7 @@ impl ReductionState<'_> {
                 + carried
         };
         part.shift = gap(&self.samples.nominal);
+        // The gap changes along the samples if the points are no joint.
         let strays = self
             .samples
             .largest(|moment| (gap(moment) - part.shift).norm());
@@ -150,6 +155,7 @@ impl ReductionState<'_> {
             };
             of(&part) - carrier.as_ref().map_or(0.0, of)
         };
+        // Whether the rig has a coordinate with this name.
         let coordinate = entry.coordinate.get_ref();
         let nominal = wrap_angle(angle(&samples.nominal));
         let active = self
@@ -170,6 +176,7 @@ impl ReductionState<'_> {
                     )
                 })
             };
+            // The coordinate may count in either direction.
             let [ahead, back] = [1.0, -1.0].map(strays);
             if ahead.min(back) > TOLERANCE {
                 log.error(
@@ -182,6 +189,7 @@ impl ReductionState<'_> {
                     "a name that the rig does not have gives a passive coordinate",
                 );
             }
+            // The angle as sign, coordinate and constant offset.
             let sign = if ahead <= back { 1.0 } else { -1.0 };
             let value = samples.nominal.state.q[k];
             let offset = wrap_angle(nominal - sign * value);
@@ -196,6 +204,7 @@ impl ReductionState<'_> {
                 passive: false,
             });
         } else {
+            // A passive coordinate is determined by the loops, so that its nominal value can be rounded.
             let nominal = (nominal * 1e6).round() / 1e6;
             self.draft.coordinates.push(DraftCoordinate {
                 name: coordinate.clone(),
@@ -203,6 +212,7 @@ impl ReductionState<'_> {
                 passive: true,
             });
         }
+        // Position of the joint in the carrier, or in the plane.
         let (on, local) = match &carrier {
             None => (
                 "base".to_owned(),
@@ -214,6 +224,7 @@ impl ReductionState<'_> {
             ),
         };
         let at = self.components(entry.at.get_ref(), &local);
+        // The model has no gap at the joint, so that the part is shifted.
         if part.shift.norm() > ZERO {
             let says = format!(
                 "is shifted by ({}, {}) m to `{}`, which changes no force",
@@ -237,6 +248,7 @@ impl ReductionState<'_> {
         if offset.abs() < 1e-9 {
             return String::new();
         }
+        // Multiples of 15 degrees are exact.
         let twelfths = offset / (std::f64::consts::PI / 12.0);
         if (twelfths - twelfths.round()).abs() < 1e-9 {
             let sign = if twelfths < 0.0 { '-' } else { '+' };
@@ -257,6 +269,7 @@ impl ReductionState<'_> {
     pub(crate) fn components(&mut self, point: &str, at: &Vector2<f64>) -> [String; 2] {
         let mut expressions = ["x", "y"].map(str::to_owned);
         for (axis, value) in expressions.iter_mut().zip([at.x, at.y]) {
+            // The quantity for which a constant of the plan can stand, such as `A.x`.
             let what = format!("{point}.{axis}");
             if value.abs() < ZERO {
                 "0".clone_into(axis);
@@ -276,6 +289,7 @@ impl ReductionState<'_> {
                 ),
                 None => (own, String::new()),
             };
+            // A constant can stand for several quantities; each is added once.
             let symbol = self
                 .draft
                 .constants
@@ -298,6 +312,7 @@ impl ReductionState<'_> {
         let Some(part) = self.parts.last() else {
             return;
         };
+        // These groups are in the model now.
         self.used_groups.extend(
             entry
                 .groups
@@ -306,6 +321,7 @@ impl ReductionState<'_> {
                 .map(|name| name.get_ref().clone()),
         );
         let name = part.name.clone();
+        // Exact values of the part, eq. (1).
         let whole = substitute(
             self.names.rig,
             part,
@@ -313,6 +329,7 @@ impl ReductionState<'_> {
             &self.samples,
             &mut self.report,
         );
+        // Whether the plan leaves out the component of the centre across the axis.
         let drops = match entry.off_axis.as_ref().map(|s| s.get_ref().as_str()) {
             None | Some("keep") => false,
             Some("drop") => true,
@@ -328,6 +345,7 @@ impl ReductionState<'_> {
             }
         };
         let about = |what: &str| format!("{what} of {}", entry.note.as_deref().unwrap_or(&name));
+        // Symbols with their values; parts may share a symbol.
         let [mass, centre, across, inertia] = symbols_of(entry);
         let draft = &mut self.draft;
         draft
@@ -340,6 +358,7 @@ impl ReductionState<'_> {
             &name,
             whole.inertia,
         );
+        // Components of the centre that are zero get no symbol.
         let mut components = ["0", "0"].map(str::to_owned);
         if whole.centre.x.abs() > ZERO {
             draft.centres.add_value(
@@ -361,6 +380,7 @@ impl ReductionState<'_> {
             );
             components[1] = across;
         }
+        // The exact values go into the report with the residuals of eq. (1).
         let groups: Vec<&str> = entry
             .groups
             .get_ref()
@@ -437,6 +457,7 @@ impl ReductionState<'_> {
                 continue;
             }
             let name = entry.name.get_ref();
+            // The mass of the groups, with a report of what the point masses neglect.
             let anchors: Vec<BodyAnchor> = points.iter().map(|(_, anchor)| *anchor).collect();
             let (plane, samples) = (&self.plane, &self.samples);
             let mass = lump_mass(
@@ -456,6 +477,7 @@ impl ReductionState<'_> {
             self.draft
                 .masses
                 .add_value(&symbol, "kg", &note, name, mass);
+            // Equal shares of the mass at each point.
             for (point, _) in &points {
                 let one = if points.len() == 1 {
                     name.clone()
@@ -476,6 +498,7 @@ impl ReductionState<'_> {
         log: &mut RigLog,
     ) -> Option<(String, BodyAnchor)> {
         let anchor = self.names.point(name, log)?;
+        // The part that carries the point, and the position there.
         let part = self.names.owner(&self.parts, &anchor, name, log).ok()?;
         let contact = self.contact_place(&anchor, part);
         self.declare(name.get_ref(), contact);

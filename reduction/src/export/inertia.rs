@@ -61,6 +61,7 @@ impl LinkInertia {
     /// The same body about the origin of the outer frame, in which its own frame has the pose `placed`.
     fn in_outer_frame(&self, placed: &LinkPlacement) -> Self {
         let (r, t) = (placed.rotation, placed.origin);
+        // Turn into the axes of the outer frame, then shift by the pose (Steiner).
         let turned = r * self.first;
         let square =
             |a: &Vector3<f64>, b: &Vector3<f64>| a.dot(b) * Matrix3::identity() - a * b.transpose();
@@ -89,10 +90,12 @@ pub(super) fn bodies(
     mechanism: &Mechanism,
     tree: &LinkTree,
 ) -> Result<Vec<LinkInertia>, ExportError> {
+    // Values of exact expressions at the nominal values of all symbols.
     let value =
         |exact: &ExactExpression| exact.evaluate(&|symbol| mechanism.symbol_nominal(symbol));
     let vector = |exact: &[ExactExpression; 3]| Vector3::from_fn(|k, _| value(&exact[k]));
     let mut bodies = vec![LinkInertia::NONE; tree.links.len()];
+    // Add a body on a frame to the link that carries the frame.
     let mut add = |frame: FrameIdx, body: &LinkInertia| {
         let link = tree.link_of[frame.0];
         let placed = tree.links[link]
@@ -100,6 +103,7 @@ pub(super) fn bodies(
             .relative_placement(&tree.frames[frame.0]);
         bodies[link].add(&body.in_outer_frame(&placed));
     };
+    // Some effects are bodies, such as rotors and rods.
     let of_effects = mechanism.effects.iter().map(|effect| &effect.bodies);
     let parts = mechanism.parts.iter();
     for part in parts.chain(of_effects.clone().flat_map(|bodies| &bodies.parts)) {
@@ -108,6 +112,7 @@ pub(super) fn bodies(
     let lumps = mechanism.lumped_masses.iter();
     for lump in lumps.chain(of_effects.flat_map(|bodies| &bodies.lumped_masses)) {
         let (forces, moments) = (vector(&lump.force_at), vector(&lump.moment_at));
+        // Such a mass fits measurements, but no body has it.
         if (forces - moments).norm() > ROUNDING * (forces.norm() + moments.norm()) {
             return Err(ExportError(format!(
                 "a lumped mass on `{}` has different places in the balances of forces and of moments, which is impossible for a \
@@ -115,6 +120,7 @@ pub(super) fn bodies(
                 mechanism.frames[lump.frame.0].name
             )));
         }
+        // A mass in shares at several points.
         let share = lump_share(lump);
         add(lump.frame, &point_mass(share * value(&lump.mass), forces));
     }
@@ -154,6 +160,7 @@ fn from_part(
     value: &dyn Fn(&ExactExpression) -> f64,
     vector: &dyn Fn(&[ExactExpression; 3]) -> Vector3<f64>,
 ) -> LinkInertia {
+    // The symmetric matrix of six expressions.
     let matrix = |six: &[ExactExpression; 6]| {
         let [xx, xy, xz, yy, yz, zz] = [0, 1, 2, 3, 4, 5].map(|k: usize| value(&six[k]));
         Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz)
@@ -173,6 +180,7 @@ fn from_part(
             centre,
             inertia,
         } => {
+            // Steiner: the inertia of the mass at the centre, plus the inertia about the centre.
             let mut body = point_mass(value(mass), vector(centre));
             body.inertia += matrix(inertia);
             body
@@ -190,6 +198,7 @@ pub(super) fn complete_inertias(
     let mut completed = Vec::new();
     for (l, link) in tree.links.iter().enumerate().skip(1) {
         let body = &mut bodies[l];
+        // Only links with mass and an impossible inertia are completed.
         if body.mass <= 0.0 || inertia_fault(body).is_none() {
             continue;
         }
@@ -198,6 +207,7 @@ pub(super) fn complete_inertias(
                 body.mass * DEFAULT_RADIUS_OF_GYRATION.powi(2) * Matrix3::identity()
             }
             LinkRotation::OneAxis(axis) => {
+                // The moment about the axis has an effect and is kept; the others get possible values.
                 let n = link.placed.rotation.transpose() * axis;
                 let about = n.dot(&(body.central_inertia() * n));
                 let across = TRANSVERSE_RATIO * about;
@@ -205,6 +215,7 @@ pub(super) fn complete_inertias(
             }
             LinkRotation::AnyAxis => continue,
         };
+        // Replace the central inertia; mass and first moment stay.
         let other = LinkInertia {
             inertia: body.inertia - body.central_inertia() + central,
             ..*body
@@ -241,6 +252,7 @@ fn link_rotation(tree: &LinkTree, mut link: usize) -> LinkRotation {
             return LinkRotation::AnyAxis;
         }
         for joint in one.joints.iter().filter(|joint| joint.is_rotation) {
+            // Parallel axes are one direction.
             turns = match turns {
                 LinkRotation::Never => LinkRotation::OneAxis(joint.axis),
                 LinkRotation::OneAxis(axis) if axis.cross(&joint.axis).norm() < 1e-9 => {
@@ -256,6 +268,7 @@ fn link_rotation(tree: &LinkTree, mut link: usize) -> LinkRotation {
 
 /// Why an inertia is physically impossible; none if it is possible.
 fn inertia_fault(body: &LinkInertia) -> Option<&'static str> {
+    // Principal moments must be positive and satisfy the triangle inequality.
     let moments = body.central_inertia().symmetric_eigenvalues();
     let size = body.inertia.norm();
     let (least, largest) = (moments.min(), moments.max());

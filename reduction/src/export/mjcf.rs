@@ -79,9 +79,11 @@ impl MjcfWriter<'_> {
 
     /// The complete file.
     fn write_all(&mut self) {
+        // The sections in the order of MuJoCo's reference: what refers to names comes last.
         let name = format!(" model=\"{}\"", self.mechanism.name);
         self.write_element("mujoco", &name, |w| {
             w.line("<compiler angle=\"radian\" autolimits=\"true\"/>");
+            // Gravity is an expression in constants of the model.
             let gravity: Vec<f64> = (w.mechanism.gravity.iter())
                 .map(|g| g.evaluate(&|s| w.mechanism.symbol_nominal(s)))
                 .collect();
@@ -95,6 +97,7 @@ impl MjcfWriter<'_> {
 
     /// The contents of a link: its sites and its child bodies.
     fn write_link(&mut self, link: usize) {
+        // Sites for the points of this link that loops, drives or elements need.
         for p in 0..self.mechanism.points.len() {
             let (on, at) = self.tree.point(self.mechanism, PointIdx(p));
             if on == link && self.is_used(PointIdx(p)) {
@@ -105,6 +108,7 @@ impl MjcfWriter<'_> {
                 ));
             }
         }
+        // Bodies are nested: each child stands inside of its parent.
         for child in 1..self.tree.links.len() {
             if self.tree.links[child].parent == link {
                 self.body(child);
@@ -115,6 +119,7 @@ impl MjcfWriter<'_> {
     /// Whether a loop, a drive or an element uses a point, so that it needs a site.
     fn is_used(&self, point: PointIdx) -> bool {
         let m = self.mechanism;
+        // Drives between two points; drives of joints have no points.
         let is_end = |drive: &ModelDrive| match drive.kind {
             DriveKind::Linear { from, to } => from == point || to == point,
             DriveKind::Joint(_) => false,
@@ -127,6 +132,7 @@ impl MjcfWriter<'_> {
     /// A body with its joints, its inertia and its contents.
     fn body(&mut self, at: usize) {
         let link = &self.tree.links[at];
+        // Pose relative to the parent, as position and quaternion.
         let placed = self.tree.links[link.parent]
             .placed
             .relative_placement(&link.placed);
@@ -139,6 +145,7 @@ impl MjcfWriter<'_> {
         );
         self.write_element("body", &head, |w| {
             let link = &w.tree.links[at];
+            // Links without joints are free bodies.
             if link.joints.is_empty() {
                 w.line(&format!("<freejoint name=\"{}_free\"/>", link.name));
             }
@@ -154,6 +161,7 @@ impl MjcfWriter<'_> {
 
     /// A joint. Limits and passive properties belong to the joint that has the name of its coordinate.
     fn joint(&self, joint: &ExportedJoint, link: usize) -> String {
+        // Anchor and axis in the axes of the body.
         let placed = &self.tree.links[link].placed;
         let coordinate = &self.mechanism.coordinates[joint.coordinate];
         let mut text = format!(
@@ -163,10 +171,12 @@ impl MjcfWriter<'_> {
             number_list(clean(placed.relative_point(&joint.origin)).as_slice()),
             number_list(clean(placed.rotation.transpose() * joint.axis).as_slice()),
         );
+        // The value of the joint at the pose in which the bodies are drawn.
         let reference = joint.ratio * self.at[joint.coordinate];
         if reference != 0.0 {
             let _ = write!(text, " ref=\"{}\"", number_text(reference));
         }
+        // A joint that follows another one has no limits and losses of its own.
         if joint.name == coordinate.name {
             let limits = self.mechanism.limits.coordinates.iter();
             let of = limits.clone().find(|(i, _)| i.0 == joint.coordinate);
@@ -196,6 +206,7 @@ impl MjcfWriter<'_> {
                 "<inertial pos=\"0 0 0\" mass=\"{NEGLIGIBLE_MASS:e}\" diaginertia=\"{inertia} {inertia} {inertia}\"/>"
             );
         }
+        // MuJoCo's sequence of the six entries: the diagonal, then xy, xz, yz.
         let i = body.central_inertia();
         let six = [
             i[(0, 0)],
@@ -217,13 +228,16 @@ impl MjcfWriter<'_> {
     fn equalities(&mut self) {
         let m = self.mechanism;
         let mut lines = Vec::new();
+        // A loop: two sites coincide.
         for one in &m.loops {
             let [a, b] = one.joins.map(|point| &m.points[point.0].name);
+            // Names of loops may have other characters than letters and digits.
             let name = one.name.replace(|c: char| !c.is_alphanumeric(), "_");
             lines.push(format!(
                 "<connect name=\"{name}\" site1=\"{a}\" site2=\"{b}\"/>"
             ));
         }
+        // Joints of a coordinate that moves several joints follow the one with its name.
         for joint in self.tree.links.iter().flat_map(|link| &link.joints) {
             let owner = &m.coordinates[joint.coordinate].name;
             if joint.name != *owner {
@@ -268,11 +282,13 @@ impl MjcfWriter<'_> {
         let drives = m.drives.iter().enumerate().map(|(d, one)| (Some(d), one));
         for (d, drive) in drives.chain(m.shared_drives.iter().map(|one| (None, one))) {
             if let DriveKind::Linear { from, to } = drive.kind {
+                // Shared drives have no passive properties.
                 let own = d.map_or(PassiveProperties::default(), |d| self.friction.drives[d]);
                 let rest = passive_attributes(&own, "springlength");
                 lines.push((format!("name=\"{}_line\"{rest}", drive.name), [from, to]));
             }
         }
+        // Springs and dampers between two points, without a drive.
         for (k, (ends, own)) in self.friction.elements.iter().enumerate() {
             let rest = passive_attributes(own, "springlength");
             lines.push((format!("name=\"element_{}\"{rest}", k + 1), *ends));
@@ -299,6 +315,7 @@ impl MjcfWriter<'_> {
         let all = drives.chain(m.shared_drives.iter().map(|one| (None, one)));
         let mut lines = Vec::new();
         for (d, drive) in all.filter(|(_, drive)| drive.is_driven) {
+            // What the motor acts on; coordinates of quaternions have no joint of their own.
             let on = match drive.kind {
                 DriveKind::Joint(CoordinateIdx(i)) => {
                     if m.coordinates[i].motion.is_quaternion() || !self.has_joint(i) {
@@ -308,6 +325,7 @@ impl MjcfWriter<'_> {
                 }
                 DriveKind::Linear { .. } => format!("tendon=\"{}_line\"", drive.name),
             };
+            // The control of a motor is its force, so that limits of the force are its range.
             let limits = m.limits.forces.iter();
             let range = limits.clone().find(|(i, _)| Some(i.0) == d);
             let range = range.map_or(String::new(), |(_, [low, high])| {
@@ -350,6 +368,7 @@ fn passive_attributes(one: &PassiveProperties, rest: &str) -> String {
             let _ = write!(text, " {name}=\"{}\"", number_text(value));
         }
     }
+    // A spring needs its relaxed position.
     if one.stiffness != 0.0 {
         let _ = write!(text, " {rest}=\"{}\"", number_text(one.rest));
     }

@@ -25,6 +25,7 @@ pub(super) fn write(
     remarks: &mut Vec<Message>,
 ) -> String {
     report_unsupported(mechanism, remarks);
+    // The base link, then each link with the joints from its parent.
     let mut text = format!(
         "<?xml version=\"1.0\"?>\n<robot name=\"{}\">\n",
         mechanism.name
@@ -39,6 +40,7 @@ pub(super) fn write(
 
 /// Adds remarks on parts of the model that URDF cannot express: loops, drives between two points, gravity.
 fn report_unsupported(mechanism: &Mechanism, remarks: &mut Vec<Message>) {
+    // Loops stay open.
     if !mechanism.loops.is_empty() {
         let names: Vec<&str> = mechanism
             .loops
@@ -50,6 +52,7 @@ fn report_unsupported(mechanism: &Mechanism, remarks: &mut Vec<Message>) {
             names.join(", ")
         ));
     }
+    // Drives between two points are left out.
     let is_line = |kind: &DriveKind| matches!(kind, DriveKind::Linear { .. });
     let drives = mechanism.drives.iter().chain(&mechanism.shared_drives);
     let lines: Vec<&str> = drives
@@ -62,6 +65,7 @@ fn report_unsupported(mechanism: &Mechanism, remarks: &mut Vec<Message>) {
             lines.join(", ")
         ));
     }
+    // Simulators have gravity in their own settings.
     let gravity: [f64; 3] =
         std::array::from_fn(|k| mechanism.gravity[k].evaluate(&|s| mechanism.symbol_nominal(s)));
     remarks.push(message!(
@@ -80,10 +84,12 @@ fn link_with_joints(
     friction: &PassiveEffects,
 ) -> String {
     let mut text = String::new();
+    // Name and pose of the link before the next joint.
     let mut parent = (
         tree.links[one.parent].name.clone(),
         tree.links[one.parent].placed,
     );
+    // Links without joints are free bodies.
     if one.joints.is_empty() {
         let origin = origin_element(&parent.1.relative_placement(&one.placed));
         let _ = writeln!(
@@ -94,6 +100,7 @@ fn link_with_joints(
         );
     }
     for (k, moving) in one.joints.iter().enumerate() {
+        // The last joint leads to the link itself, the ones before to links without mass at their origins.
         let is_last = k + 1 == one.joints.len();
         let (name, placed) = if is_last {
             (one.name.clone(), one.placed)
@@ -126,6 +133,7 @@ fn joint_element(
     (child, to): &(String, LinkPlacement),
     (friction, followed): (&PassiveEffects, &[FollowedCoordinate]),
 ) -> String {
+    // Limits of the coordinate, and the force limit of a drive that acts on it.
     let coordinate = &mechanism.coordinates[moving.coordinate].name;
     let limits = mechanism.limits.coordinates.iter();
     let limits = limits.clone().find(|(i, _)| i.0 == moving.coordinate);
@@ -136,11 +144,13 @@ fn joint_element(
             matches!(mechanism.drives[d.0].kind, DriveKind::Joint(i) if i.0 == moving.coordinate);
         drives_it.then(|| range[0].abs().max(range[1].abs()))
     });
+    // A rotation without a range has its own type.
     let kind = match (moving.is_rotation, range) {
         (true, None) => "continuous",
         (true, Some(_)) => "revolute",
         (false, _) => "prismatic",
     };
+    // The axis in the axes of the child.
     let axis = to.rotation.transpose() * moving.axis;
     let mut text = format!(
         "  <joint name=\"{}\" type=\"{kind}\">\n    {}\n    <parent link=\"{parent}\"/>\n    <child link=\"{child}\"/>\n    <axis \
@@ -149,12 +159,14 @@ fn joint_element(
         origin_element(&from.relative_placement(to)),
         number_list(clean(axis).as_slice()),
     );
+    // Limits of the joint; a negative ratio exchanges both ends.
     let scaled = |range: [f64; 2]| {
         let [a, b] = range.map(|x| x * moving.ratio);
         [a.min(b), a.max(b)]
     };
     if kind != "continuous" || rate.is_some() || effort.is_some() {
         let [low, high] = scaled(range.unwrap_or([-UNLIMITED_RANGE, UNLIMITED_RANGE]));
+        // The format requires effort and velocity in each `<limit>`, but no bounds of a continuous joint.
         let bounds = if kind == "continuous" {
             String::new()
         } else {
@@ -173,6 +185,7 @@ fn joint_element(
             number_text(most(rate.map(scaled)))
         );
     }
+    // The joint of the coordinate itself may follow another coordinate; the other joints follow it.
     let own = friction.joints[moving.coordinate];
     if moving.name != *coordinate {
         let _ = writeln!(
@@ -189,6 +202,7 @@ fn joint_element(
             number_text(one.offset)
         );
     }
+    // Losses belong to the joint with the name of the coordinate.
     if moving.name == *coordinate && own != PassiveProperties::default() {
         let _ = writeln!(
             text,
@@ -205,6 +219,7 @@ fn link_element(name: &str, body: Option<&LinkInertia>) -> String {
     let Some(body) = body.filter(|body| !body.is_zero()) else {
         return format!("  <link name=\"{name}\"/>\n");
     };
+    // Inertia about the centre of mass, in the axes of the link.
     let i = body.central_inertia();
     format!(
         "  <link name=\"{name}\">\n    <inertial>\n      <origin xyz=\"{}\" rpy=\"0 0 0\"/>\n      <mass value=\"{}\"/>\n      \
@@ -222,6 +237,7 @@ fn link_element(name: &str, body: Option<&LinkInertia>) -> String {
 
 /// The `<origin>` of a pose: position, and roll, pitch and yaw about fixed axes.
 fn origin_element(placed: &LinkPlacement) -> String {
+    // The angles of nalgebra have the same sequence as those of URDF.
     let (roll, pitch, yaw) = Rotation3::from_matrix_unchecked(placed.rotation).euler_angles();
     format!(
         "<origin xyz=\"{}\" rpy=\"{}\"/>",

@@ -20,6 +20,7 @@ impl GeomShape {
     /// A shape by MuJoCo's kind and sizes, m; `half` is half the length if both ends are given (`fromto`). None for
     /// kinds without mass, such as planes.
     pub(crate) fn new(kind: &str, size: &[f64], half: Option<f64>) -> Result<Option<Self>, String> {
+        // A size of the list, which must be positive.
         let at = |k: usize| {
             size.get(k)
                 .copied()
@@ -28,6 +29,7 @@ impl GeomShape {
         };
         let shape = match kind {
             "plane" | "hfield" => return Ok(None),
+            // Solid shapes, with the z axis along the length.
             "sphere" => {
                 let r = at(0)?;
                 Self {
@@ -43,6 +45,7 @@ impl GeomShape {
                 }
             }
             "box" => {
+                // With `fromto` the first size is both half widths.
                 let [a, b, c] = match half {
                     Some(half) => [at(0)?, at(0)?, half],
                     None => [at(0)?, at(1)?, at(2)?],
@@ -53,6 +56,7 @@ impl GeomShape {
                 }
             }
             "cylinder" => {
+                // Radius and half length.
                 let (r, h) = (at(0)?, half.map_or_else(|| at(1), Ok)?);
                 let across = r * r / 4.0 + h * h / 3.0;
                 Self {
@@ -62,6 +66,7 @@ impl GeomShape {
             }
             "capsule" => {
                 let (r, h) = (at(0)?, half.map_or_else(|| at(1), Ok)?);
+                // Volumes of the cylinder and of both caps, a sphere together.
                 let (middle, caps) = (2.0 * PI * r * r * h, 4.0 / 3.0 * PI * r.powi(3));
                 let volume = middle + caps;
                 // The centre of each cap is 3/8 r beyond the end of the cylinder.
@@ -106,6 +111,7 @@ pub(crate) fn combined_inertia(parts: &[DescriptionInertia]) -> DescriptionInert
     if mass <= 0.0 {
         return DescriptionInertia::default();
     }
+    // The common centre of mass.
     let moment: Vector3<f64> = parts.iter().map(|part| part.mass * part.at.p).sum();
     let centre = moment / mass;
     let mut inertia = Matrix3::zeros();

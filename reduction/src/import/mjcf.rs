@@ -93,15 +93,18 @@ pub(crate) fn read(document: &Document) -> Result<RobotDescription, String> {
         world: Vec::new(),
         sites: Vec::new(),
     };
+    // Options: gravity, and forces that the model does not have.
     for option in children(&root, "option") {
         if let Some(text) = option.attribute("gravity") {
             reader.out.gravity = Some(vector(exact_numbers(&option, "gravity", text)?));
         }
+        // A flag of the file can disable gravity without a change of the vector.
         let is_off = |flag: Node| flag.attribute("gravity") == Some("disable");
         if children(&option, "flag").any(is_off) {
             let says = "its flag disables gravity; the model has gravity";
             reader.out.remarks.push(located_message(&option, says));
         }
+        // Forces of the surrounding fluid are not part of a model.
         for key in ["density", "viscosity"] {
             let text = option.attribute(key);
             if text.is_some_and(|text| text.trim().parse() != Ok(0.0)) {
@@ -110,6 +113,7 @@ pub(crate) fn read(document: &Document) -> Result<RobotDescription, String> {
             }
         }
     }
+    // Elements that MuJoCo expands when it reads the file; only their result could be imported.
     for node in root.descendants() {
         let tag = node.tag_name().name();
         if tag == "include" {
@@ -125,6 +129,7 @@ pub(crate) fn read(document: &Document) -> Result<RobotDescription, String> {
             ));
         }
     }
+    // The tree of bodies with their joints and inertias.
     for body in children(&root, "worldbody") {
         let inside = MjcfContext {
             link: None,
@@ -132,6 +137,7 @@ pub(crate) fn read(document: &Document) -> Result<RobotDescription, String> {
         };
         reader.read_children(&body, inside, DescriptionPose::identity())?;
     }
+    // Then everything that refers to bodies and joints by name.
     reader.scale_to_total();
     for equalities in children(&root, "equality") {
         for node in equalities.children().filter(Node::is_element) {
@@ -140,6 +146,7 @@ pub(crate) fn read(document: &Document) -> Result<RobotDescription, String> {
     }
     reader.read_actuators(&root)?;
     reader.read_keyframe(&root)?;
+    // A remark for each section that is neither read nor known to have no effect.
     for node in root.children().filter(Node::is_element) {
         let tag = node.tag_name().name();
         if !NO_DYNAMICS.contains(&tag)
@@ -172,6 +179,7 @@ fn compiler(root: &Node) -> Result<MjcfCompiler, String> {
             out.is_degree = angle != "radian";
         }
         if let Some(sequence) = node.attribute("eulerseq") {
+            // Capitals rotate about fixed axes; the two kinds cannot be mixed.
             let is_fine = sequence.len() == 3
                 && sequence.chars().all(|c| "xyzXYZ".contains(c))
                 && (sequence == sequence.to_lowercase() || sequence == sequence.to_uppercase());
@@ -199,6 +207,7 @@ fn compiler(root: &Node) -> Result<MjcfCompiler, String> {
                 [*value] = exact_numbers(&node, key, text)?;
             }
         }
+        // Poses relative to the world have another meaning, so the file cannot be read.
         if node.attribute("coordinate") == Some("global") {
             return Err(located_message(
                 &node,
@@ -213,6 +222,7 @@ fn compiler(root: &Node) -> Result<MjcfCompiler, String> {
         }
         if let Some(text) = node.attribute("settotalmass") {
             let [total] = exact_numbers(&node, "settotalmass", text)?;
+            // The default of MuJoCo is -1, which means "no scaling".
             out.total_mass = (total > 0.0).then_some(total);
         }
     }
@@ -276,6 +286,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
         node: &Node<'a, 'i>,
         class: Option<&str>,
     ) -> Result<DescriptionPose, String> {
+        // The position; then whichever orientation is given.
         let mut out = DescriptionPose::identity();
         if let Some(pos) = self.numbers(node, class, "pos")? {
             out.p = vector(pos);
@@ -290,6 +301,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
                 .ok_or_else(|| fault("axisangle"))?;
             out.r = rotation_about(&axis, self.angle(angle));
         }
+        // The x axis is kept; the y axis is made perpendicular to it.
         if let Some([a, b, c, d, e, f]) = self.numbers(node, class, "xyaxes")? {
             let x = Vector3::new(a, b, c)
                 .try_normalize(1e-12)
@@ -300,6 +312,8 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
                 .ok_or_else(|| fault("xyaxes"))?;
             out.r = Matrix3::from_columns(&[x, y, x.cross(&y)]);
         }
+        // The smallest rotation that turns the z axis into the given direction; half a turn about x for the opposite
+        // one.
         if let Some(z) = self.numbers(node, class, "zaxis")? {
             let z = vector(z)
                 .try_normalize(1e-12)
@@ -311,6 +325,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
         }
         if let Some(angles) = self.numbers::<3>(node, class, "euler")? {
             out.r = Matrix3::identity();
+            // One rotation after the other, in the sequence of the file.
             for (letter, angle) in self.compiler.euler.chars().zip(angles) {
                 let axis = match letter.to_ascii_lowercase() {
                     'x' => Vector3::x(),
@@ -337,9 +352,11 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
         place: DescriptionPose,
     ) -> Result<(), String> {
         for child in node.children().filter(Node::is_element) {
+            // A default class is valid for all elements inside.
             let class = child.attribute("childclass").or(inside.class);
             match child.tag_name().name() {
                 "body" => self.read_body(&child, MjcfContext { class, ..inside }, place)?,
+                // A frame has no body; its pose is applied to the elements inside.
                 "frame" => {
                     let place = place.compose(&self.read_placement(&child, class)?);
                     self.read_children(&child, MjcfContext { class, ..inside }, place)?;
@@ -368,8 +385,10 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
         around: MjcfContext<'a>,
         place: DescriptionPose,
     ) -> Result<(), String> {
+        // Bodies have no default class of their own, so the pose is that of the element.
         let placed = place.compose(&self.read_placement(node, None)?);
         let own = self.out.links.len();
+        // Bodies without a name are numbered.
         let name = node
             .attribute("name")
             .map_or_else(|| format!("body{}", own + 1), str::to_owned);
@@ -382,8 +401,10 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
         let parent = around
             .link
             .map_or(DescriptionPose::identity(), |link| self.world[link]);
+        // Equalities between bodies need the poses in the world.
         self.world.push(parent.compose(&placed));
         let inertial = self.inertial(node, around.class)?;
+        // Properties of simulation and control are reported, since the model lacks them.
         if node.attribute("mocap") == Some("true") {
             self.out.remarks.push(located_message(
                 node,
@@ -406,6 +427,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
             joints: Vec::new(),
             inertial,
         });
+        // Child bodies follow the body in the list, so that parents stand before children.
         let inside = MjcfContext {
             link: Some(own),
             class: around.class,
@@ -422,10 +444,12 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
         let given = node
             .children()
             .find(|child| child.tag_name().name() == "inertial");
+        // The given inertia counts, unless the file demands that of the shapes.
         let mut found = match (given, self.compiler.from_geoms) {
             (Some(given), None | Some(false)) => {
                 let mut placed = self.read_placement(&given, None)?;
                 let [mass] = exact_numbers(&given, "mass", &required_attribute(&given, "mass")?)?;
+                // A full matrix is given in the axes of the body, a diagonal one in those of the element.
                 let inertia = if let Some(full) = given.attribute("fullinertia") {
                     if given.attribute("diaginertia").is_some() {
                         return Err(located_message(
@@ -450,8 +474,10 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
                 }
             }
             (_, Some(false)) => DescriptionInertia::default(),
+            // No `<inertial>`, or `inertiafromgeom` is true.
             _ => self.inertia_from_geoms(node, class)?,
         };
+        // Lower bounds of the compiler settings.
         found.mass = found.mass.max(self.compiler.least_mass);
         found.inertia = self.bounded_inertia(found.inertia);
         Ok(found)
@@ -464,9 +490,11 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
         let least = self.compiler.least_inertia;
         moments.eigenvalues = given.map(|moment| moment.max(least));
         let all = moments.eigenvalues;
+        // The sum of two principal moments cannot be less than the third.
         if self.compiler.balances_inertia && 2.0 * all.max() > all.sum() {
             moments.eigenvalues.fill(all.mean());
         }
+        // An unchanged matrix is returned as it is, without rounding errors.
         if moments.eigenvalues == given {
             inertia
         } else {
@@ -495,6 +523,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
         node: &Node<'a, 'i>,
         class: Option<&'a str>,
     ) -> Result<DescriptionInertia, String> {
+        // All shapes of the body itself, but not those of its child bodies.
         let mut shapes = Vec::new();
         let mut waiting = vec![(*node, class, DescriptionPose::identity())];
         while let Some((node, class, place)) = waiting.pop() {
@@ -524,10 +553,12 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
         place: DescriptionPose,
     ) -> Result<Option<DescriptionInertia>, String> {
         let mass = self.numbers::<1>(node, class, "mass")?.map(|[mass]| mass);
+        // Without a mass MuJoCo computes it from the density, by default that of water.
         let [density] = self.numbers(node, class, "density")?.unwrap_or([1000.0]);
         if mass == Some(0.0) || (mass.is_none() && density == 0.0) {
             return Ok(None);
         }
+        // Often shapes for the picture only are in another group and have no mass.
         let [group] = self.numbers(node, class, "group")?.unwrap_or([0.0]);
         let [first, last] = self.compiler.groups;
         if !(first..=last).contains(&group) {
@@ -540,6 +571,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
                  (mj_saveLastXML)",
             ));
         }
+        // A shape with a mesh has the type of a mesh, if no other is given.
         let usual = match self.text(node, class, "mesh")? {
             Some(_) => "mesh",
             None => "sphere",
@@ -617,6 +649,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
             }
         };
         let n = self.out.links[link].joints.len();
+        // Joints without a name are named after their body, with a number from the second on.
         let name = node.attribute("name").map_or_else(
             || {
                 let suffix = if n == 0 {
@@ -633,6 +666,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
         if let Some(pos) = self.numbers(node, class, "pos")? {
             joint.anchor = vector(pos);
         }
+        // Anchor and axis are given in the axes of the enclosing frame.
         joint.anchor = place.p + place.r * joint.anchor;
         if let Some(axis) = self.numbers(node, class, "axis")? {
             joint.axis = vector(axis);
@@ -641,6 +675,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
         if joint.axis.norm() == 0.0 {
             return Err(located_message(node, "the axis has no direction"));
         }
+        // Angles have the unit of the file, lengths are in m.
         let in_unit = |reader: &Self, value: f64| {
             if kind == DescriptionJointKind::Prismatic {
                 value
@@ -655,6 +690,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
             let zero = self.first(node, class, "ref")?;
             joint.zero = in_unit(self, zero);
         }
+        // A range counts if `limited` is true, or if it is not specified and `autolimits` is true.
         let limited = self.text(node, class, "limited")?.unwrap_or("auto");
         if let Some(range) = self.numbers::<2>(node, class, "range")? {
             let counts = limited == "true" || (limited == "auto" && self.compiler.has_auto_limits);
@@ -667,11 +703,13 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
                 joint.range = Some(range.map(|x| in_unit(self, x)));
             }
         }
+        // Limits of the sum of all actuators at the joint.
         if let Some(range) = self.numbers::<2>(node, class, "actuatorfrcrange")?
             && self.text(node, class, "actuatorfrclimited")? != Some("false")
         {
             joint.force = Some(range);
         }
+        // Passive forces at the joint.
         joint.damping = self.first(node, class, "damping")?;
         joint.friction = self.first(node, class, "frictionloss")?;
         joint.armature = self.first(node, class, "armature")?;

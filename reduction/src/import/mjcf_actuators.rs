@@ -20,6 +20,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
                 .collect::<Vec<_>>()
         }) {
             n += 1;
+            // The first number of the gear is the ratio at a joint or tendon with one degree of freedom.
             let gear = match self.text(&node, None, "gear")? {
                 Some(text) => numbers(&node, "gear", text)?
                     .first()
@@ -30,6 +31,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
             if let Some(name) = node.attribute("joint").or(node.attribute("jointinparent")) {
                 self.add_joint_drive(&node, name, gear)?;
             } else if let Some(name) = node.attribute("tendon") {
+                // The tendon by its name.
                 let tendon = children(root, "tendon")
                     .flat_map(|section| section.children().collect::<Vec<_>>())
                     .find(|tendon| tendon.attribute("name") == Some(name))
@@ -44,6 +46,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
                     &node,
                     &format!("it drives the joints of the tendon `{name}` together; in the model each joint has a separate drive"),
                 ));
+                // A fixed tendon is a sum of joint positions; each joint gets a drive with its coefficient.
                 for joint in children(&tendon, "joint") {
                     let gear = gear * super::xml::number_attribute(&joint, "coef")?;
                     let name = required_attribute(&joint, "joint")?;
@@ -66,11 +69,13 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
             let mut bends = Vec::new();
             let is_drive = (self.out.straight_drives.iter())
                 .any(|line| tendon.attribute("name") == Some(line.tendon.as_str()));
+            // A straight drive has damping, friction and armature of its tendon, but not its spring.
             let kept = if is_drive { 1 } else { 4 };
             for key in ["stiffness", "damping", "frictionloss", "armature"]
                 .into_iter()
                 .take(kept)
             {
+                // One tendon is one drive, even if several actuators act on it.
                 if self
                     .text(&tendon, None, key)?
                     .is_some_and(|text| text.trim() != "0")
@@ -91,6 +96,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
                 ));
             }
         }
+        // A file without actuators describes the mechanism only.
         if n == 0 {
             let joints = self.out.links.iter_mut().flat_map(|link| &mut link.joints);
             for joint in joints.filter(|joint| joint.kind != DescriptionJointKind::Free) {
@@ -111,6 +117,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
         gear: f64,
     ) -> Result<(), String> {
         let parts: Vec<Node> = tendon.children().filter(Node::is_element).collect();
+        // Pulleys and wrapped tendons have more elements, and their direction is not that of a line.
         let (&[one, other], true) = (
             parts.as_slice(),
             parts.iter().all(|part| part.tag_name().name() == "site"),
@@ -122,6 +129,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
             ));
             return Ok(());
         };
+        // The sites at both ends.
         let mut ends = [(None, Vector3::zeros()); 2];
         for (end, part) in ends.iter_mut().zip([one, other]) {
             let (link, place) = self.site(&part, &required_attribute(&part, "site")?)?;
@@ -140,6 +148,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
             ));
             return Ok(());
         }
+        // Losses of the tendon, and the rotor inertia of the actuator by the square of its gear.
         let own = |key: &str| {
             Ok::<f64, String>(self.numbers::<1>(tendon, None, key)?.map_or(0.0, |[x]| x))
         };
@@ -160,6 +169,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
             armature: on_tendon + on_drive * gear * gear,
             tendon: line,
         });
+        // The gear scales the force of the actuator; the model has the force along the tendon.
         if (gear - 1.0).abs() > 0.0 {
             self.out.remarks.push(located_message(
                 node,
@@ -179,6 +189,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
         {
             return Ok(Some([low, high]));
         }
+        // The control of a motor is its force, so that the range of the control limits it.
         if node.tag_name().name() == "motor"
             && let Some([low, high]) = self.numbers(node, None, "ctrlrange")?
             && self.text(node, None, "ctrllimited")? != Some("false")
@@ -199,6 +210,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
         let armature = self
             .numbers::<1>(node, None, "armature")?
             .map_or(0.0, |[x]| x);
+        // The joint by its name.
         let joint = self
             .out
             .links
@@ -206,8 +218,10 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
             .flat_map(|link| &mut link.joints)
             .find(|joint| joint.name == name)
             .ok_or_else(|| located_message(node, &format!("there is no joint `{name}`")))?;
+        // A free body cannot have a drive.
         joint.is_driven = joint.kind != DescriptionJointKind::Free;
         joint.armature += armature * gear * gear;
+        // Limits at the joint itself have priority.
         if joint.force.is_none() {
             joint.force = range.map(|range| scale_range(range, gear));
         }
@@ -239,6 +253,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
                 DescriptionJointKind::Free => 7,
             };
             let own: Vec<f64> = values.by_ref().take(n).collect();
+            // Only joints with one coordinate have a starting value.
             if let [value] = own[..] {
                 self.out.pose.push((joint.name.clone(), value));
             }

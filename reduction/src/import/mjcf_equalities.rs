@@ -46,6 +46,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
             return Ok(());
         }
         let tag = node.tag_name().name();
+        // Equalities without a name are numbered.
         let name = node.attribute("name").map_or_else(
             || format!("{tag}_{}", self.out.closures.len() + 1),
             str::to_owned,
@@ -57,6 +58,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
                 } else {
                     ClosureConstraint::Frames
                 };
+                // The ends are given by two sites, or by two bodies with an anchor.
                 let ends = if node.attribute("site1").is_some() {
                     let [one, other] = [
                         required_attribute(node, "site1")?,
@@ -95,6 +97,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
     ) -> Result<[(Option<usize>, DescriptionPose); 2], String> {
         let one = self.link(node, &required_attribute(node, "body1")?)?;
         let other = self.link(node, node.attribute("body2").unwrap_or("world"))?;
+        // Poses of both bodies, as the file gives them, determine the second end.
         let in_world =
             |link: Option<usize>| link.map_or(DescriptionPose::identity(), |link| self.world[link]);
         let anchor = match node.attribute("anchor") {
@@ -108,6 +111,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
                 Some(text) => Some(exact_numbers(node, "relpose", text)?),
                 None => None,
             };
+            // A zero quaternion means the relative pose of the file.
             let relative = match pose {
                 Some([x, y, z, q @ ..]) if q.iter().any(|x| x.abs() > 0.0) => DescriptionPose {
                     p: Vector3::new(x, y, z),
@@ -116,12 +120,14 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
                 },
                 _ => in_world(one).inverse().compose(&in_world(other)),
             };
+            // The weld holds both bodies together at the anchor.
             let shift = DescriptionPose {
                 p: anchor,
                 r: Matrix3::identity(),
             };
             return Ok([(one, relative.compose(&shift)), (other, shift)]);
         }
+        // For `connect` the anchor is a point of the first body.
         let first = DescriptionPose {
             p: anchor,
             r: Matrix3::identity(),
@@ -142,6 +148,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
             Some(text) => numbers(node, "polycoef", text)?,
             None => vec![0.0, 1.0],
         };
+        // Missing coefficients are zero.
         let coefficient = |k: usize| given.get(k).copied().unwrap_or(0.0);
         let zero = |name: &str| self.joint_zero(node, name);
         if of.is_some() && (2..5).any(|k| coefficient(k) != 0.0) {
@@ -150,6 +157,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
                 "a coupling by a polynomial of higher degree is not supported; models have constant ratios only",
             ));
         }
+        // q1 - zero1 = c0 + c1*(q2 - zero2), solved for q1.
         let ratio = if of.is_some() { coefficient(1) } else { 0.0 };
         let reference = of.as_deref().map_or(Ok(0.0), zero)?;
         let offset = zero(&joint)? + coefficient(0) - ratio * reference;
@@ -180,6 +188,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
             None => vec![0.0, 1.0],
         };
         let coefficient = |k: usize| given.get(k).copied().unwrap_or(0.0);
+        // The condition as a sum over joints: length of the first tendon minus a multiple of the second one's.
         let mut terms = tendon_joints(node, &required_attribute(node, "tendon1")?)?;
         if let Some(other) = node.attribute("tendon2") {
             if (2..5).any(|k| coefficient(k) != 0.0) {
@@ -200,7 +209,9 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
                 None => sums.push((joint, length)),
             }
         }
+        // A joint that cancels out is not coupled.
         sums.retain(|(_, length)| *length != 0.0);
+        // One joint is fixed; of two joints the second follows the first.
         let (one, of) = match sums.as_slice() {
             [one] => (one, None),
             [of, one] => (one, Some(of)),
@@ -214,6 +225,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
                 ));
             }
         };
+        // Solve the condition for the follower.
         let ratio = of.map_or(0.0, |(_, length)| -length / one.1);
         let reference = of.map_or(Ok(0.0), |(of, _)| self.joint_zero(node, of))?;
         let offset = self.joint_zero(node, &one.0)? + coefficient(0) / one.1 - ratio * reference;
@@ -230,6 +242,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
 
 /// Joints of a fixed tendon with their coefficients: change of length per rad or per m.
 fn tendon_joints(node: &Node<'_, '_>, name: &str) -> Result<Vec<(String, f64)>, String> {
+    // The tendon by its name.
     let root = node.document().root_element();
     let tendon = children(&root, "tendon")
         .flat_map(|section| section.children().collect::<Vec<_>>())

@@ -157,9 +157,11 @@ pub(crate) fn model_text(
         has_surplus: false,
         couplings,
     };
+    // Driven variables should stay independent, others become passive first.
     for (k, variable) in build.couplings.variables.iter().enumerate() {
         build.reluctance[k] = u8::from(!variable.is_driven) * 2;
     }
+    // Frames, coordinates and bodies, link by link; parents stand before their children.
     for index in 0..description.links.len() {
         build.link(&description, index)?;
     }
@@ -172,6 +174,7 @@ pub(crate) fn model_text(
             build.reluctance[variable] = build.reluctance[variable].min(1);
         }
     }
+    // Loops decide which coordinates are passive; then drives can be assigned to the others.
     let closed = build.close(&description)?;
     let lines = build.assign_coordinates(&description.straight_drives, closed.as_ref());
     Ok(build.finish(&description, closed.as_ref(), &lines))
@@ -181,6 +184,7 @@ impl ModelTextBuilder<'_> {
     /// Adds the frames of a link's joints, and its mass and inertia.
     fn link(&mut self, description: &RobotDescription, index: usize) -> Result<(), String> {
         let link = &description.links[index];
+        // The frame that carries the parent, and the pose of the parent in it.
         let (mut frame, carried) = link
             .parent
             .map_or((None, DescriptionPose::identity()), |parent| {
@@ -195,6 +199,7 @@ impl ModelTextBuilder<'_> {
             } else {
                 format!("{}_{}", link.name, joint.name)
             };
+            // Position of a closure on this link relative to the joint, for the choice of angles of a ball joint.
             let tip = closure_point(description, index).map(|tip| tip - joint.anchor);
             (frame, here) = match joint.kind {
                 DescriptionJointKind::Free => self.add_free_joint(joint, &here, &name),
@@ -204,6 +209,7 @@ impl ModelTextBuilder<'_> {
                 }
             };
         }
+        // The link is fixed to the frame of its last joint.
         self.links.push((frame, here));
         self.add_inertia(link, frame, &here)
     }
@@ -218,16 +224,19 @@ impl ModelTextBuilder<'_> {
         link: &DescriptionPose,
         name: &str,
     ) -> Result<(Option<usize>, DescriptionPose), String> {
+        // Joints of a model move along a named axis, so the frame is turned for other directions.
         let (axis, turned) = named_axis(&joint.axis).ok_or_else(|| {
             format!(
                 "line {}: the axis of `{}` has no direction",
                 joint.line, joint.name
             )
         })?;
+        // Pose of the frame on its parent.
         let at = DescriptionPose {
             p: link.p + link.r * joint.anchor,
             r: link.r * turned,
         };
+        // How the joint follows its variable.
         let follows = self.couplings.find_follower(&joint.name).ok_or_else(|| {
             format!(
                 "line {}: two joints have the name `{}`; rename one",
@@ -241,13 +250,17 @@ impl ModelTextBuilder<'_> {
             self.add_joint_forces(description, joint, variable, follows.ratio, follows.offset);
             (follows.ratio, coordinate)
         });
+        // Coordinates of the description are `zero` at the pose in which links are given.
         let constant = follows.offset - joint.zero;
+        // The constant part of the frame's pose.
         let shown = self.transform_text(&joint.name, &at);
+        // A joint that cannot share the coordinate of its variable gets its own.
         let follower = moved
             .as_ref()
             .filter(|_| follows.has_own)
             .map(|(_, leader)| self.follower(joint, leader, &follows));
         let own = self.unique_name(name);
+        // The expression of the joint's coordinate.
         let text = match (&follower, &moved) {
             (Some(follower), _) => follower.clone(),
             (None, None) => String::new(),
@@ -264,11 +277,13 @@ impl ModelTextBuilder<'_> {
         let offset = self.offset(&format!("{}_zero", joint.name), left, joint);
         let text = with_offset(text, &offset);
         let kind = if is_turn { "revolute" } else { "prismatic" };
+        // The z axis is the default of the format.
         let axis_text = if axis == "z" {
             String::new()
         } else {
             format!(", axis = \"{axis}\"")
         };
+        // The `joint` of the frame; a joint that a coupling fixes has none.
         let joint_text = if moved.is_some() {
             format!("{kind} = \"{text}\"{axis_text}")
         } else {
@@ -280,6 +295,7 @@ impl ModelTextBuilder<'_> {
             ));
             String::new()
         };
+        // The same motion for the numeric kinematics.
         let direction = turned.transpose() * joint.axis.normalize();
         let motion = ChainMotion {
             is_turn,
@@ -288,6 +304,7 @@ impl ModelTextBuilder<'_> {
             ratio: follows.ratio,
             offset: constant,
         };
+        // Pose of the link in the frame: the inverse of shift and turn.
         let back = DescriptionPose {
             p: -(turned.transpose() * joint.anchor),
             r: turned.transpose(),
@@ -311,6 +328,7 @@ impl ModelTextBuilder<'_> {
             let frame = self.frame(own, on, at, &shown, "", Vec::new());
             return Ok((Some(frame), back));
         }
+        // Tell the caller which coordinate belongs to the joint.
         if let Some((_, coordinate)) = &moved {
             let (coordinate, ratio, offset) = match &follower {
                 Some(own) => (own, 1.0, 0.0),
@@ -348,6 +366,7 @@ impl ModelTextBuilder<'_> {
     ) -> String {
         let own = self.unique_name(&joint.name);
         let offset = self.offset(&format!("{}_offset", joint.name), follows.offset, joint);
+        // A ratio between equal units is written as a number.
         let ratio = if follows.changes_kind {
             let unit = if joint.kind == DescriptionJointKind::Revolute {
                 "1/m"
@@ -375,6 +394,7 @@ impl ModelTextBuilder<'_> {
         if let Some(k) = self.of_variable[variable] {
             return self.coordinates[k].name.clone();
         }
+        // The coordinate has the name of the joint whose value it is.
         let meant = self.couplings.variables[variable].clone();
         let name = self.unique_name(&meant.joint);
         self.of_variable[variable] = Some(self.coordinates.len());
@@ -410,6 +430,7 @@ impl ModelTextBuilder<'_> {
         if stiffness != 0.0 && self.reluctance[variable] == 2 {
             self.reluctance[variable] = 1;
         }
+        // The range of the variable; a negative ratio exchanges its ends.
         if let Some(range) = joint.range {
             let mut ends = range.map(|end| (end - offset) / ratio);
             ends.sort_by(f64::total_cmp);
@@ -418,6 +439,7 @@ impl ModelTextBuilder<'_> {
                     .map_or(ends, |old| [old[0].max(ends[0]), old[1].min(ends[1])]),
             );
         }
+        // The lowest rate of all joints that the variable moves.
         if let Some(rate) = joint.rate {
             let rate = rate / ratio.abs();
             acts.rate = Some(acts.rate.map_or(rate, |old| old.min(rate)));
@@ -427,6 +449,7 @@ impl ModelTextBuilder<'_> {
         if is_leader {
             acts.force = joint.force.map(|force| force.map(|force| force * ratio));
         }
+        // Loops are closed from the pose of the description, or from the zero of the joint.
         let given = description
             .pose
             .iter()
@@ -448,6 +471,7 @@ impl ModelTextBuilder<'_> {
         name: &str,
         tip: Option<Vector3<f64>>,
     ) -> (Option<usize>, DescriptionPose) {
+        // Sequences that end with x, y or z.
         let along = tip.map_or(0, |tip| tip.iamax());
         let axes = ["zyx", "zxy", "yxz"][along];
         let at = DescriptionPose {
@@ -458,12 +482,14 @@ impl ModelTextBuilder<'_> {
         let own = self.unique_name(name);
         let mut names = Vec::new();
         let mut moves = Vec::new();
+        // One variable, coordinate and motion for each angle.
         for (k, letter) in axes.chars().enumerate() {
             let variable = self.chain.n_variables;
             self.chain.n_variables += 1;
             let coordinate = self.unique_name(&format!("{}_{letter}", joint.name));
             self.of_variable.push(Some(self.coordinates.len()));
             self.acts.push(VariableForces::default());
+            // Angles of ball joints become passive before all others, the last one last.
             self.reluctance.push(if k == 2 { 3 } else { 4 });
             self.start.push(0.0);
             self.coordinates.push(ImportCoordinate {
@@ -490,6 +516,7 @@ impl ModelTextBuilder<'_> {
              is a right angle",
             joint.line, joint.name
         ));
+        // Effects at the angles would be different from effects at the joint.
         if joint.damping != 0.0
             || joint.friction != 0.0
             || joint.stiffness != 0.0
@@ -507,6 +534,7 @@ impl ModelTextBuilder<'_> {
             offset: 0.0,
             axes: axes.to_owned(),
         });
+        // The frame with its three angles.
         let list: Vec<String> = names.iter().map(|name| format!("\"{name}\"")).collect();
         let text = format!("spherical = [{}], axes = \"{axes}\"", list.join(", "));
         let frame = self.frame(own, on, at, &shown, &text, moves);
@@ -525,10 +553,12 @@ impl ModelTextBuilder<'_> {
         name: &str,
     ) -> (Option<usize>, DescriptionPose) {
         let own = self.unique_name(name);
+        // Nominal values are the pose of the description; nalgebra has the real part of a quaternion last.
         let quaternion = nalgebra::UnitQuaternion::from_matrix(&link.r);
         let [x, y, z, w] = quaternion.coords.into();
         let values = [link.p.x, link.p.y, link.p.z, w, x, y, z];
         let mut names = Vec::new();
+        // Coordinates of a free body have no variable, since loops do not depend on them.
         for (suffix, nominal) in ["x", "y", "z", "qw", "qx", "qy", "qz"].iter().zip(values) {
             let name = self.unique_name(&format!("{}_{suffix}", joint.name));
             self.coordinates.push(ImportCoordinate {
@@ -553,6 +583,7 @@ impl ModelTextBuilder<'_> {
             "free = [{}], quaternion = \"wxyz\", twist = \"mixed\"",
             list.join(", ")
         );
+        // A free body has no joint at which these could act.
         if joint.damping != 0.0 || joint.armature != 0.0 || joint.friction != 0.0 {
             self.remarks.push(message!(
                 "line {}: damping, friction and armature of the free joint `{}` are left out",
@@ -577,6 +608,7 @@ impl ModelTextBuilder<'_> {
             .zip(roll_pitch_yaw(&at.r))
             .map(|(angle, value)| self.angle(&format!("{joint}_{angle}"), value, joint))
             .collect();
+        // Zeros are the default of both.
         for (key, values) in [("xyz", xyz), ("rpy", rpy)] {
             if values.iter().any(|value| value != "0") {
                 parts.push(format!("{key} = [{}]", values.join(", ")));
@@ -595,6 +627,7 @@ impl ModelTextBuilder<'_> {
         joint: &str,
         moves: Vec<ChainMotion>,
     ) -> usize {
+        // The table of the model file.
         let parent = on.map_or("base", |on| self.frame_names[on].as_str());
         let _ = write!(
             self.frames,
@@ -606,6 +639,7 @@ impl ModelTextBuilder<'_> {
         if !joint.is_empty() {
             let _ = writeln!(self.frames, "joint = {{ {joint} }}");
         }
+        // The same frame in the numeric kinematics.
         self.frame_names.push(name);
         self.chain.nodes.push(ChainFrame { on, at, moves });
         self.chain.nodes.len() - 1
@@ -625,6 +659,7 @@ impl ModelTextBuilder<'_> {
                 "the mass of the link `{name}` is negative; correct it in the description"
             ));
         }
+        // Links without mass have no body.
         if mass == 0.0 && matrix.amax() == 0.0 {
             return Ok(());
         }
@@ -640,6 +675,7 @@ impl ModelTextBuilder<'_> {
                 significant_digits(moments[2], 4)
             ));
         }
+        // A link without a frame is fixed to the base.
         let Some(frame) = frame else {
             self.remarks.push(message!(
                 "`{name}` does not move; its {} kg have no effect and are left out",
@@ -651,6 +687,7 @@ impl ModelTextBuilder<'_> {
         let c = placed.p;
         let inertia = placed.r * matrix * placed.r.transpose()
             + mass * (Matrix3::identity() * c.norm_squared() - c * c.transpose());
+        // All links of a frame are one body.
         if self.bodies.iter().all(|body| body.frame != frame) {
             self.bodies.push(ImportBody {
                 frame,
@@ -694,6 +731,7 @@ impl ModelTextBuilder<'_> {
                 ],
             };
             for offset in offsets {
+                // The point in the frames that carry both links.
                 let ends = closure.ends.map(|(link, placed)| {
                     let point = placed.p + placed.r * Vector3::from(*offset);
                     match link {
@@ -711,6 +749,7 @@ impl ModelTextBuilder<'_> {
         if pairs.is_empty() {
             return Ok(None);
         }
+        // Poses within the ranges are preferred.
         let ranges: Vec<Option<[f64; 2]>> = self
             .acts
             .iter()
@@ -722,6 +761,7 @@ impl ModelTextBuilder<'_> {
             let Some(variable) = coordinate.variable else {
                 continue;
             };
+            // The nominal values are those of the closed pose.
             coordinate.nominal = closed.values[variable];
             let Some([low, high]) = ranges[variable] else {
                 continue;
@@ -736,6 +776,7 @@ impl ModelTextBuilder<'_> {
                 ));
             }
         }
+        // Remarks on what the solution has changed.
         if closed.is_moved {
             self.remarks.push(
                 "at the pose of the description the loops are open or singular; another pose is used for the nominal values"
@@ -766,6 +807,7 @@ impl ModelTextBuilder<'_> {
         closure: &DescriptionClosure,
         ends: [Option<usize>; 2],
     ) -> Result<(), String> {
+        // The frame at the root of each end, if it is that of a free body.
         let roots = ends.map(|mut frame| {
             let mut root = None;
             while let Some(k) = frame {
@@ -791,6 +833,7 @@ impl ModelTextBuilder<'_> {
 
     /// A valid and unique name: invalid characters become `_`, and a number is added to a name that is used already.
     fn unique_name(&mut self, wanted: &str) -> String {
+        // Names have at most 40 characters before a number is added.
         let mut name: String = wanted
             .chars()
             .take(40)
@@ -811,6 +854,7 @@ impl ModelTextBuilder<'_> {
 
     /// A length in m as a new constant, in quotes; `0` below rounding.
     fn length(&mut self, name: &str, value: f64) -> String {
+        // Lengths below a picometre are rounding.
         if value.abs() < 1e-12 {
             return "0".to_owned();
         }
@@ -825,6 +869,7 @@ impl ModelTextBuilder<'_> {
 
     /// A constant angle in rad, in quotes: a multiple of pi/12, the sum of one and a known constant, or a new constant.
     fn angle(&mut self, name: &str, value: f64, joint: &str) -> String {
+        // The nearest multiple of 15 degrees, up to two turns.
         let twelfth = std::f64::consts::PI / 12.0;
         let n = (value / twelfth).round();
         let deviation = (value - n * twelfth).abs();
@@ -833,6 +878,7 @@ impl ModelTextBuilder<'_> {
         } else {
             ROUNDING
         };
+        // Angles close to it are reported, whether they are rounded or not.
         if deviation < SAME_ANGLE && deviation > ROUNDING && n.abs() <= 48.0 {
             let short = significant_digits(deviation, 2);
             self.remarks.push(if self.options.round_angles {
@@ -891,6 +937,7 @@ impl ModelTextBuilder<'_> {
         lines: &[NamedDriveLine<'_>],
     ) -> DescriptionImport {
         let robot = &description.name;
+        // The head of the file, with gravity and constants.
         let gravity = description.gravity.unwrap_or(Vector3::new(0.0, 0.0, -9.81));
         let mut text = format!(
             "# Made from {} by modelmill import: a starting point; check and correct it.\nschema = 1\nname = \"{}\"\n\
@@ -907,6 +954,7 @@ impl ModelTextBuilder<'_> {
         } else {
             "acceleration of gravity; the description does not specify it"
         };
+        // Gravity along -z is written with the symbol `g`.
         let along_z = gravity.x == 0.0 && gravity.y == 0.0;
         if gravity.norm() == 0.0 {
             self.remarks.push("the description has no gravity".into());
@@ -928,8 +976,10 @@ impl ModelTextBuilder<'_> {
         }
         text.push_str(&self.constants);
         text.push_str("\n[coordinates]\n");
+        // Passive coordinates are those that the loops determine.
         let is_passive = |coordinate: &ImportCoordinate| matches!((closed, coordinate.variable), (Some(closed), Some(v)) if closed.passive[v]);
         for coordinate in &self.coordinates {
+            // Coordinates of free bodies are never driven, so that this is not written.
             let more = if is_passive(coordinate) {
                 ", passive = true"
             } else if coordinate.is_driven || coordinate.is_free || coordinate.is_pulled {
@@ -946,6 +996,7 @@ impl ModelTextBuilder<'_> {
         }
         text.push_str(&self.followers);
         text.push_str(&self.frames);
+        // Tables in the order of the format: loops, parts, points, then forces.
         self.loops(description, closed, &mut text);
         self.parts(&mut text);
         self.line_points(lines, &mut text);
@@ -966,6 +1017,7 @@ impl ModelTextBuilder<'_> {
     ) {
         let Some(closed) = closed else { return };
         let mut loops = String::new();
+        // Each pair is a loop between two points.
         for pair in &closed.pairs {
             let name = self.unique_name(&format!(
                 "{}_closed",
@@ -974,6 +1026,7 @@ impl ModelTextBuilder<'_> {
             let mut points = Vec::new();
             for ((frame, at), letter) in pair.ends.iter().zip(["a", "b"]) {
                 let point = self.unique_name(&format!("{name}_{letter}"));
+                // The point in the frame that carries it.
                 let on = frame.map_or("base", |frame| self.frame_names[frame].as_str());
                 let at: Vec<String> = at
                     .iter()
@@ -1005,11 +1058,13 @@ impl ModelTextBuilder<'_> {
     fn parts(&self, text: &mut String) {
         for (k, body) in self.bodies.iter().enumerate() {
             let frame = &self.frame_names[body.frame];
+            // Symbols have the name of the frame; long names are replaced by a number.
             let suffix = if frame.len() < 32 {
                 format!("_{frame}")
             } else {
                 format!("_{}", k + 1)
             };
+            // The ten parameters about the origin of the frame.
             let (i, c) = (&body.inertia, &body.moment);
             let values = [
                 ("XX", i[(0, 0)]),
@@ -1023,6 +1078,7 @@ impl ModelTextBuilder<'_> {
                 ("MZ", c.z),
                 ("M", body.mass),
             ];
+            // Zeros are the default and are not written.
             let nominal: Vec<String> = values
                 .iter()
                 .filter(|(_, v)| *v != 0.0)
@@ -1043,14 +1099,17 @@ impl ModelTextBuilder<'_> {
         lines: &[NamedDriveLine<'_>],
         text: &mut String,
     ) {
+        // Names and remarks are added during the loop, so that the coordinates are taken out first.
         let coordinates = std::mem::take(&mut self.coordinates);
         let (mut drives, mut effects) = (String::new(), String::new());
         let (mut ranges, mut forces) = (String::new(), String::new());
         for coordinate in &coordinates {
+            // Coordinates of free bodies have neither drives nor effects.
             let Some(variable) = coordinate.variable else {
                 continue;
             };
             let acts = self.acts[variable].clone();
+            // A passive coordinate cannot have a drive.
             let has_drive = coordinate.is_driven && !is_passive(coordinate);
             let mut place = coordinate.name.clone();
             if has_drive {
@@ -1086,6 +1145,7 @@ impl ModelTextBuilder<'_> {
                     "\n[[effect]]\nkind = \"{kind}\"\nat = [\"{effects_at}\"]\nparameters = {{ {symbol} = {{ nominal = {} }} }}\n",
                     toml_float(value)
                 );
+                // The relaxed position of several springs is the mean, weighted with their stiffnesses.
                 if kind == "spring" {
                     let _ = writeln!(
                         effects,
@@ -1094,6 +1154,7 @@ impl ModelTextBuilder<'_> {
                     );
                 }
             }
+            // Limits of the coordinate; the rate of a passive one follows from the others.
             let mut limits = Vec::new();
             if let Some([low, high]) = acts.range.filter(|[low, high]| low < high) {
                 limits.push(format!(
@@ -1108,6 +1169,7 @@ impl ModelTextBuilder<'_> {
             if !limits.is_empty() {
                 let _ = writeln!(ranges, "{} = {{ {} }}", coordinate.name, limits.join(", "));
             }
+            // Limits of the drive.
             if let Some([low, high]) = acts.force.filter(|[low, high]| has_drive && low < high) {
                 let _ = writeln!(
                     forces,
@@ -1117,9 +1179,11 @@ impl ModelTextBuilder<'_> {
                 );
             }
         }
+        // Straight drives come after those of the joints.
         self.line_forces(lines, [&mut drives, &mut effects, &mut forces]);
         text.push_str(&drives);
         text.push_str(&effects);
+        // Tables of limits without entries are left out.
         for (table, entries) in [("coordinates", ranges), ("drives", forces)] {
             if !entries.is_empty() {
                 let _ = write!(text, "\n[limits.{table}]\n{entries}");
@@ -1135,6 +1199,7 @@ fn closure_point(description: &RobotDescription, index: usize) -> Option<Vector3
     let mut ends = closures.flat_map(|closure| &closure.ends);
     ends.find_map(|(end, placed)| {
         let (mut link, mut at) = ((*end)?, *placed);
+        // Go up from the closure, through links that are fixed to their parents.
         while link != index {
             let DescriptionLink {
                 parent,

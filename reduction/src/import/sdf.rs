@@ -56,6 +56,7 @@ pub(crate) fn read(document: &Document) -> Result<RobotDescription, String> {
         .attribute("version")
         .and_then(|text| text.trim().parse().ok())
         .unwrap_or(1.7);
+    // The model is in the file directly, or in a world.
     let world = child(&root, "world");
     let mut models =
         children(&root, "model").chain(world.iter().flat_map(|world| children(world, "model")));
@@ -73,6 +74,7 @@ pub(crate) fn read(document: &Document) -> Result<RobotDescription, String> {
         format: "SDF",
         ..RobotDescription::default()
     };
+    // Only a world specifies gravity.
     if let Some(node) = world.and_then(|world| child(&world, "gravity")) {
         out.gravity = Some(vector(exact_numbers(
             &node,
@@ -80,6 +82,7 @@ pub(crate) fn read(document: &Document) -> Result<RobotDescription, String> {
             node.text().unwrap_or(""),
         )?));
     }
+    // Models inside a model would need names with their scope.
     if let Some(inner) = model
         .children()
         .find(|node| ["model", "include"].contains(&node.tag_name().name()))
@@ -95,6 +98,7 @@ pub(crate) fn read(document: &Document) -> Result<RobotDescription, String> {
             "the model is static, so nothing moves",
         ));
     }
+    // Poses of all links in the model, through the frames to which they refer.
     let frames = model_frames(&model)?;
     let links: Vec<Node> = children(&model, "link").collect();
     let mut places = Vec::new();
@@ -110,10 +114,12 @@ pub(crate) fn read(document: &Document) -> Result<RobotDescription, String> {
     for node in children(&model, "joint") {
         joints.push(joint(&node, &links, &frames, version, &mut out)?);
     }
+    // Pose of the model in the world.
     let own = match child(&model, "pose") {
         Some(pose) => pose_of(&pose)?,
         None => DescriptionPose::identity(),
     };
+    // The canonical link, by default the first one.
     let base = model
         .attribute("canonical_link")
         .and_then(|name| {
@@ -143,6 +149,7 @@ fn number_of(node: &Node, tag: &str) -> Result<Option<f64>, String> {
 fn model_frames<'a, 'i>(model: &Node<'a, 'i>) -> Result<Vec<SdfFrame<'a, 'i>>, String> {
     let mut out: Vec<SdfFrame> = Vec::new();
     for node in model.children().filter(Node::is_element) {
+        // Frame for poses without `relative_to`: the child link for joints, else the model or the attached frame.
         let usually = match node.tag_name().name() {
             "link" => "__model__".to_owned(),
             "joint" => text_of(&node, "child").unwrap_or("__model__").to_owned(),
@@ -153,6 +160,7 @@ fn model_frames<'a, 'i>(model: &Node<'a, 'i>) -> Result<Vec<SdfFrame<'a, 'i>>, S
             _ => continue,
         };
         let name = required_attribute(&node, "name")?;
+        // Old files use the same name for a link and a joint, so only elements of the same kind are compared.
         if out
             .iter()
             .any(|frame| frame.name == name && frame.node.tag_name() == node.tag_name())
@@ -175,6 +183,7 @@ fn pose_in_model(
     from: &Node,
     depth: usize,
 ) -> Result<DescriptionPose, String> {
+    // The recursion ends at the frame of the model.
     if name == "__model__" || name.is_empty() || name == "world" {
         return Ok(DescriptionPose::identity());
     }
@@ -188,6 +197,7 @@ fn pose_in_model(
         .iter()
         .find(|frame| frame.name == name)
         .ok_or_else(|| located_message(from, &format!("there is no frame `{name}`")))?;
+    // `frame` is the older name of the attribute `relative_to`.
     let pose = child(&frame.node, "pose");
     let relative = pose
         .and_then(|pose| pose.attribute("relative_to").or(pose.attribute("frame")))
@@ -211,6 +221,7 @@ fn pose_of(node: &Node) -> Result<DescriptionPose, String> {
                 .ok_or_else(|| located_message(node, "the quaternion is zero"))?,
         });
     }
+    // Otherwise roll, pitch and yaw, in rad unless stated.
     let [px, py, pz, angles @ ..] = exact_numbers::<6>(node, "pose", text)?;
     let is_degree = node.attribute("degrees") == Some("true");
     Ok(DescriptionPose {
@@ -238,6 +249,7 @@ fn inertial(node: &Node) -> Result<DescriptionInertia, String> {
             "mass and inertia from shapes are not computed here; write them into the file",
         ));
     }
+    // Missing entries keep the defaults of the format.
     out.mass = number_of(&given, "mass")?.unwrap_or(1.0);
     if let Some(pose) = child(&given, "pose") {
         if pose
@@ -302,6 +314,7 @@ fn joint(
             "its frame is attached to itself through other frames",
         ))
     };
+    // Each degree of freedom becomes a joint, with the element that describes its axis.
     let kind = required_attribute(node, "type")?;
     let wanted: &[(&str, DescriptionJointKind)] = match kind.as_str() {
         "fixed" => &[],
@@ -326,10 +339,12 @@ fn joint(
             ));
         }
     };
+    // Pose of the joint at zero, and the links at both ends.
     let place = pose_in_model(frames, &name_in(frames, node, &name)?, node, 0)?;
     let (parent, child_link) = (end("parent")?, end("child")?);
     let mut joints = Vec::new();
     for (k, (tag, kind)) in wanted.iter().enumerate() {
+        // The second joint of a pair needs another name.
         let suffix = if k == 0 { "" } else { "_2" };
         let mut joint = DescriptionJoint::new(format!("{name}{suffix}"), *kind, line(node));
         if let Some(axis) = child(node, tag) {
@@ -339,11 +354,13 @@ fn joint(
         }
         joints.push(joint);
     }
+    // A screw has one degree of freedom: both joints are coupled.
     if let [turn, slide] = joints.as_mut_slice()
         && kind == "screw"
     {
         out.couplings.push(screw_coupling(node, turn, slide)?);
     }
+    // Sensors and settings of the solver have no effect on the model.
     if let Some(physics) = child(node, "sensor").or(child(node, "physics")) {
         out.remarks
             .push(located_message(&physics, "this element is not read"));
@@ -371,6 +388,7 @@ fn screw_coupling(
             "it needs <screw_thread_pitch>, in metres per revolution; the older <thread_pitch> is ambiguous",
         )
     })?;
+    // The translation keeps only axis and anchor; limits and losses are not counted twice.
     let mut bare = DescriptionJoint::new(
         slide.name.clone(),
         DescriptionJointKind::Prismatic,
@@ -410,6 +428,7 @@ fn read_axis(
 ) -> Result<(), String> {
     let (xyz, turned) = match child(node, "xyz") {
         Some(xyz) => {
+            // The axis is given in the axes of the joint, or of a named frame.
             let given = xyz
                 .attribute("expressed_in")
                 .filter(|name| !name.is_empty());
@@ -424,6 +443,7 @@ fn read_axis(
         }
         None => (Vector3::z(), place.r),
     };
+    // Old versions give axes in the frame of the model.
     let in_model_frame = match text_of(node, "use_parent_model_frame") {
         Some(text) => ["1", "true"].contains(&text),
         None => version < 1.45,
@@ -433,16 +453,19 @@ fn read_axis(
         return Err(located_message(node, "the axis has no direction"));
     }
     if let Some(limit) = child(node, "limit") {
+        // Limits; very large numbers mean that there is none.
         let low = number_of(&limit, "lower")?.filter(|x| *x > -NO_LIMIT);
         let high = number_of(&limit, "upper")?.filter(|x| *x < NO_LIMIT);
         if let (Some(low), Some(high)) = (low, high) {
             joint.range = (low < high).then_some([low, high]);
         }
         joint.rate = number_of(&limit, "velocity")?.filter(|x| *x > 0.0 && *x < NO_LIMIT);
+        // An effort of zero marks a joint without a drive.
         let force = number_of(&limit, "effort")?.filter(|x| *x >= 0.0 && *x < NO_LIMIT);
         joint.is_driven = force != Some(0.0);
         joint.force = force.filter(|x| *x > 0.0).map(|x| [-x, x]);
     }
+    // Losses and springs.
     if let Some(dynamics) = child(node, "dynamics") {
         joint.damping = number_of(&dynamics, "damping")?.unwrap_or(0.0);
         joint.friction = number_of(&dynamics, "friction")?.unwrap_or(0.0);
@@ -457,6 +480,7 @@ fn read_axis(
         joint.armature = rotor * gear * gear;
     }
     if let Some(mimic) = child(node, "mimic") {
+        // A coupling to another joint; the joint of a second axis has the suffix `_2`.
         let mut of = required_attribute(&mimic, "joint")?;
         if mimic.attribute("axis") == Some("axis2") {
             of.push_str("_2");
@@ -497,6 +521,7 @@ fn tree(
     let mut in_tree = vec![false; joints.len()];
     for k in order {
         let [one, other] = [part(joints[k].parent), part(joints[k].child)].map(|p| group[p]);
+        // A joint between two groups connects them; a joint inside of a group would close a loop.
         if one != other {
             in_tree[k] = true;
             for member in &mut group {
@@ -520,6 +545,7 @@ fn tree(
             } else {
                 format!("_{}", nodes[link].attribute("name").unwrap_or_default())
             };
+            // A link that no joint connects to the world is a free body.
             index[link] = Some(out.links.len());
             out.links.push(DescriptionLink {
                 name: required_attribute(&nodes[link], "name")?,
@@ -533,9 +559,11 @@ fn tree(
                 inertial: inertial(&nodes[link])?,
             });
         }
+        // Follow the joints of the tree from this link.
         let mut waiting = vec![start];
         while let Some(here) = waiting.pop() {
             for (between, _) in joints.iter().zip(&in_tree).filter(|(_, is)| **is) {
+                // The tree can pass a joint in either direction.
                 let is_forward = between.parent == here;
                 let there = if is_forward {
                     between.child
@@ -553,6 +581,7 @@ fn tree(
                 let to_link = places[link].inverse();
                 let mut moving = between.joints.clone();
                 for joint in &mut moving {
+                    // The anchor and the axis in the axes of the link that the joint moves.
                     joint.anchor = to_link.compose(&between.place).p;
                     joint.axis = to_link.r * joint.axis;
                     if !is_forward {
@@ -591,6 +620,7 @@ fn tree(
         .filter(|(_, is)| !**is)
         .map(|(b, _)| b)
     {
+        // The conditions of the closure.
         let holds = match between.kind.as_str() {
             "ball" => ClosureConstraint::Origins,
             "revolute" | "continuous" => ClosureConstraint::Axes,
@@ -602,6 +632,7 @@ fn tree(
                 ));
             }
         };
+        // A hinge has its axis along x of the closure's frame.
         let mut place = between.place;
         if let (ClosureConstraint::Axes, Some(joint)) = (holds, between.joints.first()) {
             let turned = nalgebra::Rotation3::rotation_between(&Vector3::x(), &joint.axis);
@@ -611,10 +642,12 @@ fn tree(
                 nalgebra::Rotation3::into_inner,
             );
         }
+        // The same pose as seen from the links at both ends.
         let end = |link: Option<usize>| match link {
             Some(link) => (index[link], places[link].inverse().compose(&place)),
             None => (None, own.compose(&place)),
         };
+        // A cut joint has no coordinate, so nothing can act on it.
         for joint in &between.joints {
             if joint.damping != 0.0 || joint.friction != 0.0 || joint.stiffness != 0.0 {
                 out.remarks.push(format!(

@@ -46,17 +46,20 @@ pub(crate) fn read(
         format: "URDF",
         ..RobotDescription::default()
     };
+    // Read all elements first; the tree is built from their names.
     let links: Vec<Node> = children(&robot, "link").collect();
     let mut joints = Vec::new();
     for node in children(&robot, "joint") {
         joints.push(joint(&node, &mut out)?);
     }
+    // A file of closures can change the kinds of joints.
     let closures = closures.map(closures_file::read).transpose()?;
     if let Some(file) = &closures {
         out.remarks.extend(file.remarks.iter().cloned());
         replace_joints(&mut joints, &file.joints)?;
     }
     resolve_fixed_couplings(&mut out, &joints);
+    // Transmissions have no effect on a model, but other tools scale forces by their reduction.
     for node in children(&robot, "transmission") {
         for reduction in node.descendants().filter(|node| {
             node.tag_name().name() == "mechanicalReduction"
@@ -81,6 +84,7 @@ pub(crate) fn read(
             "<loop_joint> is not part of the URDF standard; write the closure into a robot.yaml next to the file",
         ));
     }
+    // A tree needs unique names, one root, and one parent for each other link.
     check_names(&links, &joints)?;
     let root = root_link(&links, &joints)?;
     // Breadth first from the root, so that parents stand before their children.
@@ -96,6 +100,7 @@ pub(crate) fn read(
             joints: Vec::new(),
             inertial: inertial(&node)?,
         };
+        // A link gets pose and joints of the joint through which it is reached.
         if let Some(j) = between {
             let joint = &joints[j];
             link.parent = out.links.iter().position(|link| link.name == joint.parent);
@@ -112,6 +117,7 @@ pub(crate) fn read(
                     joint.line, joint.name
                 ));
             }
+        // The root of a floating robot gets a free joint.
         } else if is_floating {
             link.joints.push(DescriptionJoint::new(
                 "root_joint".to_owned(),
@@ -120,6 +126,7 @@ pub(crate) fn read(
             ));
         }
         out.links.push(link);
+        // Children of this link follow in the order of their joints.
         for (j, joint) in joints.iter().enumerate() {
             if joint.parent != name {
                 continue;
@@ -142,6 +149,7 @@ pub(crate) fn read(
         }
         k += 1;
     }
+    // Links that were not reached.
     if let Some(node) = links.iter().find(|node| {
         out.links
             .iter()
@@ -170,6 +178,7 @@ fn replace_joints(
                 "the file of closures gives a type for the joint `{name}`, which does not exist"
             ));
         };
+        // The new joints keep the losses of the old one.
         let old = std::mem::take(joints);
         let new = |name: String, kind: DescriptionJointKind| {
             let mut joint = DescriptionJoint::new(name, kind, *line);
@@ -182,6 +191,7 @@ fn replace_joints(
             JointReplacement::Fixed => {}
             JointReplacement::Ball => joints.push(new(name.clone(), DescriptionJointKind::Ball)),
             JointReplacement::Cross(axes) => {
+                // A universal joint is a sequence of hinges about the axes of the frame.
                 for letter in axes {
                     let own = format!("{name}_{}", letter.to_ascii_uppercase());
                     let mut joint = new(own, DescriptionJointKind::Revolute);
@@ -203,12 +213,14 @@ fn resolve_fixed_couplings(out: &mut RobotDescription, joints: &[UrdfJoint]) {
     };
     let remarks = &mut out.remarks;
     out.couplings.retain_mut(|coupling| {
+        // The leader does not move, so the follower does not move either.
         if let Some(of) = coupling.leader.take_if(|of| is_fixed(of)) {
             remarks.push(format!(
                 "line {}: `{}` follows `{of}`, which is fixed; it is fixed at {}",
                 coupling.line, coupling.joint, coupling.offset
             ));
         }
+        // A fixed joint needs no coupling.
         let moves = !is_fixed(&coupling.joint);
         if !moves {
             remarks.push(format!(
@@ -258,6 +270,7 @@ fn check_names(links: &[Node], joints: &[UrdfJoint]) -> Result<(), String> {
 
 /// The link that is no joint's child. Fails if there is none or more than one.
 fn root_link<'a, 'i>(links: &[Node<'a, 'i>], joints: &[UrdfJoint]) -> Result<Node<'a, 'i>, String> {
+    // A link is a child if a joint names it as such.
     let is_child = |node: &&Node| {
         joints
             .iter()
@@ -282,8 +295,10 @@ fn inertial(node: &Node) -> Result<DescriptionInertia, String> {
     let Some(inertial) = child(node, "inertial") else {
         return Ok(DescriptionInertia::default());
     };
+    // Mass and inertia are required in an `<inertial>`.
     let mass = number_attribute(&required_child(&inertial, "mass")?, "value")?;
     let inertia = required_child(&inertial, "inertia")?;
+    // The six independent entries of the symmetric matrix.
     let mut entries = [0.0; 6];
     for (entry, key) in entries
         .iter_mut()
@@ -326,6 +341,7 @@ fn joint(node: &Node, out: &mut RobotDescription) -> Result<UrdfJoint, String> {
     let mut moving = None;
     if let Some(kind) = kind {
         let mut joint = DescriptionJoint::new(name.clone(), kind, line(node));
+        // The default axis is x.
         joint.axis = match child(node, "axis") {
             Some(axis) => vector(three_numbers(&axis, "xyz")?),
             None => vector([1.0, 0.0, 0.0]),
@@ -345,6 +361,7 @@ fn joint(node: &Node, out: &mut RobotDescription) -> Result<UrdfJoint, String> {
             let range = [lower.unwrap_or(0.0), upper.unwrap_or(0.0)];
             joint.range = (range[0] < range[1]).then_some(range);
         }
+        // Zero counts as "no limit".
         joint.rate = given(limit, "velocity")?.filter(|rate| *rate > 0.0);
         joint.force = given(limit, "effort")?
             .filter(|force| *force > 0.0)
@@ -353,6 +370,7 @@ fn joint(node: &Node, out: &mut RobotDescription) -> Result<UrdfJoint, String> {
         joint.friction = given(dynamics, "friction")?.unwrap_or(0.0);
         moving = Some(joint);
     }
+    // The joint follows another one.
     if let Some(mimic) = child(node, "mimic") {
         out.couplings.push(DescriptionCoupling {
             line: line(&mimic),
@@ -377,6 +395,7 @@ fn origin(of: &Node) -> Result<DescriptionPose, String> {
     let Some(node) = child(of, "origin") else {
         return Ok(DescriptionPose::identity());
     };
+    // Both attributes are optional.
     let or_zeros = |key: &str| {
         if node.has_attribute(key) {
             three_numbers(&node, key)
@@ -406,6 +425,7 @@ fn add_closures(
         })
     };
     for closure in file.pairs {
+        // The frames of both links coincide, or their origins only.
         let [one, other] = &closure.ends;
         let ends = [place(one)?, place(other)?].map(|link| (link, DescriptionPose::identity()));
         out.closures.push(DescriptionClosure {
@@ -419,6 +439,7 @@ fn add_closures(
             },
         });
     }
+    // Drives must be joints that move.
     for name in &file.drives {
         if joints
             .iter()
@@ -429,6 +450,7 @@ fn add_closures(
             ));
         }
     }
+    // A list of drives is complete: other joints are passive.
     if !file.drives.is_empty() {
         for joint in out.links.iter_mut().flat_map(|link| &mut link.joints) {
             joint.is_driven &= file.drives.contains(&joint.name);

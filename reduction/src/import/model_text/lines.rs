@@ -23,9 +23,11 @@ pub(super) struct NamedDriveLine<'a> {
 
 /// Variables that move two frames relative to each other: those on the paths to their common ancestor.
 pub(super) fn relative_variables(chain: &FrameChain, frames: [Option<usize>; 2]) -> Vec<usize> {
+    // From each frame up to the base.
     let paths = frames.map(|frame| -> Vec<usize> {
         std::iter::successors(frame, |k| chain.nodes[*k].on).collect()
     });
+    // Frames above the common ancestor move both ends alike.
     let own = |a: &[usize], b: &[usize]| -> Vec<usize> {
         a.iter().copied().filter(|k| !b.contains(k)).collect()
     };
@@ -52,6 +54,7 @@ fn match_lines(wanted: &[Vec<usize>]) -> Vec<Option<usize>> {
                 continue;
             }
             tried.push(*k);
+            // A free coordinate is taken; otherwise its line has to find another one.
             let holder = of.iter().position(|one| *one == Some(*k));
             if holder.is_none_or(|holder| finds(holder, wanted, tried, of)) {
                 of[line] = Some(*k);
@@ -82,6 +85,7 @@ impl ModelTextBuilder<'_> {
         lines: &'l [StraightDrive],
         closed: Option<&LoopSolution>,
     ) -> Vec<NamedDriveLine<'l>> {
+        // Coordinates that are independent and have no drive.
         let is_open = |one: &ImportCoordinate| {
             let is_passive = |v: usize| closed.is_some_and(|closed| closed.passive[v]);
             !one.is_driven && !one.is_pulled && one.variable.is_some_and(|v| !is_passive(v))
@@ -99,6 +103,7 @@ impl ModelTextBuilder<'_> {
             }
             on_line.into_iter().map(|(k, _)| k).collect()
         };
+        // The largest number of lines that can be drives at the same time.
         let wanted: Vec<Vec<usize>> = lines.iter().map(drives).collect();
         let driven = match_lines(&wanted);
         let (mut kept, mut over): (Vec<&StraightDrive>, Vec<&StraightDrive>) =
@@ -112,6 +117,7 @@ impl ModelTextBuilder<'_> {
                 None => over.push(line),
             }
         }
+        // In a tree with all coordinates driven, further drives are surplus drives.
         let all_driven =
             closed.is_none() && (self.coordinates.iter()).all(|one| one.is_driven || one.is_pulled);
         for line in over {
@@ -126,6 +132,7 @@ impl ModelTextBuilder<'_> {
                 ));
             }
         }
+        // Names of the drives and their points.
         kept.into_iter()
             .map(|line| {
                 let name = self.unique_name(&line.name);
@@ -139,6 +146,7 @@ impl ModelTextBuilder<'_> {
     pub(super) fn line_points(&self, lines: &[NamedDriveLine<'_>], text: &mut String) {
         for NamedDriveLine { line, points, .. } in lines {
             for ((link, at), point) in line.ends.iter().zip(points) {
+                // The end of the line in the frame that carries its link.
                 let (frame, place) = match link {
                     Some(link) => {
                         let (frame, placed) = self.links[*link];
@@ -183,6 +191,7 @@ impl ModelTextBuilder<'_> {
                 drives,
                 "\n[[drive]]\nname = \"{place}\"\nlinear = {{ from = \"{from}\", to = \"{to}\" }}\n"
             );
+            // Losses and rotor inertia act along the line.
             for (kind, symbol, value) in [
                 ("viscous_friction", "Fv", line.damping),
                 ("coulomb_friction", "Fc", line.friction),
@@ -200,6 +209,7 @@ impl ModelTextBuilder<'_> {
                     );
                 }
             }
+            // Limits of the force along the line.
             if let Some([low, high]) = line.force.filter(|[low, high]| low < high) {
                 let _ = writeln!(
                     forces,
