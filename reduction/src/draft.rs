@@ -51,6 +51,7 @@ impl DraftSymbols {
         what: &str,
         value: f64,
     ) {
+        // Parts that share a symbol add their values to it.
         let known = self.0.iter().position(|symbol| symbol.name == name);
         let at = known.unwrap_or_else(|| {
             self.0.push(DraftSymbol {

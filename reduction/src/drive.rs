@@ -34,6 +34,7 @@ impl ContactPlace {
     /// The nearest point on the longitudinal axis of its part at the same distance from the joint; points of the base
     /// stay.
     pub(crate) fn projected_on_axis(self) -> Self {
+        // The distance from the joint is kept, on the side of the joint on which the point is.
         let at = Vector2::new(self.at.norm().copysign(self.at.x), 0.0);
         if self.part.is_some() {
             Self { at, ..self }
@@ -61,6 +62,7 @@ pub(crate) fn check_linear(
             contacts.map(|contact| contact.plane_position(parts, moment, plane, samples));
         (truth, to - from)
     };
+    // Errors of length and direction along the samples.
     let length = samples.largest(|moment| {
         let (truth, model) = vectors(moment);
         truth.norm() - model.norm()
@@ -69,6 +71,7 @@ pub(crate) fn check_linear(
         let (truth, model) = vectors(moment);
         truth.perp(&model).atan2(truth.dot(&model))
     });
+    // The drive has a component along the normal if its points are not in one plane.
     let out = samples.largest(|moment| {
         plane
             .normal

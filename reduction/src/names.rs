@@ -25,6 +25,7 @@ impl<'a> PlanNames<'a> {
         let bodies: Vec<&str> = rig.bodies.iter().map(|body| body.name.as_str()).collect();
         let mut groups: Vec<(String, Vec<usize>)> = Vec::new();
         let mut taken = vec![false; bodies.len()];
+        // Groups of the plan; a body belongs to one group at most.
         for group in &plan.group {
             let mut members = Vec::new();
             for name in &group.bodies {
@@ -37,10 +38,12 @@ impl<'a> PlanNames<'a> {
                     }
                 }
             }
+            // A group without a valid body was reported already.
             if !members.is_empty() {
                 groups.push((group.name.get_ref().clone(), members));
             }
         }
+        // Bodies without a group are groups with their own names.
         for (at, body) in bodies.iter().enumerate().filter(|(at, _)| !taken[*at]) {
             groups.push(((*body).to_owned(), vec![at]));
         }
@@ -54,6 +57,7 @@ impl<'a> PlanNames<'a> {
         used: &mut Vec<String>,
         log: &mut RigLog,
     ) -> Vec<usize> {
+        // Each group may be used once, since its mass would be counted twice otherwise.
         let known: Vec<&str> = self.groups.iter().map(|(name, _)| name.as_str()).collect();
         let mut bodies = Vec::new();
         for name in names {
@@ -77,6 +81,7 @@ impl<'a> PlanNames<'a> {
 
     /// A point by its name in `[points]` of the plan or, if it is not there, in the rig.
     pub(crate) fn point(&self, name: &PlanName, log: &mut RigLog) -> Option<BodyAnchor> {
+        // A name of the plan may stand for a point with another name in the rig.
         let renamed = self
             .plan
             .points
@@ -102,6 +107,7 @@ impl<'a> PlanNames<'a> {
 
     /// The name in the model of a point of the rig; none if the point has no name.
     pub(crate) fn point_name(&self, anchor: &BodyAnchor) -> Option<String> {
+        // Whether a point of the rig has this name and this anchor.
         let here = |name: &str| {
             self.rig
                 .points
@@ -131,6 +137,7 @@ impl<'a> PlanNames<'a> {
         name: &PlanName,
         log: &mut RigLog,
     ) -> Result<Option<usize>, UnknownName> {
+        // Points of the base need no part.
         let Some(body) = anchor.body else {
             return Ok(None);
         };

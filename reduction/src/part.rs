@@ -32,6 +32,7 @@ impl SubstitutionPart {
     /// Direction of its longitudinal axis in the nominal configuration, rad.
     pub(crate) fn nominal_angle(&self, plane: &MotionPlane, samples: &MotionSamples) -> f64 {
         let nominal = &samples.nominal;
+        // From the joint to the end of the axis, in the plane.
         let axis = plane.plane_position(&nominal.place(&self.to))
             - plane.plane_position(&nominal.place(&self.joint[1]));
         axis.y.atan2(axis.x)
@@ -55,6 +56,7 @@ impl SubstitutionPart {
         samples: &MotionSamples,
     ) -> Vector2<f64> {
         let nominal = &samples.nominal;
+        // Relative to the joint, turned into the axes of the part.
         let d = plane.plane_position(&nominal.place(anchor))
             - plane.plane_position(&nominal.place(&self.joint[1]));
         rotation(-self.nominal_angle(plane, samples)) * d
@@ -87,6 +89,7 @@ fn body_rotation(
     plane: &MotionPlane,
     samples: &MotionSamples,
 ) -> f64 {
+    // The direction of the body that was along x of the plane in the nominal configuration.
     let then = samples.nominal.motion.bodies[body].R_WB.transpose() * plane.x;
     let now = plane.components(&(moment.motion.bodies[body].R_WB * then));
     now.y.atan2(now.x)
@@ -106,11 +109,13 @@ pub(crate) fn substitute(
     samples: &MotionSamples,
     report: &mut ReductionReport,
 ) -> PlanarBody {
+    // Each body in the frame of the part, as it moves along the samples.
     let lead = part.bodies[0];
     let angle = part.nominal_angle(plane, samples);
     let mut flats = Vec::new();
     for &body in &part.bodies {
         let seen = planar_body(rig, body, plane, samples);
+        // A body of the part must not rotate relative to the leading one.
         let twist = samples.largest(|moment| {
             wrap_angle(
                 body_rotation(body, moment, plane, samples)
@@ -122,7 +127,9 @@ pub(crate) fn substitute(
             body: Some(body),
             at: solid.centre,
         };
+        // Its centre of mass must move like a point of the part, up to a shift.
         let (arm, shift, strays) = fit_carried_point(part, &at, plane, samples);
+        // The leading body defines the motion, so that it has no errors.
         if body != lead {
             report.add(
                 2,
@@ -162,6 +169,7 @@ fn fit_carried_point(
     let mut right = DVector::zeros(2 * n);
     let moments = || samples.moments.iter().chain([&samples.nominal]);
     for (i, moment) in moments().enumerate() {
+        // Position relative to the joint: rotation times arm, plus shift.
         let (s, c) = part.rotation_angle(moment, plane, samples).sin_cos();
         let d = plane.plane_position(&moment.place(at))
             - plane.plane_position(&moment.place(&part.joint[1]));
@@ -179,6 +187,7 @@ fn fit_carried_point(
     } else {
         matrix.clone().svd(true, true).solve(&right, 1e-9).ok()
     };
+    // Otherwise the arm is the position in the nominal configuration, without a shift.
     let x = solved
         .unwrap_or_else(|| DVector::from_vec(vec![right[2 * n - 2], right[2 * n - 1], 0.0, 0.0]));
     let strays = (matrix * &x - right).amax();
@@ -194,6 +203,7 @@ pub(crate) fn merge_bodies(flats: &[PlanarBody]) -> PlanarBody {
     } else {
         Vector2::zeros()
     };
+    // Inertias about the common centre add up.
     let inertia = flats
         .iter()
         .map(|flat| flat.inertia + flat.mass * (flat.centre - centre).norm_squared())
@@ -231,6 +241,7 @@ pub(crate) fn lump_mass(
         .iter()
         .map(|body| planar_body(rig, *body, plane, samples))
         .collect();
+    // The exact values of the groups, and those of the point masses.
     let whole = merge_bodies(&flats);
     let masses: Vec<PlanarBody> = points
         .iter()
@@ -246,6 +257,7 @@ pub(crate) fn lump_mass(
             most.max(moment.motion.bodies[*b].w_WB_W.dot(&plane.normal).abs())
         })
     });
+    // The largest difference of acceleration between a body's centre and any of the points.
     let strays = samples.largest(|moment| {
         let mut most: f64 = 0.0;
         for body in bodies {
@@ -271,6 +283,7 @@ pub(crate) fn lump_mass(
         strays,
         "m/s^2",
     ));
+    // Entries 3 and 4 are the rate of rotation and the difference of acceleration.
     let says = if sizes[3].is_significant() || sizes[4].is_significant() {
         "becomes a point mass; it rotates or moves differently from the point, so the residuals have an effect on the forces"
     } else {

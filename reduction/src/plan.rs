@@ -228,6 +228,7 @@ pub fn plan(path: &str, text: &str) -> Result<ReductionPlan, LoadFailure> {
         diagnostics,
         sources: sources.clone(),
     };
+    // Faults of the syntax end the reading; those of the values are collected.
     let entry: PlanEntry = parse(text, 0).map_err(|found| fail(vec![*found]))?;
     let mut log = RigLog::default();
     let one =
@@ -252,6 +253,7 @@ pub fn plan(path: &str, text: &str) -> Result<ReductionPlan, LoadFailure> {
         "this is not a valid name of a model",
         "expected letters, digits and `_`",
     );
+    // Normal and x must not be parallel.
     let directions = [entry.plane.normal, entry.plane.x].map(nalgebra::Vector3::from);
     let across = directions[0].cross(&directions[1]).norm();
     let samples = &entry.samples;
@@ -263,6 +265,7 @@ pub fn plan(path: &str, text: &str) -> Result<ReductionPlan, LoadFailure> {
         "normal and x of the plane do not define a frame",
         "expected two directions in `[plane]` that are not parallel",
     );
+    // Limits of the number of samples and of their range.
     let is_sound =
         (4..=100_000).contains(&samples.number) && samples.range > 0.0 && samples.range <= 10.0;
     one(

@@ -17,10 +17,12 @@ use crate::plan::{ReductionPlan, plan};
 ///
 /// Fails if a body cannot be reached by revolute joints; such rigs need a plan written by hand.
 pub fn default_plan(rig: &Rig) -> Result<ReductionPlan, Message> {
+    // Points are added to a copy of the rig.
     let mut rig = rig.clone();
     let hinges: Vec<(usize, [BodyAnchor; 2])> = (0..rig.joints.len())
         .filter_map(|j| rig.hinge(j).map(|anchors| (j, anchors)))
         .collect();
+    // All joints must be revolute.
     if let Some(other) = (0..rig.joints.len()).find(|j| rig.hinge(*j).is_none()) {
         return Err(message!(
             "`{}` is not a revolute joint, so this rig needs a plan ({}), in which parts and lumped masses replace the \
@@ -29,6 +31,7 @@ pub fn default_plan(rig: &Rig) -> Result<ReductionPlan, Message> {
             Remedy::option(OptionName::Plan)
         ));
     }
+    // Tables of the parts, and those of the loops, which stand last.
     let mut text = format!("schema = 1\nname = \"{}_reduced\"\n", rig.name);
     let mut loops = String::new();
     let mut carried = vec![false; rig.bodies.len()];
@@ -51,6 +54,7 @@ pub fn default_plan(rig: &Rig) -> Result<ReductionPlan, Message> {
             );
             continue;
         }
+        // The end that is carried already is on the carrier, the other one on the new part.
         let (at, from) = if is_carried(&carried, a.body) {
             (a, b)
         } else {
@@ -58,6 +62,7 @@ pub fn default_plan(rig: &Rig) -> Result<ReductionPlan, Message> {
         };
         let Some(body) = from.body else { continue };
         carried[body] = true;
+        // The part with its joint, the end of its axis and its coordinate.
         let end = far_end(&rig, &hinges, body, &from.at);
         let points = [at, from, BodyAnchor { at: end, ..from }]
             .map(|anchor| add_point(&mut rig, &name, anchor));
@@ -75,6 +80,7 @@ pub fn default_plan(rig: &Rig) -> Result<ReductionPlan, Message> {
             points[0], points[1], points[2]
         );
     }
+    // Bodies that no joint reaches.
     if let Some(body) = carried.iter().position(|reached| !reached) {
         return Err(message!(
             "`{}` is not connected to the base by revolute joints",
@@ -82,6 +88,7 @@ pub fn default_plan(rig: &Rig) -> Result<ReductionPlan, Message> {
         ));
     }
     text.push_str(&loops);
+    // Read the text like the file of a plan.
     let mut plan =
         plan("the plan generated for this rig", &text).map_err(|failure| failure.render(false))?;
     plan.rig = Some(Box::new(rig));
@@ -95,6 +102,7 @@ fn far_end(
     body: usize,
     from: &Vector3<f64>,
 ) -> Vector3<f64> {
+    // Other joints on the body.
     let here = hinges
         .iter()
         .flat_map(|(_, anchors)| anchors)
@@ -114,6 +122,7 @@ fn add_point(rig: &mut Rig, stem: &str, anchor: BodyAnchor) -> String {
     if let Some(point) = rig.points.iter().find(|point| point.anchor == anchor) {
         return point.name.clone();
     }
+    // The first number that gives a free name.
     let mut n = 1;
     let mut name = format!("{stem}_{n}");
     while rig.points.iter().any(|point| point.name == name) {

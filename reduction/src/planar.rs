@@ -22,6 +22,7 @@ pub(crate) struct SpatialBody {
 
 /// A body of the rig together with its lumped masses, by the theorem of Steiner.
 pub(crate) fn spatial_body(rig: &Rig, body: usize) -> SpatialBody {
+    // The body itself, then each lumped mass on it.
     let own = &rig.bodies[body];
     let mut parts = vec![SpatialBody {
         mass: own.mass,
@@ -45,6 +46,7 @@ pub(crate) fn spatial_body(rig: &Rig, body: usize) -> SpatialBody {
 /// Several rigidly connected bodies as one: total mass, common centre of mass, and inertia about it (Steiner).
 fn merge_spatial(parts: &[SpatialBody]) -> SpatialBody {
     let mass: f64 = parts.iter().map(|part| part.mass).sum();
+    // Without mass the centre has no meaning; any place is permitted.
     let moment: Vector3<f64> = parts.iter().map(|part| part.mass * part.centre).sum();
     let centre = if mass > 0.0 {
         moment / mass
@@ -81,6 +83,7 @@ pub(crate) fn planar_body(
     samples: &MotionSamples,
 ) -> PlanarBody {
     let solid = spatial_body(rig, body);
+    // The moment about the normal, in the axes of the body.
     let moves = &samples.nominal.motion.bodies[body];
     let n = moves.R_WB.transpose() * plane.normal;
     PlanarBody {
@@ -95,6 +98,7 @@ pub(crate) fn out_of_plane_rate(plane: &MotionPlane, samples: &MotionSamples) ->
     samples.largest(|moment| {
         let bodies = moment.motion.bodies.iter();
         bodies.fold(0.0, |most: f64, body| {
+            // Velocity along the normal, and rotation about other axes than the normal.
             let slides = plane.normal.dot(&body.v_WB_W).abs();
             let tips = plane.normal.cross(&body.w_WB_W).norm();
             most.max(slides).max(tips)
@@ -112,6 +116,7 @@ pub(crate) fn check_group(
     samples: &MotionSamples,
     report: &mut ReductionReport,
 ) {
+    // The bodies of the group in the axes of the base, as one body.
     let in_base: Vec<SpatialBody> = bodies
         .iter()
         .map(|body| {
@@ -131,6 +136,7 @@ pub(crate) fn check_group(
     let moment = plane.normal.dot(&turned);
     let product = (turned - moment * plane.normal).norm();
     let tilt = if product > 1e-12 * moment.abs().max(whole.inertia.amax()) {
+        // The principal axis that is nearest to the normal.
         let eigen = whole.inertia.symmetric_eigen();
         let nearest = (0..3)
             .map(|k| eigen.eigenvectors.column(k).dot(&plane.normal).abs())

@@ -31,6 +31,7 @@ pub(crate) const ZERO: f64 = 1e-12;
 /// bodies that leave the plane, joints that do not coincide.
 pub fn reduce(rig: &Rig, plan: &ReductionPlan) -> Result<PlanarReduction, LoadFailure> {
     let mut log = RigLog::default();
+    // A result counts only if the log has no faults.
     let outcome = run(rig, plan, &mut log);
     match outcome {
         Some((draft, report)) if log.0.is_empty() => {
@@ -41,6 +42,7 @@ pub fn reduce(rig: &Rig, plan: &ReductionPlan) -> Result<PlanarReduction, LoadFa
             Ok(PlanarReduction { model, report })
         }
         _ => {
+            // Faults in the sequence of the plan's text.
             log.0.sort_by_key(|found| found.span.map(|span| span.start));
             Err(LoadFailure {
                 diagnostics: log.0,
@@ -57,10 +59,12 @@ fn run(
     log: &mut RigLog,
 ) -> Option<(PlanarDraft, ReductionReport)> {
     let entry = &plan.entry;
+    // Groups, the plane of motion, and samples of the rig's motion.
     let names = PlanNames::new(rig, entry, log);
     let plane = MotionPlane::new(entry.plane.at, entry.plane.normal, entry.plane.x);
     let samples = match MotionSamples::new(rig, entry.samples.number, entry.samples.range) {
         Ok(samples) if samples.moments.len() >= 4 => samples,
+        // Too few poses for the checks.
         Ok(samples) => {
             let says = format!(
                 "{} of {} sampled poses cannot be reached by the rig; reduce `range` in `[samples]`",
@@ -77,6 +81,7 @@ fn run(
             return None;
         }
     };
+    // All steps work on the same state.
     let mut work = ReductionState {
         names,
         plane,
@@ -92,6 +97,7 @@ fn run(
         used_groups: Vec::new(),
         part_totals: Vec::new(),
     };
+    // The next steps make no sense if the motion is not planar, or if parts are missing.
     work.planar_reduction(log);
     if !log.0.is_empty() {
         return None;
@@ -100,6 +106,7 @@ fn run(
     if !log.0.is_empty() {
         return None;
     }
+    // The remaining steps report all faults at once.
     work.lumped_masses(log);
     work.check_equation_1();
     work.loops(log);
@@ -109,6 +116,7 @@ fn run(
     work.check_constants(log);
     let draft = work.draft;
     let mut report = work.report;
+    // Symbols that stand for several quantities, with the differences between their values.
     for symbols in [
         &draft.masses,
         &draft.centres,
@@ -144,6 +152,7 @@ impl ReductionState<'_> {
     /// Step 1: checks that motion is planar, and writes gravity in the plane.
     fn planar_reduction(&mut self, log: &mut RigLog) {
         let rig = self.names.rig;
+        // No body may leave the plane.
         let out = out_of_plane_rate(&self.plane, &self.samples);
         if out.is_nan() || out > TOLERANCE {
             log.0.push(plain_error(
@@ -170,6 +179,7 @@ impl ReductionState<'_> {
                 "m/s or rad/s",
             )],
         );
+        // Gravity in the plane; the component out of it loads bearings only.
         let across = self.plane.normal.dot(&rig.gravity);
         let flat = self.plane.components(&rig.gravity);
         self.report.add(
@@ -182,6 +192,7 @@ impl ReductionState<'_> {
                 "m/s^2",
             )],
         );
+        // One symbol `g` with a sign if gravity is along an axis, else two components.
         self.draft.gravity = match (flat.x.abs() > ZERO, flat.y.abs() > ZERO) {
             (false, false) => ["0", "0"].map(str::to_owned),
             (true, true) => [("gx", flat.x), ("gy", flat.y)]
@@ -195,6 +206,7 @@ impl ReductionState<'_> {
                 signed_name(self.gravity_constant("g", flat.y.abs()), flat.y),
             ],
         };
+        // The size of what the plane neglects in each group.
         for (name, bodies) in &self.names.groups {
             check_group(
                 rig,

@@ -79,6 +79,7 @@ impl ReductionReport {
         ];
         let mut text = String::new();
         for (step, title) in (1..).zip(titles) {
+            // Steps without findings have no title.
             let findings: Vec<&ReductionFinding> = self
                 .findings
                 .iter()

@@ -30,6 +30,7 @@ impl MotionPlane {
     pub(crate) fn new(at: [f64; 3], normal: [f64; 3], x: [f64; 3]) -> Self {
         let normal = Vector3::from(normal).normalize();
         let x = Vector3::from(x);
+        // The component of x in the plane.
         let x = (x - normal * normal.dot(&x)).normalize();
         Self {
             at: Vector3::from(at),
@@ -93,6 +94,7 @@ impl MotionSamples {
     ///
     /// Fails if the rig cannot be assembled in its nominal configuration.
     pub(crate) fn new(rig: &Rig, number: usize, range: f64) -> Result<Self, RigPoseError> {
+        // The nominal configuration at standstill.
         let mut tracker = RigTracker::new(rig)?;
         let q0 = tracker.coordinates().to_vec();
         let rest = vec![0.0; q0.len()];
@@ -158,6 +160,7 @@ fn sampled_states(q0: &[f64], number: usize, range: f64) -> impl Iterator<Item =
     }
     (0..number).map(move |i| {
         let draw = |k: usize| {
+            // A number between -1 and 1.
             let step = root.powi(-(i32::try_from(k).unwrap_or(i32::MAX - 1) + 1));
             2.0 * (0.5 + (i as f64 + 1.0) * step).fract() - 1.0
         };

@@ -6,11 +6,13 @@ use crate::draft::{DraftSymbol, DraftSymbols, PlanarDraft};
 
 /// The text of a model file.
 pub(crate) fn model_file(draft: &PlanarDraft) -> String {
+    // The head of the file.
     let mut text = format!("# {}\n", draft.origin);
     let _ = writeln!(text, "schema = 1\nname = \"{}\"", draft.name);
     if !draft.title.is_empty() {
         let _ = writeln!(text, "title = {}", toml_string(&draft.title));
     }
+    // Zero gravity is not written.
     if draft.gravity.iter().any(|g| g != "0") {
         let _ = writeln!(
             text,
@@ -19,6 +21,7 @@ pub(crate) fn model_file(draft: &PlanarDraft) -> String {
             vector_value(&draft.gravity[1])
         );
     }
+    // Constants in their order, parameters sorted by class and name.
     symbol_table(
         &mut text,
         "constants",
@@ -30,6 +33,7 @@ pub(crate) fn model_file(draft: &PlanarDraft) -> String {
         parameters.extend(sorted_by_name(class));
     }
     symbol_table(&mut text, "parameters", "nominal", &parameters);
+    // Coordinates, then the tables that refer to them.
     text.push_str("\n[coordinates]\n");
     for coordinate in &draft.coordinates {
         let passive = if coordinate.passive {
@@ -58,6 +62,7 @@ fn frames_and_points(text: &mut String, draft: &PlanarDraft) {
             "\n[[frame]]\nname = \"{}\"\non = \"{}\"",
             frame.name, frame.on
         );
+        // The z axis of every frame is the normal of the plane.
         let [x, y] = &frame.at;
         let _ = match (x.as_str(), y.as_str()) {
             ("0", "0") => writeln!(text, "modified_dh = {{ theta = \"{}\" }}", frame.angle),
@@ -93,6 +98,7 @@ fn frames_and_points(text: &mut String, draft: &PlanarDraft) {
 
 /// Tables `[[part]]` and `[[lumped_mass]]`.
 fn masses(text: &mut String, draft: &PlanarDraft) {
+    // The inertia about the centre of mass; other moments have no effect on planar motion.
     for part in &draft.parts {
         let _ = writeln!(
             text,
@@ -110,6 +116,7 @@ fn masses(text: &mut String, draft: &PlanarDraft) {
             text,
             "\n[[lumped_mass]]\nname = \"{name}\"\nmass = \"{mass}\""
         );
+        // A mass at one point is complete and needs no share.
         if *shares > 1 {
             let _ = writeln!(text, "share = \"1/{shares}\"");
         }
@@ -125,6 +132,7 @@ fn loops_and_drives(text: &mut String, draft: &PlanarDraft) {
             "\n[[loop]]\nname = \"{name}\"\njoins = [\"{one}\", \"{two}\"]"
         );
     }
+    // A drive moves a coordinate, or acts between two points.
     for (name, moves) in &draft.drives {
         let _ = writeln!(text, "\n[[drive]]\nname = \"{name}\"");
         let _ = match moves {
@@ -140,6 +148,7 @@ fn loops_and_drives(text: &mut String, draft: &PlanarDraft) {
             effect.kind,
             places.join(", ")
         );
+        // Entries of an inline table.
         let list = |values: &[(String, f64)], wrap: fn(&str) -> String| {
             let entries: Vec<String> = values
                 .iter()
@@ -191,6 +200,8 @@ fn sorted_by_name(symbols: &DraftSymbols) -> Vec<&DraftSymbol> {
     sorted.sort_by_cached_key(|symbol| {
         let mut key = String::new();
         let mut digits = String::new();
+        // Numbers are padded with zeros, so that they are sorted by size; the last character completes a number at the
+        // end.
         for c in symbol.name.chars().chain(['\0']) {
             if c.is_ascii_digit() {
                 digits.push(c);
@@ -226,6 +237,7 @@ pub(crate) fn significant_digits(x: f64, n: usize) -> String {
     if x == 0.0 || !x.is_finite() {
         return format!("{x}");
     }
+    // Round in exponential notation, then print the shortest decimal or exponential number.
     let rounded: f64 = format!("{x:.*e}", n.saturating_sub(1)).parse().unwrap_or(x);
     if (1e-3..1e6).contains(&rounded.abs()) {
         format!("{rounded}")

@@ -74,6 +74,7 @@ fn add_effect(
     format: DescriptionFormat,
     found: &mut PassiveEffects,
 ) -> bool {
+    // Nominal value of a parameter or a constant of the effect; zero if it has none.
     let value = |symbol: &str| {
         let term = effect.terms.iter().find(|term| term.symbol == symbol);
         term.map_or(0.0, |term| mechanism.parameters[term.parameter.0].nominal)
@@ -84,6 +85,7 @@ fn add_effect(
             value.evaluate(&|s| mechanism.symbol_nominal(s))
         })
     };
+    // A spring and damper between two points.
     if effect.mechanics == Some(Mechanics::Strut) {
         let (stiffness, constant) = (value("k"), value("F0"));
         let [EffectPlace::Point(from), EffectPlace::Point(to)] = effect.places[..] else {
@@ -119,6 +121,7 @@ fn add_effect(
     {
         return true;
     }
+    // What the effect changes; URDF has viscous and Coulomb friction only.
     let change: &dyn Fn(&mut PassiveProperties) = match effect.kind.as_str() {
         "viscous_friction" => &|one| one.damping += value("Fv"),
         "coulomb_friction" => &|one| one.friction += value("Fc"),
@@ -132,6 +135,7 @@ fn add_effect(
         },
         _ => return false,
     };
+    // Apply it at each place, as far as the format has such a place.
     for place in &effect.places {
         match *place {
             EffectPlace::Coordinate(i) => change(&mut found.joints[i.0]),

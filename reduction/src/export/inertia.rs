@@ -103,7 +103,7 @@ pub(super) fn bodies(
             .relative_placement(&tree.frames[frame.0]);
         bodies[link].add(&body.in_outer_frame(&placed));
     };
-    // Some effects are bodies, such as rotors and rods.
+    // Some effects are bodies.
     let of_effects = mechanism.effects.iter().map(|effect| &effect.bodies);
     let parts = mechanism.parts.iter();
     for part in parts.chain(of_effects.clone().flat_map(|bodies| &bodies.parts)) {

@@ -79,7 +79,7 @@ impl MjcfWriter<'_> {
 
     /// The complete file.
     fn write_all(&mut self) {
-        // The sections in the order of MuJoCo's reference: what refers to names comes last.
+        // Bodies first; the sections after them refer to bodies, joints and sites by name.
         let name = format!(" model=\"{}\"", self.mechanism.name);
         self.write_element("mujoco", &name, |w| {
             w.line("<compiler angle=\"radian\" autolimits=\"true\"/>");
@@ -176,7 +176,7 @@ impl MjcfWriter<'_> {
         if reference != 0.0 {
             let _ = write!(text, " ref=\"{}\"", number_text(reference));
         }
-        // A joint that follows another one has no limits and losses of its own.
+        // Limits and losses are written once, at the joint with the name of the coordinate.
         if joint.name == coordinate.name {
             let limits = self.mechanism.limits.coordinates.iter();
             let of = limits.clone().find(|(i, _)| i.0 == joint.coordinate);

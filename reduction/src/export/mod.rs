@@ -85,11 +85,13 @@ pub fn export(
         }
         _ => vec![0.0; mechanism.coordinates.len()],
     };
+    // Links and joints, then inertias of the links, which simulators check.
     let mut tree = tree::link_tree(mechanism, &at)?;
     tree.followed = followed_coordinates(mechanism, &mut remarks);
     let mut bodies = inertia::bodies(mechanism, &tree)?;
     inertia::complete_inertias(&tree, &mut bodies, &mut remarks);
     inertia::report_impossible(&tree, &bodies, &mut remarks);
+    // Values of base parameters cannot be distributed to bodies.
     if !mechanism.identified_base.is_empty() {
         remarks.push(message!(
             "the values under `[identified]` are those of base parameters, which do not determine single bodies, so bodies have \
@@ -130,6 +132,7 @@ fn followed_coordinates(
         |exact: &ExactExpression| exact.evaluate(&|symbol| mechanism.symbol_nominal(symbol));
     let mut found = Vec::new();
     for coupling in &mechanism.couplings {
+        // Both formats know couplings to one joint only.
         if let [(of, factor)] = &coupling.terms[..] {
             found.push(FollowedCoordinate {
                 coordinate: coupling.coordinate.0,
@@ -158,6 +161,7 @@ fn number_text(value: f64) -> String {
     if value.abs() < 1e-15 {
         return "0".to_owned();
     }
+    // Integers without a decimal point.
     if value.fract() == 0.0 && value.abs() < 1e15 {
         return format!("{value:.0}");
     }

@@ -79,6 +79,7 @@ impl LinkTree {
     pub(super) fn point(&self, mechanism: &Mechanism, point: PointIdx) -> (usize, Vector3<f64>) {
         let point = &mechanism.points[point.0];
         let at = Vector3::from_fn(|k, _| point.at[k].evaluate(&|s| mechanism.symbol_nominal(s)));
+        // From the frame to the base, then into the link.
         let frame = &self.frames[point.frame.0];
         let link = self.link_of[point.frame.0];
         let in_base = frame.origin + frame.rotation * at;
@@ -99,6 +100,7 @@ pub(super) fn link_tree(mechanism: &Mechanism, at: &[f64]) -> Result<LinkTree, E
             *value = 0.0;
         }
     }
+    // Poses of all frames, with the axes of their joints.
     let poses = Kinematics::new(mechanism).poses(&at);
     let frames: Vec<LinkPlacement> = (poses.frames().iter())
         .map(|pose| LinkPlacement {
@@ -107,6 +109,7 @@ pub(super) fn link_tree(mechanism: &Mechanism, at: &[f64]) -> Result<LinkTree, E
         })
         .collect();
     let owners = coordinate_owners(mechanism, &poses)?;
+    // The base is the first link.
     let mut links = vec![ExportedLink {
         name: mechanism.frames[0].name.clone(),
         parent: 0,
@@ -117,6 +120,7 @@ pub(super) fn link_tree(mechanism: &Mechanism, at: &[f64]) -> Result<LinkTree, E
     for (f, pose) in poses.frames().iter().enumerate().skip(1) {
         let frame = &mechanism.frames[f];
         let parent = link_of[frame.parent.0];
+        // A free body moves without joints.
         let is_free = frame
             .steps
             .iter()
@@ -126,6 +130,7 @@ pub(super) fn link_tree(mechanism: &Mechanism, at: &[f64]) -> Result<LinkTree, E
             link_of.push(parent);
             continue;
         }
+        // A joint for each motion of the frame.
         let joint = |(k, moved): (usize, &modelmill_spec::CoordinateAxis)| {
             let is_owner = owners[moved.coordinate] == Some((f, k));
             let coordinate = &mechanism.coordinates[moved.coordinate].name;
@@ -145,6 +150,7 @@ pub(super) fn link_tree(mechanism: &Mechanism, at: &[f64]) -> Result<LinkTree, E
             }
         };
         let joints: Vec<ExportedJoint> = pose.joint_axes.iter().enumerate().map(joint).collect();
+        // The origin of a link is on the axis of its last joint, as URDF requires.
         let origin = joints.last().map_or(frames[f].origin, |last| last.origin);
         link_of.push(links.len());
         links.push(ExportedLink {
@@ -177,6 +183,7 @@ fn coordinate_owners(
     let mut moves = vec![false; mechanism.coordinates.len()];
     for (f, pose) in poses.frames().iter().enumerate() {
         for (k, moved) in pose.joint_axes.iter().enumerate() {
+            // A joint with a ratio of 1 or -1 can have the name of its coordinate.
             moves[moved.coordinate] = true;
             if (moved.factor.abs() - 1.0).abs() < f64::EPSILON {
                 owners[moved.coordinate].get_or_insert((f, k));

@@ -60,6 +60,7 @@ impl FrameChain {
     fn pose(&self, values: &[f64]) -> Vec<PosedFrame> {
         let mut out: Vec<PosedFrame> = Vec::with_capacity(self.nodes.len());
         for node in &self.nodes {
+            // The fixed pose, then one motion after the other.
             let mut at = node
                 .on
                 .map_or(DescriptionPose::identity(), |on| out[on].at)
@@ -68,6 +69,7 @@ impl FrameChain {
             for motion in &node.moves {
                 let value =
                     motion.variable.map_or(0.0, |v| motion.ratio * values[v]) + motion.offset;
+                // The axis as the motions before have left it.
                 moves.push((at.r * motion.axis, at.p));
                 at = at.compose(&if motion.is_turn {
                     DescriptionPose {
@@ -96,9 +98,11 @@ impl FrameChain {
         let posed = self.pose(values);
         let mut gaps = DVector::zeros(3 * pairs.len());
         let mut rows = DMatrix::zeros(3 * pairs.len(), self.n_variables);
+        // The size is at least a millimetre, also if all points are at the origin.
         let mut size = 1e-3_f64;
         for (k, pair) in pairs.iter().enumerate() {
             for ((frame, local), sign) in pair.ends.iter().zip([1.0, -1.0]) {
+                // The point in the base, with opposite signs for both ends.
                 let place = frame.map_or(DescriptionPose::identity(), |frame| posed[frame].at);
                 let point = place.p + place.r * local;
                 size = size.max(point.amax());
@@ -134,6 +138,7 @@ impl FrameChain {
             let [place, other] = pair.ends.map(|(frame, _)| {
                 frame.map_or(DescriptionPose::identity(), |frame| posed[frame].at)
             });
+            // The first point in the frame of the second one.
             let first = place.p + place.r * pair.ends[0].1;
             pair.ends[1].1 = other.r.transpose() * (first - other.p);
         }
@@ -160,6 +165,7 @@ impl FrameChain {
             let Ok(step) = svd.solve(&gaps, cut) else {
                 break;
             };
+            // Shorten long steps, so that the assembly mode hardly changes.
             let scale = (LONGEST_STEP / step.amax()).min(1.0);
             if !scale.is_finite() {
                 break;
@@ -180,6 +186,7 @@ pub(crate) fn rank(matrix: &DMatrix<f64>, share: f64) -> (usize, f64) {
     }
     let values = matrix.clone().singular_values();
     let largest = values.max();
+    // Values that count, and the smallest of them.
     let kept: Vec<f64> = values
         .iter()
         .copied()

@@ -67,6 +67,7 @@ pub(crate) fn close_loops(
             .iter()
             .zip(ranges)
             .map(|(x, range)| {
+                // Poses near the start are moved into the ranges; later ones are anywhere within them.
                 let moved = x + spread * noise.next();
                 match range {
                     Some([low, high]) if attempt > 40 => {
@@ -77,6 +78,7 @@ pub(crate) fn close_loops(
                 }
             })
             .collect();
+        // Solve from this pose; poses outside of the ranges are used only if there are no others.
         let gap = chain.close_pairs(pairs, &mut values);
         least = least.min(gap);
         if gap < NEARLY_CLOSED {
@@ -91,6 +93,7 @@ pub(crate) fn close_loops(
                 outside.push(values);
             }
         }
+        // Six poses are enough to recognise a singular one.
         if poses.len() == 6 {
             break;
         }
@@ -110,6 +113,7 @@ pub(crate) fn close_loops(
         .map(|values| independent_conditions(chain, pairs, values).0)
         .collect();
     let wanted = ranks.iter().copied().max().unwrap_or(0);
+    // Of the poses with this rank, the one farthest from a singularity.
     let general = (0..poses.len())
         .filter(|k| ranks[*k] == wanted)
         .max_by(|a, b| {
@@ -117,11 +121,13 @@ pub(crate) fn close_loops(
             share(*a).total_cmp(&share(*b))
         })
         .unwrap_or(0);
+    // Redundant pairs and the passive variables are determined at the general pose.
     let pairs = independent_pairs(chain, pairs, &poses[general]);
     let (_, rows, _) = chain.gaps(&pairs, &poses[general]);
     // Three rows of a pair can be dependent, for example in a planar loop.
     let by_itself = (0..pairs.len()).map(|k| rank(&rows.rows(3 * k, 3).into_owned(), ZERO_SHARE).0);
     let passive = choose_passive(&rows, reluctance, wanted);
+    // How well the passive variables are determined at a pose.
     let settled = |values: &[f64]| {
         let (_, rows, _) = chain.gaps(&pairs, values);
         passive_conditioning(&rows, &passive)
@@ -135,6 +141,7 @@ pub(crate) fn close_loops(
             }
         }
     }
+    // Close the independent pairs at the chosen pose.
     let mut values = poses.swap_remove(best);
     let gap = chain.close_pairs(&pairs, &mut values);
     let mut pairs = pairs;
@@ -158,6 +165,7 @@ fn independent_conditions(
     pairs: &[CoincidentPair],
     values: &[f64],
 ) -> (usize, f64) {
+    // Where loops do not close exactly, redundant conditions have singular values of the size of the gap.
     let (gaps, rows, size) = chain.gaps(pairs, values);
     rank(&rows, ZERO_SHARE.max(GAP_FACTOR * gaps.amax() / size))
 }
@@ -171,6 +179,7 @@ fn independent_pairs(
     let mut kept: Vec<CoincidentPair> = Vec::new();
     let mut n = 0;
     for pair in pairs {
+        // A pair is kept if the rank increases.
         kept.push(*pair);
         let (now, _) = independent_conditions(chain, &kept, values);
         if now == n {
@@ -183,6 +192,7 @@ fn independent_pairs(
 
 /// Chooses as many passive variables as the rank: first those with high reluctance, from the end of the description.
 fn choose_passive(rows: &DMatrix<f64>, reluctance: &[u8], wanted: usize) -> Vec<bool> {
+    // The sort is stable, so that equal reluctance leaves the order from the end.
     let mut order: Vec<usize> = (0..rows.ncols()).rev().collect();
     order.sort_by_key(|k| std::cmp::Reverse(reluctance[*k]));
     let mut passive = Vec::new();
@@ -205,6 +215,7 @@ fn exchange_passive(rows: &DMatrix<f64>, reluctance: &[u8], mut passive: Vec<boo
     let n = passive.len();
     let mut now = passive_conditioning(rows, &passive);
     while now < POORLY_CONDITIONED {
+        // The best exchange of one pair.
         let mut best = (MUCH * now, None);
         for out in (0..n).filter(|k| passive[*k]) {
             for into in (0..n).filter(|k| !passive[*k] && reluctance[*k] == reluctance[out]) {
@@ -225,6 +236,7 @@ fn exchange_passive(rows: &DMatrix<f64>, reluctance: &[u8], mut passive: Vec<boo
 /// The smallest singular value of the passive columns relative to the largest; zero if the loops do not determine these
 /// variables.
 fn passive_conditioning(rows: &DMatrix<f64>, passive: &[bool]) -> f64 {
+    // The Jacobian of the passive variables alone.
     let columns: Vec<_> = (0..passive.len())
         .filter(|k| passive[*k])
         .map(|k| rows.column(k).into_owned())
@@ -249,6 +261,7 @@ fn select_columns(
     let mut chosen: Vec<nalgebra::DVector<f64>> = Vec::new();
     for k in order {
         let column = rows.column(*k) / scale;
+        // The part of the column that is orthogonal to those chosen.
         let length = column.norm();
         let mut rest = column.into_owned();
         for _ in 0..2 {
@@ -257,6 +270,7 @@ fn select_columns(
                 rest -= direction * along;
             }
         }
+        // Columns that are almost zero are never taken.
         if chosen.len() < wanted && rest.norm() > least * length.max(1e-6) {
             chosen.push(rest.normalize());
             passive[*k] = true;

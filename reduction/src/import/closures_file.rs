@@ -53,6 +53,7 @@ pub(crate) fn read(text: &str) -> Result<ClosureFile, String> {
     // Lines that start with a blank, a dash or a bracket continue the value of the key before.
     let mut entries: Vec<(u32, &str, String)> = Vec::new();
     for (line, text) in (1..).zip(text.lines()) {
+        // Remove comments, and skip empty lines and the start of the document.
         let text = text.split(" #").next().unwrap_or_default();
         if text.trim().is_empty() || text.starts_with('#') || text.trim() == "---" {
             continue;
@@ -69,6 +70,7 @@ pub(crate) fn read(text: &str) -> Result<ClosureFile, String> {
         })?;
         entries.push((line, key.trim(), value.to_owned()));
     }
+    // Line and words of a key; no words without the key.
     let list = |key: &str| -> (u32, Vec<String>) {
         let entry = entries.iter().find(|(_, name, _)| *name == key);
         entry.map_or((0, Vec::new()), |(line, _, value)| {
@@ -84,6 +86,7 @@ pub(crate) fn read(text: &str) -> Result<ClosureFile, String> {
             "line {line} of the file of closures: expected pairs in `closed_loop`, each with its `type`"
         ));
     }
+    // Drives, and joints with their true kinds.
     let mut out = ClosureFile {
         drives: list("name_mot").1,
         ..ClosureFile::default()
@@ -111,6 +114,7 @@ pub(crate) fn read(text: &str) -> Result<ClosureFile, String> {
         };
         out.joints.push((name, becomes));
     }
+    // Other keys get a remark.
     for (line, key, _) in &entries {
         if !KNOWN_KEYS.contains(key) {
             out.remarks.push(format!(
@@ -118,6 +122,7 @@ pub(crate) fn read(text: &str) -> Result<ClosureFile, String> {
             ));
         }
     }
+    // Closures of three conditions (origins) or six (whole frames).
     for (k, ends) in pairs.iter().enumerate() {
         let is_full = match kinds.get(k).map(|kind| kind.to_lowercase()).as_deref() {
             None | Some("6d") => true,

@@ -67,6 +67,7 @@ struct CouplingRule {
 
 /// Resolves all couplings of a description. Adds a remark for each ratio that is rounded to a fraction.
 pub(crate) fn resolve(description: &mut RobotDescription) -> Result<ImportCouplings, String> {
+    // Joints with one coordinate; ball joints and free joints cannot be coupled.
     let joints: Vec<DescriptionJoint> = description
         .links
         .iter()
@@ -79,8 +80,10 @@ pub(crate) fn resolve(description: &mut RobotDescription) -> Result<ImportCoupli
         })
         .cloned()
         .collect();
+    // Rules with leaders that are independent, and driven if possible.
     let mut rules = coupling_rules(description, &joints)?;
     prefer_driven_leaders(&joints, &mut rules);
+    // Each joint without a rule is a variable.
     let mut variables = Vec::new();
     let mut variable_of: Vec<Option<usize>> = vec![None; joints.len()];
     for (leader, joint) in joints.iter().enumerate() {
@@ -88,6 +91,7 @@ pub(crate) fn resolve(description: &mut RobotDescription) -> Result<ImportCoupli
             continue;
         }
         let mut followers = joints.iter().zip(&rules);
+        // A drive at a follower moves the variable too.
         let leads_driven = followers.any(|(other, rule)| {
             other.is_driven && rule.is_some_and(|rule| rule.leader == Some(leader))
         });
@@ -97,6 +101,7 @@ pub(crate) fn resolve(description: &mut RobotDescription) -> Result<ImportCoupli
             is_driven: joint.is_driven || leads_driven,
         });
     }
+    // How each joint follows its variable.
     let mut follows = Vec::new();
     for (k, joint) in joints.iter().enumerate() {
         let found = match rules[k] {
@@ -108,6 +113,7 @@ pub(crate) fn resolve(description: &mut RobotDescription) -> Result<ImportCoupli
                 changes_kind: false,
             },
             Some(rule) => {
+                // With a ratio of zero the joint is fixed.
                 let leader = rule.leader.filter(|_| rule.ratio != 0.0);
                 let ratio = fraction(rule.ratio).map_or(rule.ratio, |(p, q)| p as f64 / q as f64);
                 if leader.is_some() && (ratio - rule.ratio).abs() > 1e-14 {
@@ -146,6 +152,7 @@ fn coupling_rules(
     description: &RobotDescription,
     joints: &[DescriptionJoint],
 ) -> Result<Vec<Option<CouplingRule>>, String> {
+    // Index of a joint by its name.
     let index = |name: &str, line: u32| {
         joints
             .iter()
@@ -157,6 +164,7 @@ fn coupling_rules(
     let mut rules: Vec<Option<CouplingRule>> = vec![None; joints.len()];
     for coupling in &description.couplings {
         let line = coupling.line;
+        // The joint and the one that it follows.
         let one = index(&coupling.joint, line)?;
         let of = coupling
             .leader
@@ -196,6 +204,7 @@ fn coupling_rules(
             && let Some(of) = rule.leader
             && let Some(next) = rules[of]
         {
+            // A chain longer than the number of joints is a cycle.
             steps += 1;
             if steps > joints.len() {
                 return Err(format!(
@@ -203,6 +212,7 @@ fn coupling_rules(
                     rule.line, joints[k].name
                 ));
             }
+            // Insert the rule of the leader into that of the follower.
             rules[k] = Some(CouplingRule {
                 leader: next.leader,
                 ratio: rule.ratio * next.ratio,
@@ -221,6 +231,7 @@ fn prefer_driven_leaders(joints: &[DescriptionJoint], rules: &mut [Option<Coupli
         if rules[old].is_some() || joints[old].is_driven {
             continue;
         }
+        // The first driven follower of this leader.
         let found = (0..joints.len()).find_map(|k| {
             let rule = rules[k].filter(|rule| rule.leader == Some(old) && rule.ratio != 0.0)?;
             joints[k].is_driven.then_some((k, rule))
@@ -231,11 +242,13 @@ fn prefer_driven_leaders(joints: &[DescriptionJoint], rules: &mut [Option<Coupli
                 .as_mut()
                 .filter(|rule| rule.leader == Some(old) && k != new)
             {
+                // The old leader as a function of the new one, inserted into the rule.
                 rule.ratio /= lead.ratio;
                 rule.offset -= rule.ratio * lead.offset;
                 rule.leader = Some(new);
             }
         }
+        // The inverse of the rule of the new leader.
         rules[old] = Some(CouplingRule {
             leader: Some(new),
             ratio: 1.0 / lead.ratio,
@@ -249,6 +262,7 @@ fn prefer_driven_leaders(joints: &[DescriptionJoint], rules: &mut [Option<Coupli
 /// Numerator and denominator if a ratio is a fraction of small integers.
 fn fraction(ratio: f64) -> Option<(i64, i64)> {
     (1..=LARGEST_MULTIPLE).find_map(|q| {
+        // The nearest numerator for each denominator, the smallest denominator first.
         let p = (ratio * q as f64).round();
         let is_same = (ratio - p / q as f64).abs() < SAME_RATIO;
         #[allow(clippy::cast_possible_truncation, reason = "small")]

@@ -34,6 +34,7 @@ impl<'a, 'i> MjcfDefaults<'a, 'i> {
 
     /// Adds a class and those inside it; fails for an inner class without a name.
     fn add_class(&mut self, node: Node<'a, 'i>, parent: Option<usize>) -> Result<(), String> {
+        // Only the outermost class may be without a name.
         let name = match (node.attribute("class"), parent) {
             (Some(name), _) => name,
             (None, None) => "main",
@@ -68,6 +69,7 @@ impl<'a, 'i> MjcfDefaults<'a, 'i> {
         if let Some(value) = node.attribute(key) {
             return Ok(Some(value));
         }
+        // The class that the element names, or that of the body, or the main class.
         let named = node.attribute("class").or(around);
         let mut class = match named {
             None => self.classes.iter().position(|class| class.parent.is_none()),
@@ -80,6 +82,7 @@ impl<'a, 'i> MjcfDefaults<'a, 'i> {
                     })?,
             ),
         };
+        // From this class outwards, the first that has the attribute.
         let tag = node.tag_name().name();
         while let Some(index) = class {
             let MjcfDefaultClass { parent, node, .. } = &self.classes[index];

@@ -29,6 +29,7 @@ fn expand_file(
     seen: &mut Vec<String>,
     depth: usize,
 ) -> Result<String, String> {
+    // Faults of the main file are reported by the import.
     let Ok(document) = Document::parse(text) else {
         return Ok(text.to_owned());
     };
@@ -36,6 +37,7 @@ fn expand_file(
     if depth == 0 && root.tag_name().name() != "mujoco" {
         return Ok(text.to_owned());
     }
+    // The text between includes stays as it is.
     let mut out = String::new();
     let mut from = 0;
     for node in root.descendants() {
@@ -49,6 +51,7 @@ fn expand_file(
                 &format!("`{name}` is included twice; MuJoCo permits each file once"),
             ));
         }
+        // Read the other file and expand its own includes.
         seen.push(name.clone());
         let other = read(&name).map_err(|fault| located_message(&node, &fault))?;
         let whole = expand_file(&other, read, seen, depth + 1)
@@ -58,6 +61,7 @@ fn expand_file(
         })?;
         let children = inner.root_element().children();
         let range = node.range();
+        // The children of its root, without line breaks.
         out.push_str(&text[from..range.start]);
         for child in children.filter(roxmltree::Node::is_element) {
             out.push_str(&whole[child.range()].replace(['\n', '\r'], " "));

@@ -97,6 +97,7 @@ pub fn import(text: &str, options: &Options) -> Result<DescriptionImport, Import
             "this file is too large for a robot description".to_owned(),
         ));
     }
+    // A frequent mistake is a file with macros or the YAML next to the description.
     let document = Document::parse(text).map_err(|error| {
         let expected = if text.trim_start().starts_with('<') {
             "XML with macros (xacro) expanded"
@@ -129,6 +130,7 @@ pub fn import(text: &str, options: &Options) -> Result<DescriptionImport, Import
         description.pose.push((name.clone(), *value));
     }
     welds::cut_at_joints(&mut description);
+    // Options for URDF only would have no effect on other formats.
     let is_urdf = description.format == "URDF";
     if !is_urdf && (options.floating || options.closures.is_some()) {
         return Err(ImportError(format!(

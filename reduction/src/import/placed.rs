@@ -71,6 +71,7 @@ pub(crate) fn rotation_from_quaternion([w, x, y, z]: [f64; 4]) -> Option<Matrix3
 
 /// Roll, pitch and yaw of a rotation matrix, rad, with full precision also if pitch is near a right angle.
 pub(crate) fn roll_pitch_yaw(r: &Matrix3<f64>) -> [f64; 3] {
+    // The pitch from the first column; its cosine is positive.
     let pitch = (-r[(2, 0)]).atan2(r[(0, 0)].hypot(r[(1, 0)]));
     // At a pitch of a right angle only the sum of roll and yaw is defined, and the two entries are rounding.
     let roll = if r[(2, 1)].hypot(r[(2, 2)]) < 1e-14 {
@@ -78,6 +79,7 @@ pub(crate) fn roll_pitch_yaw(r: &Matrix3<f64>) -> [f64; 3] {
     } else {
         r[(2, 1)].atan2(r[(2, 2)])
     };
+    // The yaw from the other two columns with the roll removed.
     let (sin, cos) = roll.sin_cos();
     let yaw = (sin * r[(0, 2)] - cos * r[(0, 1)]).atan2(cos * r[(1, 1)] - sin * r[(1, 2)]);
     [roll, pitch, yaw]
@@ -87,6 +89,7 @@ pub(crate) fn roll_pitch_yaw(r: &Matrix3<f64>) -> [f64; 3] {
 pub(crate) fn twelfths_of_pi(n: f64) -> String {
     #[allow(clippy::cast_possible_truncation, reason = "at most 48")]
     let n = n as i64;
+    // The greatest common divisor with 12.
     let common = (1..=12)
         .rev()
         .find(|d| n % d == 0 && 12 % d == 0)
@@ -108,6 +111,7 @@ pub(crate) fn named_axis(direction: &Vector3<f64>) -> Option<(&'static str, Matr
     if !(length > 0.0 && length.is_finite()) {
         return None;
     }
+    // A coordinate axis in either direction needs no rotation.
     let unit = direction / length;
     for (k, names) in [["x", "-x"], ["y", "-y"], ["z", "-z"]]
         .into_iter()

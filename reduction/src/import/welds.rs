@@ -44,6 +44,7 @@ impl LoopCut {
 /// Replaces each weld by a cut at a joint of its loop, if there is a suitable one.
 pub(crate) fn cut_at_joints(description: &mut RobotDescription) {
     for k in 0..description.closures.len() {
+        // Express the ends in links that move.
         let closure = &mut description.closures[k];
         for (link, placed) in &mut closure.ends {
             // A frame of a link that is fixed to its parent is a frame of the parent.
@@ -57,6 +58,7 @@ pub(crate) fn cut_at_joints(description: &mut RobotDescription) {
         if closure.constraint != ClosureConstraint::Frames {
             continue;
         }
+        // The best cut on each side of the weld, then the better of both.
         let ends = closure.ends.map(|(link, _)| link);
         let cuts = [1, 0].map(|end| {
             let best = possible_cuts(description, ends[end], ends[1 - end])
@@ -83,6 +85,7 @@ fn possible_cuts(
     other: Option<usize>,
 ) -> Vec<LoopCut> {
     let links = &description.links;
+    // Joints above the common ancestor are not in the loop.
     let shared = ancestors(links, other);
     let mut turned = Vec::new();
     let mut found = Vec::new();
@@ -90,6 +93,7 @@ fn possible_cuts(
         if shared.contains(&link) {
             break;
         }
+        // With a cut below this link, it and the links before it are attached to the other side.
         turned.push(link);
         found.extend(cut_below(description, &turned));
         // Only links with at most one axis can be inverted.
@@ -113,6 +117,7 @@ fn cut_below(description: &RobotDescription, turned: &[usize]) -> Option<LoopCut
     let links = &description.links;
     let may_go = |joint: &DescriptionJoint| {
         let mut couplings = description.couplings.iter();
+        // The joint loses its coordinate, so that nothing may refer to it or act on it.
         let is_coupled =
             couplings.any(|c| c.joint == joint.name || c.leader.as_ref() == Some(&joint.name));
         let acts = [
@@ -134,6 +139,7 @@ fn cut_below(description: &RobotDescription, turned: &[usize]) -> Option<LoopCut
         if link.joints.is_empty() || !link.joints.iter().all(may_go) {
             break;
         }
+        // The last joint of a link is nearest to it.
         for joint in link.joints.iter().rev() {
             let at = DescriptionPose {
                 p: joint.anchor,
@@ -141,6 +147,7 @@ fn cut_below(description: &RobotDescription, turned: &[usize]) -> Option<LoopCut
             };
             found.push((joint.kind, seen.compose(&at)));
         }
+        // A ball joint: one point closes the loop.
         if is_ball(&found) {
             return Some(LoopCut {
                 inverted_links: turned.to_vec(),
@@ -150,6 +157,7 @@ fn cut_below(description: &RobotDescription, turned: &[usize]) -> Option<LoopCut
             });
         }
         let parent = link.parent?;
+        // Otherwise go on through a link without mass.
         let inertial = &links[parent].inertial;
         // Hinges of one ball joint are separated by links without mass, other children and closures.
         let is_bare = inertial.mass == 0.0
@@ -162,6 +170,7 @@ fn cut_below(description: &RobotDescription, turned: &[usize]) -> Option<LoopCut
         if !is_bare || found.len() >= 3 {
             break;
         }
+        // The pose of the parent in the last link of `turned`.
         seen = seen.compose(&link.at.inverse());
         here = parent;
         within.push(here);
@@ -185,6 +194,7 @@ fn is_ball(found: &[(DescriptionJointKind, DescriptionPose)]) -> bool {
             (DescriptionJointKind::Revolute, b),
             (DescriptionJointKind::Revolute, c),
         ] => {
+            // All axes pass through one point and span space.
             let meet = |x: &DescriptionPose| (x.p - a.p).amax() < MEETING_DISTANCE;
             let axes = Matrix3::from_columns(&[a.r.column(0), b.r.column(0), c.r.column(0)]);
             meet(b) && meet(c) && axes.determinant().abs() > COPLANAR_VOLUME
@@ -196,6 +206,7 @@ fn is_ball(found: &[(DescriptionJointKind, DescriptionPose)]) -> bool {
 /// A right-handed rotation matrix with x along a direction; none for a zero vector.
 fn axes_along(direction: &Vector3<f64>) -> Option<Matrix3<f64>> {
     let x = direction.try_normalize(0.0)?;
+    // The coordinate axis farthest from x, made perpendicular to it.
     let mut away = Vector3::zeros();
     away[x.iamin()] = 1.0;
     let y = (away - x * x.dot(&away)).normalize();
@@ -204,6 +215,7 @@ fn axes_along(direction: &Vector3<f64>) -> Option<Matrix3<f64>> {
 
 /// Attaches the links between weld and joint to the other end of the weld, and makes the joint the closure.
 fn apply_cut(description: &mut RobotDescription, closure: usize, end: usize, cut: &LoopCut) {
+    // The frames that the weld holds together.
     let (other, there) = description.closures[closure].ends[1 - end];
     let (_, here) = description.closures[closure].ends[end];
     let own = cut.inverted_links[cut.inverted_links.len() - 1];
@@ -232,9 +244,11 @@ fn apply_cut(description: &mut RobotDescription, closure: usize, end: usize, cut
     let (mut parent, mut at, mut joints) = (other, there.compose(&here.inverse()), Vec::new());
     for link in &cut.inverted_links {
         let now = &mut description.links[*link];
+        // What the link had before belongs to the next link in the inverted chain.
         let before = std::mem::replace(&mut now.at, at);
         let reversed = std::mem::replace(&mut now.joints, joints);
         now.parent = parent;
+        // The joint in the axes of the link that was its parent.
         joints = reversed
             .into_iter()
             .map(|joint| DescriptionJoint {
@@ -246,6 +260,7 @@ fn apply_cut(description: &mut RobotDescription, closure: usize, end: usize, cut
         parent = Some(*link);
         at = before.inverse();
     }
+    // The closure is now at the joint.
     let DescriptionClosure {
         line,
         ends,
@@ -277,6 +292,7 @@ fn sort_links(description: &mut RobotDescription) {
             }
         }
     }
+    // Replace all indices of links by the new ones.
     let place = |link: usize| order.iter().position(|k| *k == link).unwrap_or(link);
     for closure in &mut description.closures {
         for (link, _) in &mut closure.ends {
