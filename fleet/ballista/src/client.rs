@@ -45,16 +45,19 @@ pub(crate) struct QueryRequest<'a> {
 ///
 /// Fails if the query is invalid, or the scheduler does not answer.
 pub(crate) async fn run_query(ground: &Arc<Ground>, asked: &QueryRequest<'_>) -> Result<()> {
+    // A session with the functions of the fleet and the tables.
     let session = open_session(asked).await?;
     register(&session, ground);
     for table in asked.tables {
         register_table(&session, table).await?;
     }
     let frame = flatten_structs(session.sql(asked.sql).await?)?;
+    // Results of the executors, or of this process.
     let batches = match asked.scheduler {
         Some(url) => collect_answer(&frame, url).await?,
         None => frame.collect().await?,
     };
+    // The header stands before the first batch only.
     let mut header = true;
     for batch in batches.iter().filter(|batch| batch.num_rows() > 0) {
         let mut writer = WriterBuilder::new()
@@ -75,6 +78,7 @@ async fn open_session(asked: &QueryRequest<'_>) -> Result<SessionContext> {
             stores::runtime_environment(None)?,
         ));
     };
+    // The configuration with Ballista's own extensions.
     let config = SessionConfig::new_with_ballista().with_target_partitions(asked.partitions);
     let state = SessionStateBuilder::new()
         .with_default_features()
@@ -91,6 +95,7 @@ async fn register_table(session: &SessionContext, table: &str) -> Result<()> {
             "`--table {table}` has no folder; write it as `--table samples=recordings/`"
         )));
     };
+    // The files as a table; folders give three more columns.
     let external = format!(
         "CREATE EXTERNAL TABLE {name}_files STORED AS PARQUET PARTITIONED BY (robot, day, recording) LOCATION '{folder}'"
     );
@@ -137,6 +142,7 @@ async fn collect_answer(frame: &DataFrame, url: &str) -> Result<Vec<RecordBatch>
             Ok(batches) => return Ok(batches),
             Err(error) => error,
         };
+        // The job that the scheduler assigned to the query.
         let job = plan
             .downcast_ref::<DistributedQueryExec<LogicalPlanNode>>()
             .and_then(DistributedQueryExec::job_id);
@@ -166,6 +172,7 @@ async fn was_executor_lost(url: &str, job_id: String) -> Result<bool> {
             "the scheduler does not report the state of the query: {error}; check that it runs, then run the query again"
         ))
     };
+    // Ask the scheduler for the state of the job.
     let http = url.replacen("df://", "http://", 1);
     let mut scheduler = SchedulerGrpcClient::connect(http)
         .await

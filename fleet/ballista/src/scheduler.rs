@@ -43,6 +43,7 @@ pub(crate) async fn serve(
     timeout: u64,
 ) -> std::result::Result<(), Fault> {
     let functions = ground.clone();
+    // Sessions of the scheduler know the functions of the fleet.
     let session = move |config: SessionConfig| {
         let state = default_session_builder(config.with_ballista_adaptive_query_planner(false))?;
         let known = state.aggregate_functions().values().cloned();
@@ -68,6 +69,7 @@ pub(crate) async fn serve(
         override_session_builder: Some(Arc::new(session)),
         ..SchedulerConfig::default()
     };
+    // Names of hosts are not resolved here.
     let address = format!("{host}:{port}").parse().map_err(|error| {
         Fault::new(format!(
             "`{host}:{port}` is not an address: {error}; give a numeric host such as 127.0.0.1"
@@ -79,6 +81,7 @@ pub(crate) async fn serve(
         session.unwrap_or_else(|| Arc::new(default_session_builder)),
         Arc::new(default_config_producer),
     ));
+    // Jobs and executors are in memory; a restart of the scheduler loses them.
     let cluster = ExecutorCluster {
         known: InMemoryClusterState::default(),
         jobs: jobs.clone(),
@@ -106,6 +109,7 @@ struct ExecutorCluster {
 impl ExecutorCluster {
     /// Cancels all running jobs and returns their number. The scheduler has processed the requests when this returns.
     async fn end_jobs(&self) -> std::result::Result<usize, Fault> {
+        // All jobs that run, in a fixed sequence.
         let mut running = Vec::new();
         let all = self.jobs.get_all_jobs().await.map_err(Fault::new)?;
         let mut all: Vec<JobId> = all.into_iter().collect();
@@ -119,6 +123,7 @@ impl ExecutorCluster {
         if running.is_empty() {
             return Ok(0);
         }
+        // Cancel them by the scheduler's own interface.
         let mut scheduler = SchedulerGrpcClient::connect(format!("http://{}", self.address))
             .await
             .map_err(Fault::new)?;
@@ -134,6 +139,7 @@ impl ExecutorCluster {
 
 #[async_trait]
 impl ClusterState for ExecutorCluster {
+    /// Cancels all running jobs before Ballista removes an executor.
     async fn remove_executor(&self, executor_id: &str) -> Result<()> {
         match self.end_jobs().await {
             Ok(ended) => {

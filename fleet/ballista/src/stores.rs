@@ -42,6 +42,7 @@ impl ObjectStoreRegistry for ObjectStores {
         self.known.deregister_store(url)
     }
 
+    /// The store of a URL; registers a bucket of S3 at its first use.
     fn get_store(&self, url: &Url) -> Result<Arc<dyn ObjectStore>> {
         let known = self.known.get_store(url);
         if known.is_ok() || url.scheme() != "s3" {

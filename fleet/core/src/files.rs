@@ -31,6 +31,7 @@ impl FileSource for PlanFiles {
         self.files_for(path).kind(path)
     }
 
+    /// Folders are on disk only.
     fn list(&self, folder: &Path) -> Result<Vec<PathBuf>, FileError> {
         self.disk.list(folder)
     }

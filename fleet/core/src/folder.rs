@@ -32,6 +32,7 @@ pub fn robots(folder: &Path) -> Result<BTreeMap<String, Vec<FleetFile>>, FleetFa
     for path in paths {
         let below = path.strip_prefix(folder).unwrap_or(&path);
         let parts: Vec<_> = below.iter().map(|part| part.to_string_lossy()).collect();
+        // Size and time of change distinguish versions of a file.
         let about = fs::metadata(&path).map_err(|error| read_fault(&path, &error))?;
         let changed = about.modified().ok();
         let changed = changed.and_then(|at| at.duration_since(std::time::UNIX_EPOCH).ok());
@@ -131,6 +132,7 @@ fn robot_and_day(parts: &[String]) -> Option<(String, String)> {
     if let (Some(robot), Some(day)) = (named("robot="), named("day=")) {
         return Some((robot, day));
     }
+    // Otherwise folders have the names of robots, and days are folders or part of the file name.
     let (file, folders) = parts.split_last()?;
     let robot = folders.first()?.clone();
     let day = folders.get(1).cloned().unwrap_or_else(|| {

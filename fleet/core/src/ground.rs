@@ -134,6 +134,7 @@ impl FleetModel {
         name: &str,
         mut recording: PreparedRecording,
     ) -> Result<FleetSummary, FleetFault> {
+        // Dead sensors are recognised in the raw readings.
         let time = recording.raw_column("t").unwrap_or_default();
         let columns: Vec<(&str, bool, &[f64], f64)> = self
             .still
@@ -143,6 +144,7 @@ impl FleetModel {
             })
             .collect();
         let sensors = sensors::sensor_faults(name, time, &columns);
+        // Size of the recording.
         let samples = time.len() as u64;
         let seconds = match time {
             [first, .., last] => last - first,
@@ -179,6 +181,7 @@ impl FleetModel {
                     left * left * samples as f64
                 }
             });
+        // Sums over all rows, from which parameters and changes are computed.
         Ok(FleetSummary {
             mark: self.mark,
             recordings: 1,
@@ -203,6 +206,7 @@ impl FleetModel {
     pub fn solve(&self, summary: &FleetSummary) -> Result<FleetFit, FleetFault> {
         self.check_plan(summary)?;
         let Some(base) = &summary.base else {
+            // The first bad recording is given as an example.
             let why = match summary.bad.as_slice() {
                 [] => "it contains none".to_owned(),
                 [first, ..] => format!(
@@ -267,6 +271,7 @@ fn exclude_dead_sensors(
     drives: &[String],
     sensors: &[SensorFault],
 ) {
+    // Drives with a dead force sensor.
     let is_dead: Vec<bool> = (drives.iter())
         .map(|drive| sensors.iter().any(|one| one.is_force && one.of == *drive))
         .collect();
@@ -275,6 +280,7 @@ fn exclude_dead_sensors(
     }
     for stretch in &mut recording.segments {
         let run = &mut stretch.run;
+        // No sample is left out so far.
         if run.left_out.is_empty() {
             run.left_out = vec![vec![false; run.time.len()]; drives.len()];
         }
@@ -299,6 +305,7 @@ fn sort_by_time(
         // The reader of recordings reports missing columns, and knows the mapping of the plan for time.
         return Ok(columns);
     };
+    // Most recordings are sorted already.
     if time.windows(2).all(|two| two[0] <= two[1]) {
         return Ok(columns);
     }
@@ -309,6 +316,7 @@ fn sort_by_time(
             other.len()
         )));
     }
+    // The sort is stable, so that rows of equal time keep their order.
     let mut order: Vec<usize> = (0..n).collect();
     order.sort_by(|a, b| time[*a].total_cmp(&time[*b]));
     for (_, values) in &mut columns {

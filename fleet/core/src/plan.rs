@@ -76,6 +76,7 @@ impl ReferenceSums {
     /// The compact form of normal equations.
     fn from_moments(sums: &NormalEquations) -> Self {
         let n = sums.rhs.len();
+        // A column that is zero in all rows has a zero on the diagonal.
         let kept: Vec<usize> = (0..n).filter(|k| sums.gram[(*k, *k)] != 0.0).collect();
         let products = (0..kept.len()).map(|i| {
             let a = kept[i];
@@ -126,6 +127,7 @@ impl FleetPlan {
         reading: &RecordingOptions,
         reference: &[&Path],
     ) -> Result<Self, FleetFault> {
+        // The model with its files, so that the plan needs no other file.
         let host = Host::new();
         let derived = host.model(model)?;
         let files = derived.loaded.sources.files.iter();
@@ -136,6 +138,7 @@ impl FleetPlan {
         let mut last = FleetFault::new(
             "there is no reference recording; give one or more of faultless machines",
         );
+        // The first recording that can be read determines the preparation.
         let mut readable = reference.iter().filter_map(|path| {
             let read = derived.recording(path, reading);
             read.map_err(|error| last = error.into()).ok()
@@ -158,6 +161,7 @@ impl FleetPlan {
                 still: Vec::new(),
             },
         };
+        // Read all reference recordings with the fixed preparation.
         let reading = plan.reading();
         let recordings: Vec<PreparedRecording> = reference
             .iter()
@@ -227,6 +231,7 @@ impl FleetPlan {
     ///
     /// Fails if the model has faults, or the reference belongs to another model.
     pub fn derive_model(&self) -> Result<FleetModel, FleetFault> {
+        // The model comes from the plan, not from disk.
         let mut files = PlanFiles {
             memory: MemoryFiles::default(),
             disk: DiskFiles::default(),
@@ -267,6 +272,7 @@ fn fixed_preparation(
         .first()
         .map(|stretch| &stretch.run)
         .ok_or_else(|| FleetFault::new(format!("{} has no samples", chosen.file())))?;
+    // Values that are specified have priority over those of the first recording.
     let (prepared, asked) = (&run.prepared, &reading.preparation);
     let mut cutoff_hz = asked.cutoff_hz.or(prepared.cutoff_hz);
     let mut decimate = prepared.decimate.max(asked.decimate).max(1);

@@ -154,6 +154,7 @@ fn robot_changes(ground: &FleetModel, runs: &[DayRun], known: &[usize]) -> Vec<R
 
 /// The most significant onset of any parameter, if a physical change explains it.
 fn clearest_change(ground: &FleetModel, runs: &[DayRun], within: f64) -> Option<RobotChange> {
+    // Values of a parameter over the days; none where it is not determined.
     let series = |k: usize| -> Vec<Option<UncertainValue>> {
         let told = runs.iter().map(|run| {
             let fitted = run.0[k];
@@ -161,17 +162,20 @@ fn clearest_change(ground: &FleetModel, runs: &[DayRun], within: f64) -> Option<
         });
         told.collect()
     };
+    // The most significant onset of any parameter.
     let parameters = runs.first()?.0.len();
     let onsets = (0..parameters).filter_map(|k| Some((k, clearest_onset(&series(k))?)));
     let (_, found) = onsets.max_by(|a, b| a.1.gain.total_cmp(&b.1.gain))?;
     let sums = |some: &[DayRun]| -> Vec<NormalEquations> {
         some.iter().map(|run| run.1.clone()).collect()
     };
+    // Physical changes that explain the difference between the days before and since.
     let (before, later) = runs.split_at(found.day);
     let changes = ground.common.changes(&sums(before), &sums(later), within);
     if changes.is_empty() {
         return None;
     }
+    // All parameters that differ significantly, by their mean values.
     let mut steps: Vec<ParameterStep> = (0..parameters)
         .filter_map(|parameter| {
             let told = series(parameter);
@@ -208,6 +212,7 @@ fn step_significance(step: &ParameterStep) -> f64 {
 fn dead_sensors(days: &[RobotDay]) -> Vec<DeadSensor> {
     let mut all: Vec<DeadSensor> = Vec::new();
     for (k, day) in days.iter().enumerate() {
+        // A sensor counts once per day.
         let mut seen: Vec<&str> = Vec::new();
         for fault in &day.sensors {
             if seen.contains(&fault.of.as_str()) {
@@ -236,6 +241,7 @@ impl RobotHistory {
 
     /// All results as one JSON object: `values` and `std` of each day are in the order of the parameters.
     pub fn json(&self, ground: &FleetModel) -> Value {
+        // Parameters by day, changes, and dead sensors.
         let infos = ground.parameters();
         let days = self.days.iter().map(|day| {
             json!({

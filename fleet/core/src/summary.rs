@@ -78,6 +78,7 @@ impl FleetSummary {
                  with one plan",
             ));
         }
+        // R factors are merged; if one side has none, the other is used.
         self.base = match (self.base.take(), &other.base) {
             (Some(mine), Some(theirs)) => Some(mine.merge_with(theirs).map_err(FleetFault::new)?),
             (mine, theirs) => mine.or_else(|| theirs.clone()),
@@ -115,6 +116,7 @@ impl FleetSummary {
     /// The summary as bytes, for [`FleetSummary::from_bytes`].
     pub fn bytes(&self) -> Vec<u8> {
         let mut to = SummaryWriter::default();
+        // Version and plan first, so that other summaries are recognised.
         to.bytes(BEGIN);
         to.integer(VERSION);
         to.integer(self.mark);
@@ -167,6 +169,7 @@ impl FleetSummary {
         }
         let mut from = SummaryReader::new(bytes, what)?;
         let _: [u8; 4] = from.array()?;
+        // Another version has other contents.
         let version = from.integer()?;
         if version != VERSION {
             return Err(FleetFault::new(format!(
@@ -184,6 +187,7 @@ impl FleetSummary {
                 "{what} has {columns} columns, more than any model; make it again"
             )));
         }
+        // The same sequence as in `bytes`.
         let whole = from.moments(columns)?;
         let base = match from.integer()? {
             0 => None,

@@ -56,6 +56,7 @@ pub struct FleetAggregate {
 impl FleetAggregate {
     /// The aggregate with a kind of result.
     pub fn new(ground: Arc<Ground>, answer: AggregateKind) -> Self {
+        // Samples are the name of a recording and its columns; summaries are bytes.
         let columns = ground.columns();
         let numbers = vec![DataType::Float64; columns.len()];
         let samples = TypeSignature::Exact([vec![DataType::Utf8], numbers].concat());
@@ -87,12 +88,14 @@ impl FleetAggregate {
 }
 
 impl fmt::Debug for FleetAggregate {
+    /// Shows the name of the function.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.answer.name())
     }
 }
 
 impl PartialEq for FleetAggregate {
+    /// Equal aggregates have the same result and the same plan.
     fn eq(&self, other: &Self) -> bool {
         self.answer == other.answer && self.ground.mark() == other.ground.mark()
     }
@@ -101,6 +104,7 @@ impl PartialEq for FleetAggregate {
 impl Eq for FleetAggregate {}
 
 impl Hash for FleetAggregate {
+    /// Consistent with the comparison.
     fn hash<H: Hasher>(&self, state: &mut H) {
         self.answer.hash(state);
         self.ground.mark().hash(state);
@@ -116,6 +120,7 @@ impl AggregateUDFImpl for FleetAggregate {
         &self.signature
     }
 
+    /// Bytes for summaries, a struct for parameters.
     fn return_type(&self, _: &[DataType]) -> Result<DataType> {
         Ok(match self.answer {
             AggregateKind::Summary | AggregateKind::Merged => DataType::Binary,
@@ -123,6 +128,7 @@ impl AggregateUDFImpl for FleetAggregate {
         })
     }
 
+    /// The state of a group. More than one argument means samples.
     fn accumulator(&self, args: AccumulatorArgs<'_>) -> Result<Box<dyn Accumulator>> {
         if args.is_distinct {
             return exec_err!(
@@ -138,6 +144,7 @@ impl AggregateUDFImpl for FleetAggregate {
         }))
     }
 
+    /// Partitions exchange states as bytes.
     fn state_fields(&self, args: StateFieldsArgs<'_>) -> Result<Vec<FieldRef>> {
         Ok(vec![Arc::new(Field::new(
             format!("{}[state]", args.name),
@@ -163,6 +170,7 @@ struct SummaryAccumulator {
 impl SummaryAccumulator {
     /// Adds a summary; fails if it belongs to another plan.
     fn add(&mut self, bytes: &[u8]) -> Result<()> {
+        // A summary of another plan cannot be added.
         let one = Summary::of_bytes(bytes).map_err(external_error)?;
         self.fleet.ground.check(&one).map_err(external_error)?;
         match &mut self.sum {
@@ -177,6 +185,7 @@ impl SummaryAccumulator {
         let Some(column) = values.first() else {
             return exec_err!("an argument is missing; give a column of summaries");
         };
+        // The engine may have bytes in another type.
         let column = cast(column, &DataType::Binary)?;
         let Some(column) = column.as_any().downcast_ref::<BinaryArray>() else {
             return exec_err!("summaries are bytes; give the result of `modelmill_summarise`");
@@ -198,6 +207,7 @@ impl SummaryAccumulator {
 }
 
 impl Accumulator for SummaryAccumulator {
+    /// Adds rows of the table.
     fn update_batch(&mut self, values: &[ArrayRef]) -> Result<()> {
         if self.of_samples {
             self.samples.add(values)
@@ -206,6 +216,7 @@ impl Accumulator for SummaryAccumulator {
         }
     }
 
+    /// Adds states of other partitions.
     fn merge_batch(&mut self, states: &[ArrayRef]) -> Result<()> {
         Self::for_each_summary(states, |bytes| {
             if self.of_samples {
@@ -216,6 +227,7 @@ impl Accumulator for SummaryAccumulator {
         })
     }
 
+    /// The state as bytes; it is consumed.
     fn state(&mut self) -> Result<Vec<ScalarValue>> {
         let bytes = if self.of_samples {
             Some(self.samples.bytes())
@@ -225,6 +237,7 @@ impl Accumulator for SummaryAccumulator {
         Ok(vec![ScalarValue::Binary(bytes)])
     }
 
+    /// The result of the group.
     fn evaluate(&mut self) -> Result<ScalarValue> {
         let sum = self.finish_sum()?;
         match self.fleet.answer {
@@ -241,6 +254,7 @@ impl Accumulator for SummaryAccumulator {
                     Arc::new(UInt64Array::from(vec![sum.bad.len() as u64])),
                 ];
                 for k in 0..n {
+                    // Value and standard deviation; both are null if not determined.
                     let fitted = fit.as_ref().map(|fit| fit.parameters[k]);
                     columns.push(Arc::new(Float64Array::from(vec![
                         fitted.map(|fitted| fitted.value),
@@ -255,6 +269,7 @@ impl Accumulator for SummaryAccumulator {
         }
     }
 
+    /// Memory of the group, bytes.
     fn size(&self) -> usize {
         let sum = self.sum.as_ref().map_or(0, |sum| 8 * sum.whole.gram.len());
         size_of_val(self) + self.samples.size() + sum

@@ -39,12 +39,14 @@ impl RecordingsFunction {
 }
 
 impl std::fmt::Debug for RecordingsFunction {
+    /// Shows the name of the function.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str("modelmill_recordings")
     }
 }
 
 impl TableFunctionImpl for RecordingsFunction {
+    /// The table of a folder; its files are not listed yet.
     fn call_with_args(&self, args: TableFunctionArgs<'_, '_>) -> Result<Arc<dyn TableProvider>> {
         let [
             Expr::Literal(ScalarValue::Utf8(Some(folder)) | ScalarValue::Utf8View(Some(folder)), _),
@@ -54,6 +56,7 @@ impl TableFunctionImpl for RecordingsFunction {
                 "modelmill_recordings needs one text argument: the folder that contains those of the robots"
             );
         };
+        // A URL has a scheme, a path has none.
         let folder = if folder.contains("://") {
             RecordingsFolder::Stored(ListingTableUrl::parse(folder)?)
         } else {
@@ -87,10 +90,12 @@ impl RecordingsFolder {
                 robots(folder).map_err(external_error)?,
             ),
             Self::Stored(url) => {
+                // All objects below the URL.
                 let store = session.runtime_env().object_store(url)?;
                 let above = url.prefix();
                 let found: Vec<ObjectMeta> = store.list(Some(above)).try_collect().await?;
                 let found = found.into_iter().map(|object| {
+                    // The name of an object is its path below the folder.
                     let below = object.location.prefix_match(above);
                     let parts: Vec<_> = below
                         .into_iter()
@@ -131,6 +136,7 @@ impl RecordingsSource {
     /// The summary of a file. A fault of the recording is part of the summary; a store that does not answer is an
     /// error.
     async fn summary(&self, ground: Arc<Ground>, file: File) -> Result<Summary> {
+        // Objects of a store are read as a whole; files are opened by the library.
         let bytes = match self {
             Self::Disk => None,
             Self::Store(store) => {
@@ -138,6 +144,7 @@ impl RecordingsSource {
                 Some(store.get(&place).await?.bytes().await?)
             }
         };
+        // Computing takes long, so that it must not block the threads of the engine.
         let summed = tokio::task::spawn_blocking(move || match bytes {
             None => ground.summarise_file(&file.name, &file.path),
             Some(bytes) => ground.summarise_bytes(&file.name, bytes.into()),
@@ -159,6 +166,7 @@ struct RecordingsTable {
 }
 
 impl std::fmt::Debug for RecordingsTable {
+    /// Shows the folder.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match &self.folder {
             RecordingsFolder::Path(folder) => write!(f, "recordings below {}", folder.display()),
@@ -173,10 +181,12 @@ impl TableProvider for RecordingsTable {
         self.schema.clone()
     }
 
+    /// It is computed and has no data of its own.
     fn table_type(&self) -> TableType {
         TableType::View
     }
 
+    /// Lists the files and distributes them over partitions.
     async fn scan(
         &self,
         session: &dyn Session,
@@ -226,6 +236,7 @@ struct RecordingsPartition {
 }
 
 impl std::fmt::Debug for RecordingsPartition {
+    /// Shows the number of files.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{} recordings", self.files.len())
     }
@@ -236,6 +247,7 @@ impl PartitionStream for RecordingsPartition {
         &self.schema
     }
 
+    /// One batch with one row per file, read when it is requested.
     fn execute(&self, _: Arc<TaskContext>) -> SendableRecordBatchStream {
         let (ground, schema, source) = (
             self.ground.clone(),

@@ -24,6 +24,7 @@ impl GroupSamples {
                 "samples have no columns; give the recording's name, time, coordinates and forces"
             );
         };
+        // Convert names and numbers to the types that are stored.
         let names = cast(names, &DataType::Utf8)?;
         let Some(names) = names.as_any().downcast_ref::<StringArray>() else {
             return exec_err!(
@@ -42,6 +43,7 @@ impl GroupSamples {
                 })
             })
             .collect::<Result<_>>()?;
+        // Rows without a name are one recording.
         let name = |row: usize| {
             if names.is_null(row) {
                 ""
@@ -62,6 +64,7 @@ impl GroupSamples {
             }
             if let Some(kept) = self.recordings.get_mut(this) {
                 for (kept, column) in kept.iter_mut().zip(&columns) {
+                    // Without null values whole slices can be copied.
                     if column.null_count() == 0 {
                         kept.extend_from_slice(&column.values()[from..to]);
                     } else {
@@ -105,6 +108,7 @@ impl GroupSamples {
         let mut bytes = Vec::with_capacity(self.size() + 64);
         for (name, columns) in std::mem::take(&mut self.recordings) {
             let rows = columns.first().map_or(0, Vec::len);
+            // The lengths, so that the reader knows where each part ends.
             for number in [name.len(), columns.len(), rows] {
                 bytes.extend_from_slice(&(number as u64).to_le_bytes());
             }
@@ -135,6 +139,7 @@ impl GroupSamples {
     fn add_one(&mut self, left: &mut &[u8]) -> Option<()> {
         let mut number =
             || usize::try_from(u64::from_le_bytes(take_bytes(left, 8)?.try_into().ok()?)).ok();
+        // Lengths, then name and columns, as they were written.
         let [length, columns, rows] = [number()?, number()?, number()?];
         let name = std::str::from_utf8(take_bytes(left, length)?)
             .ok()?

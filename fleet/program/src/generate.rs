@@ -208,6 +208,7 @@ pub fn generate(folder: &Path, size: &FleetSize) -> Result<Value, FleetFault> {
     write_text(&folder.join("five_bar.toml"), MODEL)?;
     write_text(&folder.join("model.toml"), FRICTION)?;
     let data = folder.join("recordings");
+    // The motions that all robots share; then the robots with their changes.
     let motions: Vec<FleetMotion> = (0..MOTIONS)
         .into_par_iter()
         .map(|k| motion(size, k))
@@ -221,6 +222,7 @@ pub fn generate(folder: &Path, size: &FleetSize) -> Result<Value, FleetFault> {
         .par_iter()
         .enumerate()
         .try_for_each(|(r, (name, planted))| {
+            // One file for each recording, in folders by robot and day.
             let robot = robot_parameters(size, r);
             for day in 0..size.days {
                 for k in 0..size.per_day {
@@ -238,6 +240,7 @@ pub fn generate(folder: &Path, size: &FleetSize) -> Result<Value, FleetFault> {
             }
             Ok::<_, FleetFault>(())
         })?;
+    // The names of the recordings that were cut off.
     let bad = bad.iter().map(|(r, day, k)| {
         format!(
             "robot={}/day={}/recording={k}/data.parquet",
@@ -284,6 +287,7 @@ fn samples(size: &FleetSize) -> usize {
 
 /// The date of a day, counted from 1 March 2026.
 fn date(day: usize) -> String {
+    // Lengths of the months from March to December.
     let lengths = [31, 30, 31, 30, 31, 31, 30, 31, 30, 31];
     let (mut month, mut left) = (3, day);
     for length in lengths {
@@ -319,6 +323,7 @@ fn motion(size: &FleetSize, k: usize) -> Result<FleetMotion, FleetFault> {
         .map_err(|failure| FleetFault::new(failure.render(false)))?
         .rig;
     let mut noise = GaussianNoise::new(size.seed, 1_000 + k as u64);
+    // Random amplitudes of sine and cosine, scaled so that no deflection exceeds the reach.
     let mut waves = [[[0.0; 2]; HARMONICS]; 2];
     for waves in &mut waves {
         let mut largest = 0.0;
@@ -330,6 +335,7 @@ fn motion(size: &FleetSize, k: usize) -> Result<FleetMotion, FleetFault> {
             *x *= REACH / largest;
         }
     }
+    // Angles, rates and accelerations of the series.
     let state = |t: f64| {
         let mut state = RigState {
             q: MIDDLE.to_vec(),
@@ -358,6 +364,7 @@ fn motion(size: &FleetSize, k: usize) -> Result<FleetMotion, FleetFault> {
             .map(|_| std::array::from_fn(|_| [Vec::new(), Vec::new()]))
             .collect(),
     };
+    // All links without mass; then one number of one link at a time.
     for body in &mut rig.bodies {
         set_link(body, [0.0; 4]);
     }
@@ -421,6 +428,7 @@ fn robot_parameters(size: &FleetSize, r: usize) -> RobotParameters {
     let mut noise = GaussianNoise::new(size.seed, 10_000 + r as u64);
     let mut links = LINKS;
     for link in &mut links {
+        // All numbers of a link vary together, and a little by themselves.
         let heavier = 1.0 + ROBOTS * noise.normal();
         for number in link {
             *number *= heavier * (1.0 + 0.3 * ROBOTS * noise.normal());
@@ -492,13 +500,16 @@ fn write_recording(
 ) -> Result<(), FleetFault> {
     let seed = size.seed
         ^ ((r as u64) << 24 | (day as u64) << 8 | k as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    // A different part of one of the motions for each recording.
     let mut noise = GaussianNoise::new(seed, 3);
     let motion = &motions[random_index(&mut noise, MOTIONS)];
     let n = motion.q[0].len();
     let start = random_index(&mut noise, n);
     let mut links = robot.links;
+    // Friction varies from recording to recording.
     let daily = 1.0 + DAILY * noise.normal();
     let [mut dry, mut viscous] = [robot.dry, robot.viscous].map(|f| f.map(|f| f * daily));
+    // The change of the robot, if it is present on this day.
     let mut dead = None;
     let mut load = 0.0;
     match planted {
@@ -516,6 +527,7 @@ fn write_recording(
         PlantedChange::Odd { mass } => load = *mass,
         _ => {}
     }
+    // The load at the tip of the second link changes ZZ, MX and M.
     links[1][0] += load * TO_TIP * TO_TIP;
     links[1][1] += load * TO_TIP;
     links[1][3] += load;
@@ -535,6 +547,7 @@ fn write_recording(
             sum
         })
         .collect();
+    // Readings of the sensors; the motion is repeated after its period.
     let all = samples(size);
     let time: Vec<f64> = (0..all).map(|i| i as f64 / size.rate).collect();
     let mut positions = [Vec::with_capacity(all), Vec::with_capacity(all)];
@@ -575,6 +588,7 @@ fn write_parquet(
     torques: &[Vec<f32>; 2],
 ) -> Result<(), FleetFault> {
     let fault = |error: &dyn std::fmt::Display| write_fault(path, error);
+    // No column has empty values.
     let column = |name: &str, kind: Physical| {
         Type::primitive_type_builder(name, kind)
             .with_repetition(Repetition::REQUIRED)
@@ -602,6 +616,7 @@ fn write_parquet(
         .set_dictionary_enabled(false)
         .build();
     let file = fs::File::create(path).map_err(|error| fault(&error))?;
+    // One row group, with the columns in the order of the schema.
     let written = (|| {
         let mut writer =
             SerializedFileWriter::new(BufWriter::new(file), schema, Arc::new(properties))?;

@@ -65,6 +65,7 @@ impl FleetResults {
 /// Fails if the folder has no recordings, the model has faults, or results cannot be written.
 pub fn identify(asked: &FleetRequest<'_>) -> Result<String, FleetFault> {
     let begin = Instant::now();
+    // Files by robot, and the folder for stored summaries.
     let robots = folder::robots(asked.recordings)?;
     let states = asked.out.join("state");
     fs::create_dir_all(&states).map_err(|error| {
@@ -85,10 +86,12 @@ pub fn identify(asked: &FleetRequest<'_>) -> Result<String, FleetFault> {
     let looked_at: Vec<RobotHistory> = robots
         .par_iter()
         .map(|(name, files)| {
+            // One robot after the other on each thread, so that few summaries are in memory.
             let days = daily_summaries(&ground, &states, name, files, &kept_ones)?;
             let robot = robot_history(&ground, name, &days)?;
             let before = done.fetch_add(files.len(), Ordering::Relaxed);
             let now = before + files.len();
+            // A line of progress at every twentieth.
             if now * 20 / total != before * 20 / total {
                 eprintln!("{now} of {total} recordings");
             }
@@ -103,6 +106,7 @@ pub fn identify(asked: &FleetRequest<'_>) -> Result<String, FleetFault> {
             summary: robot.before.clone(),
         })
         .collect();
+    // Compare the robots with each other.
     let outliers = outliers(&ground, &ones)?;
     let samples = looked_at.iter().map(|robot| robot.samples).sum();
     let found = FleetResults {
@@ -113,6 +117,7 @@ pub fn identify(asked: &FleetRequest<'_>) -> Result<String, FleetFault> {
         recordings: total,
         samples,
     };
+    // Write the results.
     folder::write_atomic(
         &asked.out.join("results.json"),
         format!("{}\n", json(&found)).as_bytes(),
@@ -120,6 +125,7 @@ pub fn identify(asked: &FleetRequest<'_>) -> Result<String, FleetFault> {
     folder::write_atomic(&asked.out.join("fleet.html"), page::page(&found).as_bytes())?;
     let kept = kept_ones.into_inner();
     let seconds = summed.saturating_sub(planned).as_secs_f64();
+    // Samples per second without the recordings whose summaries were stored.
     let rate = found.samples as f64 * (total - kept) as f64 / total as f64 / seconds.max(1e-9);
     Ok(format!(
         "{}\n{} recordings, {} of which were done before; {:.3e} samples; {seconds:.1} s to summarise them{}; {:.1} s in total; \
@@ -188,6 +194,7 @@ fn plan(asked: &FleetRequest<'_>, robots: &[&[FleetFile]]) -> Result<FleetPlan, 
                 asked.model.display()
             ))
         })?;
+        // A plan belongs to one model; its first file is the model file.
         if plan.files.first().is_none_or(|(_, text)| *text != model) {
             return Err(FleetFault::new(format!(
                 "{} was made with another model than {}, so its summaries cannot be used; choose another folder with `--out`, or \
@@ -196,6 +203,7 @@ fn plan(asked: &FleetRequest<'_>, robots: &[&[FleetFile]]) -> Result<FleetPlan, 
                 asked.model.display()
             )));
         }
+        // Keep the plan with the summaries that are made with it.
         if asked.plan.is_some() {
             folder::write_atomic(&there, text.as_bytes())?;
         }
@@ -221,6 +229,7 @@ fn daily_summaries(
     files: &[FleetFile],
     kept_ones: &AtomicUsize,
 ) -> Result<Vec<(String, FleetSummary)>, FleetFault> {
+    // Summaries of an earlier run.
     let (state, mut kept) = SummaryStore::open(states, name, ground.empty_summary().mark)?;
     let done: Vec<Option<FleetSummary>> = files.iter().map(|file| kept.remove(&file.key)).collect();
     kept_ones.fetch_add(done.iter().flatten().count(), Ordering::Relaxed);
@@ -230,12 +239,14 @@ fn daily_summaries(
         .map(|(file, done)| match done {
             Some(summary) => Ok(summary),
             None => {
+                // A new summary is stored at once, so that an interrupted job loses little.
                 let summary = ground.summarise_file(&file.name, &file.path);
                 state.append(&file.key, &summary)?;
                 Ok(summary)
             }
         })
         .collect::<Result<_, FleetFault>>()?;
+    // Files are sorted by day, so that each day is a sequence of files.
     let mut days: Vec<(String, FleetSummary)> = Vec::new();
     for (file, summary) in files.iter().zip(summaries) {
         match days.last_mut() {

@@ -18,6 +18,7 @@ const MOST_PICTURED: usize = 60;
 pub(crate) fn page(found: &FleetResults) -> String {
     let title = format!("A fleet of {} robots", found.robots.len());
     let mut page = begin_page(&title);
+    // The verdict on top, then one section for each kind of result.
     let is_quiet =
         found.outliers.found.is_empty() && found.robots.iter().all(RobotHistory::is_quiet);
     let class = if is_quiet { "adequate" } else { "missing" };
@@ -60,6 +61,7 @@ fn change_list(changes: &[RunChange]) -> String {
     if changes.is_empty() {
         return "<p>No single physical change explains it.</p>\n".to_owned();
     }
+    // Alternatives that fit the data as well stand below each change.
     let mut html = String::from("<ul>\n");
     for one in changes {
         let _ = write!(html, "<li>{}", escape(&one.says));
@@ -78,6 +80,7 @@ fn change_list(changes: &[RunChange]) -> String {
 
 /// The most significant step of a robot, in standard deviations.
 fn change_clarity(robot: &RobotHistory) -> f64 {
+    // Steps without standard deviations give no finite ratio and do not count.
     let steps = robot.changes.iter().flat_map(|since| &since.steps);
     steps
         .map(|step| {
@@ -98,11 +101,13 @@ fn changed_robots(found: &FleetResults) -> String {
         return "<p>No robot changed permanently.</p>\n".to_owned();
     }
     robots.sort_by(|a, b| change_clarity(b).total_cmp(&change_clarity(a)));
+    // Name, unit and expression of each parameter.
     let infos = found.ground.parameters();
     let mut html = String::new();
     for robot in robots.iter().take(MOST_PICTURED) {
         let _ = writeln!(html, "<h3>{}</h3>", escape(&robot.name));
         for since in &robot.changes {
+            // A change that grows has a rate, a step has none.
             let grows = match (since.per_day, since.steps.first()) {
                 (Some(per_day), Some(step)) => {
                     let info = &infos[step.parameter];
@@ -128,12 +133,14 @@ fn changed_robots(found: &FleetResults) -> String {
             continue;
         };
         let k = step.parameter;
+        // Its value and standard deviation on each day that determines it.
         let known: Vec<(usize, [f64; 2])> = (robot.days.iter().enumerate())
             .filter_map(|(at, day)| {
                 let fitted = day.fit.as_ref()?.parameters[k];
                 Some((at, [fitted.value, fitted.deviation?]))
             })
             .collect();
+        // Its mean values before and since each change.
         let steps: Vec<(usize, [f64; 2])> = (robot.changes.iter())
             .filter_map(|since| {
                 let own = since.steps.iter().find(|step| step.parameter == k)?;
@@ -148,6 +155,7 @@ fn changed_robots(found: &FleetResults) -> String {
             &steps,
         ));
     }
+    // Further robots are listed without pictures.
     if robots.len() > MOST_PICTURED {
         let _ = writeln!(
             html,
@@ -178,6 +186,7 @@ fn outlier_table(found: &FleetResults) -> String {
     }
     let rows: Vec<Vec<TableCell>> = (found.outliers.found.iter())
         .map(|one| {
+            // The largest distance of any parameter.
             let apart = found.outliers.distances[one.robot]
                 .iter()
                 .flatten()
@@ -236,6 +245,7 @@ fn usual_values_table(found: &FleetResults) -> String {
     let infos = found.ground.parameters();
     let rows: Vec<Vec<TableCell>> = (infos.iter().zip(&found.outliers.usual))
         .filter_map(|(info, usual)| {
+            // Parameters without a usual value or spread are left out.
             let usual = (*usual)?;
             let spread = usual.deviation?;
             Some(vec![

@@ -42,11 +42,13 @@ struct ScoreTally {
 pub fn score(found: &Path, truth: &Path) -> Result<String, FleetFault> {
     let results = read(&found.join("results.json"))?;
     let truth = read(truth)?;
+    // Days by name, so that distances between days can be counted.
     let days: Vec<String> = list(&truth["days"]).iter().map(text).collect();
     let place = |day: &Value| {
         days.iter()
             .position(|one| Some(one.as_str()) == day.as_str())
     };
+    // Results by the name of the robot.
     let robots: BTreeMap<String, Value> = list(&results["robots"])
         .into_iter()
         .map(|robot| (text(&robot["robot"]), robot))
@@ -57,6 +59,7 @@ pub fn score(found: &Path, truth: &Path) -> Result<String, FleetFault> {
         .collect();
     let mut tallies: BTreeMap<String, ScoreTally> = BTreeMap::new();
     let (mut sound, mut alarms) = (0_u32, Vec::new());
+    // Compare each robot with what was simulated for it.
     for one in list(&truth["robots"]) {
         let (name, planted) = (text(&one["robot"]), &one["planted"]);
         let Some(robot) = robots.get(&name) else {
@@ -79,6 +82,7 @@ pub fn score(found: &Path, truth: &Path) -> Result<String, FleetFault> {
         };
         let (is_found, in_time, is_named) = match kind.as_str() {
             "none" => {
+                // Any result for an unchanged robot is a false alarm.
                 sound += 1;
                 if !since.is_empty() || !dead.is_empty() || differ.contains_key(&name) {
                     let changes = since
@@ -99,6 +103,7 @@ pub fn score(found: &Path, truth: &Path) -> Result<String, FleetFault> {
                 continue;
             }
             "dead_sensor" => {
+                // The sensor itself must be reported, not only any sensor.
                 let own: Vec<&Value> = dead
                     .iter()
                     .filter(|one| one["sensor"] == planted["at"])
@@ -107,11 +112,13 @@ pub fn score(found: &Path, truth: &Path) -> Result<String, FleetFault> {
                 (!own.is_empty(), near, !own.is_empty())
             }
             "odd" => {
+                // It differs on all days, so that a change on some day would be wrong.
                 let own = differ.get(&name);
                 let is_named = own.is_some_and(|one| has_change(&one["changes"], "payload", None));
                 (own.is_some(), own.is_some() && since.is_empty(), is_named)
             }
             _ => {
+                // Wear and loads begin on a day.
                 let near = since.iter().any(|one| is_near(&one["day"]));
                 let is_named = since.iter().any(|one| match kind.as_str() {
                     "wear" => has_change(&one["changes"], "friction", planted["at"].as_str()),
@@ -120,6 +127,7 @@ pub fn score(found: &Path, truth: &Path) -> Result<String, FleetFault> {
                 (!since.is_empty(), near, is_named)
             }
         };
+        // Count the result, and describe it if anything is wrong.
         tally.planted += 1;
         tally.found += usize::from(is_found);
         tally.in_time += usize::from(is_found && in_time);
@@ -197,6 +205,7 @@ fn bad_recordings_text(results: &Value, truth: &Value) -> String {
     let mut planted: Vec<String> = list(&truth["bad"]).iter().map(text).collect();
     bad.sort();
     planted.sort();
+    // Both lists by name.
     let missed = planted.iter().filter(|one| !bad.contains(one)).count();
     let further = bad.iter().filter(|one| !planted.contains(one)).count();
     format!(

@@ -25,6 +25,7 @@ impl SummaryStore {
         robot: &str,
         mark: u64,
     ) -> Result<(Self, HashMap<String, FleetSummary>), FleetFault> {
+        // A file name that is valid on all systems.
         let name: String = robot
             .chars()
             .map(|c| {
@@ -65,6 +66,7 @@ impl SummaryStore {
             .append(true)
             .open(&path)
             .map_err(fault)?;
+        // Remove the incomplete entry.
         if sound < bytes.len() {
             file.set_len(sound as u64).map_err(fault)?;
         }
@@ -74,6 +76,7 @@ impl SummaryStore {
 
     /// Appends the summary of a recording.
     pub(crate) fn append(&self, key: &str, summary: &FleetSummary) -> Result<(), FleetFault> {
+        // Length and bytes of the key, then of the summary, written together.
         let bytes = summary.bytes();
         let mut entry = Vec::with_capacity(key.len() + bytes.len() + 16);
         for part in [key.as_bytes(), &bytes] {
@@ -97,6 +100,7 @@ impl SummaryStore {
 /// incomplete.
 fn entry(bytes: &[u8], at: usize) -> Option<(String, FleetSummary, usize)> {
     let part = |at: usize| -> Option<(&[u8], usize)> {
+        // A length of eight bytes, then the bytes themselves.
         let length = bytes.get(at..at.checked_add(8)?)?;
         let length = usize::try_from(u64::from_le_bytes(length.try_into().ok()?)).ok()?;
         let end = (at + 8).checked_add(length)?;
