@@ -14,7 +14,7 @@ use super::thresholds::{
     WRAP_TOLERANCE_RAD,
 };
 use crate::motion::{DerivativeSource, PreparedRun};
-use crate::recording::{GAP, RecordingNote, SignalRecording};
+use crate::recording::{GAP_LEAST_STEPS, RecordingNote, SignalRecording};
 use crate::signal::median;
 use crate::words::{backquoted_list, with_digits};
 
@@ -243,7 +243,7 @@ fn compare_rate(time: &[f64], position: &[f64], rate: &[f64]) -> Option<(f64, f6
     let mut start = 0;
     for end in 1..=time.len() {
         // Continue up to a gap or the end.
-        if end < time.len() && time[end] - time[end - 1] <= GAP * usual {
+        if end < time.len() && time[end] - time[end - 1] <= GAP_LEAST_STEPS * usual {
             continue;
         }
         // Trapezoidal rule.

@@ -15,7 +15,7 @@ use crate::motion::prepare::find_motion_series;
 use crate::motion::prepared_as::PreparationRecord;
 use crate::motion::smooth::RecordedCoordinate;
 use crate::recording::{
-    GAP, NoteSeverity, RecordingError, RecordingFault, RecordingNote, SignalRecording,
+    GAP_LEAST_STEPS, NoteSeverity, RecordingError, RecordingFault, RecordingNote, SignalRecording,
     sample_place_word,
 };
 use crate::signal::median;
@@ -156,7 +156,7 @@ impl SignalRecording {
         let breaks = stretches[..stretches.len() - 1].iter();
         let places = breaks.filter_map(|stretch| stretch.line(stretch.samples() - 1));
         let mut says = format!(
-            "{} has {} in time of more than {GAP} usual steps that {} too long for this motion to be bridged, the first after \
+            "{} has {} in time of more than {GAP_LEAST_STEPS} usual steps that {} too long for this motion to be bridged, the first after \
              line {}: the {} segments are filtered and differentiated separately.",
             self.file(),
             count_of(stretches.len() - 1, "gap", "gaps"),
