@@ -8,23 +8,19 @@ use crate::motion::mean_rate;
 use modelmill_boundary::message;
 use modelmill_boundary::text::{OptionName, Remedy};
 
+use super::thresholds::{
+    CLOCK_AGREEING_OF_THREE, CLOCK_AGREEMENT_SHARE, CLOCK_RATIOS, CLOCK_SQUARED_CORRELATION,
+    MIN_CLOCK_ERROR, REPEATED_CHANCE_FACTOR, REPEATED_FEWEST_POSITIONS, REPEATED_FEWEST_SAMPLES,
+    REPEATED_LEAST_SHARE,
+};
 use crate::recording::{RecordingNote, SignalRecording};
 use crate::signal::median;
 use crate::words::{backquoted_list, with_digits};
 
-/// Least relative clock error; a smaller one may be the scale of a sensor, or its noise.
-const MIN_CLOCK_ERROR: f64 = 0.005;
-/// Two thirds of the coordinates must show at least this share of the clock error. If the clock drifts, coordinates
-/// that move at different times show different errors.
-const AGREEMENT_SHARE: f64 = 0.4;
-/// Ratios outside of this range are unit errors, which are reported elsewhere.
-const CLOCKS: std::ops::Range<f64> = 0.9..1.1;
 /// Largest number of pieces of the recording over which rates are integrated.
 const PIECES: usize = 400;
 /// Least number of samples of a piece.
 const SHORTEST: usize = 8;
-/// Share of repeated samples from which on they are reported.
-const REPEATED: f64 = 0.02;
 
 impl SignalRecording {
     /// Warnings about the times of samples. `coordinates` are the names of the positions; rates have the suffix `_d`.
@@ -58,14 +54,14 @@ impl SignalRecording {
         // The median over the coordinates is not affected by a single wrong sensor.
         let middle = median(ratios.values().copied().collect());
         let off = middle - 1.0;
-        if ratios.is_empty() || !CLOCKS.contains(&middle) || off.abs() < MIN_CLOCK_ERROR {
+        if ratios.is_empty() || !CLOCK_RATIOS.contains(&middle) || off.abs() < MIN_CLOCK_ERROR {
             return None;
         }
         // Coordinates that show a clock error of the same sign and of similar size.
         let agree = ratios
             .values()
-            .filter(|ratio| (*ratio - 1.0) * off.signum() > AGREEMENT_SHARE * off.abs());
-        if 3 * agree.count() < 2 * ratios.len() {
+            .filter(|ratio| (*ratio - 1.0) * off.signum() > CLOCK_AGREEMENT_SHARE * off.abs());
+        if 3 * agree.count() < CLOCK_AGREEING_OF_THREE * ratios.len() {
             return None;
         }
         let names: Vec<String> = ratios.keys().cloned().collect();
@@ -99,7 +95,7 @@ impl SignalRecording {
             .collect();
         let n = time.len();
         // A single position may repeat by chance, and so may few samples.
-        if positions.len() < 2 || n < 100 {
+        if positions.len() < REPEATED_FEWEST_POSITIONS || n < REPEATED_FEWEST_SAMPLES {
             return None;
         }
         // Bitwise equality: any noise of a new measurement would change the value.
@@ -123,7 +119,7 @@ impl SignalRecording {
             .product();
         // Report only if repetitions are clearly more frequent than by chance.
         let part = all as f64 / n as f64;
-        (part > REPEATED + 3.0 * by_chance).then(|| {
+        (part > REPEATED_LEAST_SHARE + REPEATED_CHANCE_FACTOR * by_chance).then(|| {
             RecordingNote::warning(message!(
                 "In {all} of {n} samples of {} all positions are equal to those of the sample before, while the mechanism \
                  moves. Samples were written twice, or read later than their times state. This disturbs derivatives of \
@@ -168,7 +164,7 @@ fn change_by_integral(time: &[f64], q: &[f64], qd: &[f64]) -> Option<f64> {
         qq += q * q;
     }
     // If the rate does not explain the position, the clock is not the reason.
-    let is_explained = qi * qi > 0.95 * qq * ii;
+    let is_explained = qi * qi > CLOCK_SQUARED_CORRELATION * qq * ii;
     if ii <= 0.0 || !is_explained {
         return None;
     }

@@ -8,20 +8,15 @@ use std::f64::consts::PI;
 use modelmill_boundary::message;
 use modelmill_boundary::text::{Message, OptionName, OptionSetting, Remedy};
 
+use super::thresholds::{
+    LONGEST_STEP_S, RATE_FEWEST_SAMPLES, RATE_MOST_MISFIT, RATE_MOST_NOISE, RATE_RATIO_TOLERANCE,
+    SAME_RATIO_TOLERANCE, SHORTEST_STEP_S, WRAP_LEAST_STEPS, WRAP_TOLERANCE_DEG,
+    WRAP_TOLERANCE_RAD,
+};
 use crate::motion::{DerivativeSource, PreparedRun};
-use crate::recording::{GAP, RecordingNote, SignalRecording};
+use crate::recording::{GAP_LEAST_STEPS, RecordingNote, SignalRecording};
 use crate::signal::median;
 use crate::words::{backquoted_list, with_digits};
-
-/// Largest relative deviation from 1 of the ratio of a rate to the derivative of its position; drift and coarse
-/// sampling cause a few per cent.
-const RATIO_TOLERANCE: f64 = 0.1;
-/// Largest share of a rate's integral that the position may leave unexplained, as a ratio of rms values.
-const MISFIT: f64 = 0.3;
-/// Steps from this on are too long for a recording of forces, s.
-const SLOWEST: f64 = 0.5;
-/// Steps up to this are too short for a recording of forces, s.
-const FASTEST: f64 = 2e-6;
 
 impl PreparedRun {
     /// Warnings about measured forces that are 0 in every sample; parameters of 0 would explain them exactly.
@@ -73,7 +68,7 @@ impl SignalRecording {
         // Unit of the time: unless the rates show that it is right.
         let step = median(time.windows(2).map(|w| w[1] - w[0]).collect());
         // One sample has no steps.
-        if time.len() > 1 && step <= FASTEST {
+        if time.len() > 1 && step <= SHORTEST_STEP_S {
             notes.push(RecordingNote::warning(format!(
                 "`t` in {} has steps of {} s, which is too short for a recording of forces. Check its unit: times must \
                  be in s.",
@@ -81,7 +76,7 @@ impl SignalRecording {
                 with_digits(step, 3)
             )));
         }
-        if step >= SLOWEST && rates.is_empty() && !settled {
+        if step >= LONGEST_STEP_S && rates.is_empty() && !settled {
             notes.push(RecordingNote::warning(message!(
                 "`t` in {} has steps of {} s, which is too long for a recording of forces. Times must be in s; if they \
                  are in ms, convert them ({}).",
@@ -115,7 +110,7 @@ impl SignalRecording {
             let beside = self.column("t").ok().zip(self.column(&of).ok());
             let compared = beside.and_then(|(time, of)| compare_rate(time, of, values));
             let is_rad = compared.is_some_and(|(ratio, misfit)| {
-                misfit < MISFIT && (ratio * 180.0 / PI - 1.0).abs() < RATIO_TOLERANCE
+                misfit < RATE_MOST_MISFIT && (ratio * 180.0 / PI - 1.0).abs() < RATE_RATIO_TOLERANCE
             });
             if is_rad {
                 break;
@@ -132,10 +127,12 @@ impl SignalRecording {
         // A jump is about a full turn and far larger than a usual step.
         let usual = median(steps.iter().map(|step| step.abs()).collect());
         for (turn, slack, name_of_turn, besides) in [
-            (2.0 * PI, 0.5, "2 pi", ""),
-            (360.0, 20.0, "360", " and in degrees"),
+            (2.0 * PI, WRAP_TOLERANCE_RAD, "2 pi", ""),
+            (360.0, WRAP_TOLERANCE_DEG, "360", " and in degrees"),
         ] {
-            let jumps = |step: &f64| (step.abs() - turn).abs() < slack && step.abs() > 10.0 * usual;
+            let jumps = |step: &f64| {
+                (step.abs() - turn).abs() < slack && step.abs() > WRAP_LEAST_STEPS * usual
+            };
             let Some(first) = steps.iter().position(jumps) else {
                 continue;
             };
@@ -181,19 +178,20 @@ impl SignalRecording {
                     continue;
                 };
                 // The column is the derivative.
-                if misfit < MISFIT && (ratio - 1.0).abs() < RATIO_TOLERANCE {
+                if misfit < RATE_MOST_MISFIT && (ratio - 1.0).abs() < RATE_RATIO_TOLERANCE {
                     settled = true;
                     continue;
                 }
                 // A ratio has an explanation only if the rate is a multiple of the derivative.
-                let why = if misfit < MISFIT {
+                let why = if misfit < RATE_MOST_MISFIT {
                     explain_ratio(ratio, *is_angle)
                 } else {
                     Message::new()
                 };
                 // Columns with the same explanation and ratio share one warning.
                 match found.iter_mut().find(|(other, .., r)| {
-                    *other == why && (why.is_empty() || (r / ratio - 1.0).abs() < 0.05)
+                    *other == why
+                        && (why.is_empty() || (r / ratio - 1.0).abs() < SAME_RATIO_TOLERANCE)
                 }) {
                     Some((_, ofs, rates, _)) => {
                         ofs.push(of);
@@ -245,7 +243,7 @@ fn compare_rate(time: &[f64], position: &[f64], rate: &[f64]) -> Option<(f64, f6
     let mut start = 0;
     for end in 1..=time.len() {
         // Continue up to a gap or the end.
-        if end < time.len() && time[end] - time[end - 1] <= GAP * usual {
+        if end < time.len() && time[end] - time[end - 1] <= GAP_LEAST_STEPS * usual {
             continue;
         }
         // Trapezoidal rule.
@@ -270,7 +268,7 @@ fn compare_rate(time: &[f64], position: &[f64], rate: &[f64]) -> Option<(f64, f6
     // A coordinate at standstill away from zero differs from its mean by rounding, which is no motion.
     let rounding = (1e-12 * largest).powi(2) * time.len() as f64;
     // A signal that changes as much between samples as in total is noise, or sampled too coarsely.
-    if time.len() < 16 || qq <= rounding || steps > 0.5 * qq {
+    if time.len() < RATE_FEWEST_SAMPLES || qq <= rounding || steps > RATE_MOST_NOISE * qq {
         return None;
     }
     // The rate is zero, although the position moves.
@@ -287,7 +285,7 @@ fn compare_rate(time: &[f64], position: &[f64], rate: &[f64]) -> Option<(f64, f6
 fn explain_ratio(ratio: f64, is_angle: bool) -> Message {
     let degree = 180.0 / PI;
     // Whether the ratio is near a value, with either sign.
-    let is = |value: f64| (ratio.abs() / value - 1.0).abs() < RATIO_TOLERANCE;
+    let is = |value: f64| (ratio.abs() / value - 1.0).abs() < RATE_RATIO_TOLERANCE;
     let why = if is(1.0) {
         Message::new()
     } else if is(degree) && is_angle {

@@ -15,11 +15,10 @@ use nalgebra::{DMatrix, DVector};
 
 use super::by_channel::ChannelRegressor;
 use super::robust::{RobustFit, robust_fit, solve_normal};
+use super::thresholds::{DELAY_RESOLUTION_STEPS, DELAY_STUDENT_FACTOR, FAR_SHIFT_MIN_IMPROVEMENT};
 
 /// Number of blocks of time, which are left out one by one.
 const BLOCKS: usize = 20;
-/// Student's factor for 99 % with one degree of freedom less than there are blocks.
-const STUDENT: f64 = 2.861;
 /// Number of shifts that are tried on either side before the best is refined.
 const COARSE: usize = 40;
 /// Largest number of Gauss-Newton rounds; a remaining delay below this share of a step does not change the shift.
@@ -27,10 +26,6 @@ const ROUNDS: usize = 8;
 const WHOLE_STEP_TOLERANCE: f64 = 0.6;
 /// Largest change of a delay in one round, in steps.
 const MAX_ROUND_STEPS: f64 = 5.0;
-/// A shift far from zero must lower the cost by this much.
-const MIN_IMPROVEMENT: f64 = 0.05;
-/// Least uncertainty of a delay, in steps.
-const DELAY_RESOLUTION: f64 = 0.05;
 
 /// Input of the estimate: the model along a recording and its measured forces.
 #[derive(Debug, Clone)]
@@ -108,7 +103,7 @@ impl ForceDelays {
             let mut fits = (starts.iter()).filter_map(|start| audit.refine_delays(start, groups));
             let near = fits.next()?;
             let far = fits.min_by(|a, b| a.cost.total_cmp(&b.cost));
-            let is_better = |far: &DelayFit| far.cost < near.cost - MIN_IMPROVEMENT;
+            let is_better = |far: &DelayFit| far.cost < near.cost - FAR_SHIFT_MIN_IMPROVEMENT;
             Some(match far {
                 Some(far) if is_better(&far) => far,
                 _ => near,
@@ -277,7 +272,7 @@ impl DelayAudit<'_> {
                 let widths = Self::half_widths(&columns, &fit, &forces, delays)?;
                 let of = |c: usize| DelayEstimate {
                     seconds: shifts[c] + further[c],
-                    half_width: widths[c % delays].hypot(DELAY_RESOLUTION * step),
+                    half_width: widths[c % delays].hypot(DELAY_RESOLUTION_STEPS * step),
                 };
                 let found = (0..channels).map(of).collect();
                 return Some(self.evaluate_fit(&fit, &forces, &counts, found));
@@ -362,7 +357,7 @@ impl DelayAudit<'_> {
                 .iter()
                 .map(|values| (values[k] - mean).powi(2))
                 .sum();
-            STUDENT * ((count - 1.0) / count * sum).sqrt()
+            DELAY_STUDENT_FACTOR * ((count - 1.0) / count * sum).sqrt()
         };
         Some((0..last).map(of).collect())
     }

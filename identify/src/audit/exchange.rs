@@ -8,6 +8,7 @@ use nalgebra::{Cholesky, DVector, Dyn};
 
 use super::by_channel::ChannelRegressor;
 use super::robust::factor_normal;
+use super::thresholds::WIRING_ROWS_PER_COLUMN;
 
 /// A factorised regressor, which gives the error of the best fit to any forces.
 #[derive(Debug, Clone)]
@@ -33,7 +34,7 @@ impl ForceAudit {
     /// Factorises a regressor; `None` if it has fewer rows than twice its columns, or a number that is not finite.
     pub fn new(regressor: ChannelRegressor) -> Option<Self> {
         let rows = regressor.samples() * regressor.channels();
-        if rows == 0 || rows < 2 * regressor.columns() {
+        if rows == 0 || rows < WIRING_ROWS_PER_COLUMN * regressor.columns() {
             return None;
         }
         // All rows have equal weight; the forces are not needed for the factor.

@@ -9,6 +9,7 @@ mod exchange;
 mod positions;
 mod robust;
 mod signals;
+mod thresholds;
 
 pub use by_channel::ChannelRegressor;
 pub use delay::{DelayAudit, DelayEstimate, ForceDelays};

@@ -4,29 +4,19 @@
 //! If time stamps are wrong, the position errors are the time error times the rate, with the same time error for all
 //! coordinates. With backlash, the position jumps each time the load changes sides, by one length to and fro.
 
+use super::thresholds::{
+    BACKLASH_ALIKE_OF_FIVE, BACKLASH_ALTERNATING_OF_FIVE, BACKLASH_ENCODER_STEPS,
+    BACKLASH_FEWEST_JUMPS, BACKLASH_JUMP_SIGMAS, BACKLASH_SIZE_TOLERANCE, BACKLASH_TRAVEL_SHARE,
+    FAST_RATE_SHARE, JITTER_FEWEST_SAMPLES, JITTER_MIN_AGREEMENT, JITTER_MIN_ERROR_GROWTH,
+    POSITION_FAULT_NEIGHBOURHOODS, SLOW_RATE_SHARE,
+};
 use crate::recording::SignalRecording;
 use crate::signal::median;
 
 /// Number of neighbours on either side of a sample.
 const SIDE: usize = 5;
-/// Shares of the largest rate below which a coordinate is slow, and above which it is fast.
-const SLOW: f64 = 0.1;
-const FAST: f64 = 0.4;
-/// Least ratio of the errors at fast motion to those at slow motion.
-const MIN_ERROR_GROWTH: f64 = 3.0;
-/// Least correlation of the time errors of two coordinates.
-const MIN_AGREEMENT: f64 = 0.7;
 /// Number of samples on either side of a jump that are used to estimate it.
 const JUMP_NEIGHBOURS: usize = 10;
-/// Least number of jumps for backlash, and least size of each, in robust standard deviations.
-const JUMPS: usize = 3;
-const MIN_JUMP_DEVIATIONS: f64 = 8.0;
-/// Least size of jumps in encoder steps: the steps themselves are no backlash.
-const STEPS: f64 = 8.0;
-/// Least size of jumps as a share of the travel.
-const MIN_TRAVEL_SHARE: f64 = 5e-5;
-/// Largest relative difference of a jump from the median.
-const SPREAD: f64 = 0.35;
 /// Largest number of samples that are used, from the start.
 const MAX_SAMPLES: usize = 20_000;
 
@@ -55,7 +45,7 @@ impl SignalRecording {
             return Vec::new();
         };
         let n = time.len().min(MAX_SAMPLES);
-        if n < 20 * JUMP_NEIGHBOURS {
+        if n < POSITION_FAULT_NEIGHBOURHOODS * JUMP_NEIGHBOURS {
             return Vec::new();
         }
         let time = &time[..n];
@@ -155,14 +145,17 @@ fn timing_jitter(all: &[CubicResidual]) -> Option<f64> {
             let sizes = pairs.clone().filter(|(_, v)| wanted(v.abs() / fastest));
             median(sizes.map(|(e, _)| e.abs()).collect())
         };
-        let [slow, fast] = [size(&|v| v < SLOW), size(&|v| v > FAST)];
-        if fastest <= 0.0 || fast <= MIN_ERROR_GROWTH * slow {
+        let [slow, fast] = [
+            size(&|v| v < SLOW_RATE_SHARE),
+            size(&|v| v > FAST_RATE_SHARE),
+        ];
+        if fastest <= 0.0 || fast <= JITTER_MIN_ERROR_GROWTH * slow {
             return None;
         }
         // Time error at each fast sample: position error over rate.
         told.push(
             pairs
-                .map(|(e, v)| (v.abs() > FAST * fastest).then(|| e / v))
+                .map(|(e, v)| (v.abs() > FAST_RATE_SHARE * fastest).then(|| e / v))
                 .collect(),
         );
     }
@@ -177,7 +170,8 @@ fn timing_jitter(all: &[CubicResidual]) -> Option<f64> {
             let sum = |of: &dyn Fn(&(f64, f64)) -> f64| both.iter().map(of).sum::<f64>();
             // Correlation of the time errors at samples where both coordinates are fast.
             let alike = sum(&|(a, b)| a * b) / (sum(&|(a, _)| a * a) * sum(&|(_, b)| b * b)).sqrt();
-            if both.len() < 30 || alike.is_nan() || alike < MIN_AGREEMENT {
+            if both.len() < JITTER_FEWEST_SAMPLES || alike.is_nan() || alike < JITTER_MIN_AGREEMENT
+            {
                 return None;
             }
             times.extend(both.iter().map(|(a, _)| a * a));
@@ -204,7 +198,7 @@ fn backlash_width(time: &[f64], q: &[f64]) -> Option<f64> {
         let near = i.saturating_sub(JUMP_NEIGHBOURS)..(i + JUMP_NEIGHBOURS + 1).min(jumps.len());
         // Only the largest jump of a neighbourhood counts.
         let is_largest = jumps[near].iter().all(|x| x.abs() <= own.abs());
-        if is_largest && own.abs() > MIN_JUMP_DEVIATIONS * noise {
+        if is_largest && own.abs() > BACKLASH_JUMP_SIGMAS * noise {
             found.push(*own);
         }
     }
@@ -212,19 +206,21 @@ fn backlash_width(time: &[f64], q: &[f64]) -> Option<f64> {
     let middle = median(found.iter().map(|x| x.abs()).collect());
     let low = q.iter().copied().fold(f64::INFINITY, f64::min);
     let travel = q.iter().copied().fold(f64::NEG_INFINITY, f64::max) - low;
-    if middle < STEPS * encoder_resolution(q) || middle < MIN_TRAVEL_SHARE * travel {
+    if middle < BACKLASH_ENCODER_STEPS * encoder_resolution(q)
+        || middle < BACKLASH_TRAVEL_SHARE * travel
+    {
         return None;
     }
-    let is_alike = |x: &&f64| (x.abs() - middle).abs() < SPREAD * middle;
+    let is_alike = |x: &&f64| (x.abs() - middle).abs() < BACKLASH_SIZE_TOLERANCE * middle;
     // Neighbouring jumps in opposite directions.
     let alternate = found
         .windows(2)
         .filter(|pair| pair[0] * pair[1] < 0.0)
         .count();
     // Four of five jumps must have the same size, and four of five must change the sign.
-    let is_play = found.len() >= JUMPS
-        && 5 * found.iter().filter(is_alike).count() >= 4 * found.len()
-        && 5 * alternate >= 4 * (found.len() - 1);
+    let is_play = found.len() >= BACKLASH_FEWEST_JUMPS
+        && 5 * found.iter().filter(is_alike).count() >= BACKLASH_ALIKE_OF_FIVE * found.len()
+        && 5 * alternate >= BACKLASH_ALTERNATING_OF_FIVE * (found.len() - 1);
     is_play.then_some(middle)
 }
 

@@ -8,10 +8,10 @@
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::by_channel::ChannelRegressor;
+use super::thresholds::AUDIT_HUBER_BOUND_SIGMAS;
 use crate::signal::median;
 
-/// Huber's bound in standard deviations, and the number of times rows are reweighted.
-const BOUND: f64 = 1.345;
+/// Number of times rows are reweighted.
 const ROUNDS: usize = 5;
 /// Residuals below this share of the largest force are rounding.
 const ROUNDING: f64 = 1e-9;
@@ -59,7 +59,8 @@ pub fn robust_fit(
             let scale = scale.max(ROUNDING * largest);
             for i in counted() {
                 // Huber's weight: 1 within the bound, bound / |residual| beyond.
-                let within = (BOUND * scale / rest[i].abs().max(scale * 1e-9)).min(1.0);
+                let within =
+                    (AUDIT_HUBER_BOUND_SIGMAS * scale / rest[i].abs().max(scale * 1e-9)).min(1.0);
                 weights[i] = within / (scale * scale);
             }
         }

@@ -6,25 +6,15 @@ use std::f64::consts::PI;
 use modelmill_boundary::message;
 use modelmill_boundary::text::{OptionName, Remedy};
 
+use super::thresholds::{
+    BEYOND_LIMIT_ONE_IN, EXACT_LIMIT_SHORTEST_RUN, FEWEST_AT_LIMIT, LARGE_ANGLE_RAD,
+    LIMIT_BAND_MOST_SHARE, LIMIT_BAND_SIGMAS, LIMIT_BAND_WIDTHS, LIMIT_CROWDING,
+    NOISY_LIMIT_FEWEST_SAMPLES, NOISY_LIMIT_ONE_IN, PLATEAU_STEEPNESS, SLOW_UPDATE_FEWEST_CHANGES,
+    SLOW_UPDATE_SHARE,
+};
 use crate::recording::{RecordingNote, SignalRecording, sample_place_word};
 use crate::signal::white_noise;
 use crate::words::{count_of, seven_digits, with_digits};
-
-/// Angles beyond this value, rad, are probably in degrees: two turns to each side.
-const LARGE_ANGLE: f64 = 4.0 * PI;
-/// Least number of samples at a limit for a saturated force.
-const FEWEST_AT_LIMIT: usize = 8;
-/// There must also be this many times more samples than at the next value. The crest of a wave has 2.4 times as many
-/// samples at its last step as at the one before.
-const CROWDED: usize = 3;
-
-/// Half width of the band around a limit, in standard deviations of white noise.
-const SPREAD: f64 = 5.0;
-/// Least product of slope and length of a plateau, relative to the width of the band; 8 for the top of a parabola.
-const STEEP: f64 = 30.0;
-
-/// Largest half width of the band, relative to the limit.
-const SHARP: f64 = 0.01;
 
 impl SignalRecording {
     /// Warnings about single signals. `coordinates` are `(name, whether it is an angle)`; columns that cannot be used
@@ -66,7 +56,7 @@ impl SignalRecording {
         let changes: Vec<usize> = (1..values.len())
             .filter(|i| values[*i].total_cmp(&values[i - 1]).is_ne())
             .collect();
-        if changes.len() < 20 {
+        if changes.len() < SLOW_UPDATE_FEWEST_CHANGES {
             return None;
         }
         // Distances between changes: at least nine of ten must be equal and above one sample.
@@ -76,7 +66,7 @@ impl SignalRecording {
         let usual = gaps[n / 2];
         // Most distances are equal if the signal is updated at a fixed rate.
         let share = gaps.iter().filter(|gap| **gap == usual).count() as f64 / n as f64;
-        (usual > 1 && share > 0.9).then(|| {
+        (usual > 1 && share > SLOW_UPDATE_SHARE).then(|| {
             RecordingNote::warning(message!(
                 "`{name}` in {} changes only every {usual} samples: each value is repeated, so the signal was recorded at \
                  a lower rate than the file. Rates computed from such steps are wrong. Keep one sample of each value, or \
@@ -95,7 +85,7 @@ impl SignalRecording {
             value if value < 1e7 => format!("{value:.1}"),
             value => seven_digits(value),
         };
-        (largest > LARGE_ANGLE).then(|| {
+        (largest > LARGE_ANGLE_RAD).then(|| {
             RecordingNote::warning(message!(
                 "`{name}` in {} reaches {}, which is {} turns in rad. Angles must be in rad; if it is in degrees, \
                  use {}.",
@@ -116,7 +106,7 @@ impl SignalRecording {
         positions: &[&[f64]],
     ) -> Option<RecordingNote> {
         let n = force.len();
-        if n < 20 * FEWEST_AT_LIMIT {
+        if n < NOISY_LIMIT_FEWEST_SAMPLES {
             return None;
         }
         let mut found: Vec<(f64, usize, usize)> = Vec::new();
@@ -124,13 +114,13 @@ impl SignalRecording {
         for is_high in [true, false] {
             let (level, spread) = crowded_level(force, is_high)?;
             // Friction causes plateaus too, but they are less sharp.
-            if spread > SHARP * level.abs() {
+            if spread > LIMIT_BAND_MOST_SHARE * level.abs() {
                 continue;
             }
             // Only noise lies beyond a limit.
             let sign = if is_high { 1.0 } else { -1.0 };
             let beyond = force.iter().filter(|f| sign * (*f - level) > spread);
-            if beyond.count() > n / 1000 {
+            if beyond.count() > n / BEYOND_LIMIT_ONE_IN {
                 continue;
             }
             // Whether a sample lies within the band around the level.
@@ -161,7 +151,7 @@ impl SignalRecording {
                 let is_moving = positions.iter().any(moves);
                 if is_moving
                     && length >= FEWEST_AT_LIMIT
-                    && steepest * length as f64 > STEEP * spread
+                    && steepest * length as f64 > PLATEAU_STEEPNESS * spread
                 {
                     count += length;
                     first.get_or_insert(start);
@@ -228,7 +218,7 @@ impl SignalRecording {
             let (at_next, _) = count_at_value(force, next, positions);
             if let Some(first) = first
                 && count >= FEWEST_AT_LIMIT
-                && count > CROWDED * at_next
+                && count > LIMIT_CROWDING * at_next
             {
                 found.push((limit, count, first));
             }
@@ -268,7 +258,7 @@ fn count_at_value(force: &[f64], value: f64, positions: &[&[f64]]) -> (usize, Op
         }
         // Something must move during the run of equal values.
         let moves = |q: &&[f64]| i > start && q[start].total_cmp(&q[i - 1]).is_ne();
-        if i - start >= 3 && positions.iter().any(moves) {
+        if i - start >= EXACT_LIMIT_SHORTEST_RUN && positions.iter().any(moves) {
             count += i - start;
             first.get_or_insert(start);
         }
@@ -288,7 +278,7 @@ fn crowded_level(force: &[f64], is_high: bool) -> Option<(f64, f64)> {
     }
     let n = sorted.len();
     // The narrowest interval with this many samples, within the outer third of the values.
-    let few = (n / 100).max(FEWEST_AT_LIMIT);
+    let few = (n / NOISY_LIMIT_ONE_IN).max(FEWEST_AT_LIMIT);
     // Only the outer third of the values can be at a limit.
     let upper = &sorted[n - n / 3..];
     let crowd = (0..upper.len().checked_sub(few)?).min_by(|a, b| {
@@ -297,7 +287,8 @@ fn crowded_level(force: &[f64], is_high: bool) -> Option<(f64, f64)> {
     })?;
     let width = (upper[crowd + few] - upper[crowd]).abs();
     let level = upper[crowd + few / 2];
-    Some((level, (SPREAD * white_noise(force)).max(2.0 * width)))
+    let spread = (LIMIT_BAND_SIGMAS * white_noise(force)).max(LIMIT_BAND_WIDTHS * width);
+    Some((level, spread))
 }
 
 /// A recorded number as it is in the file; with seven digits if it is very large.

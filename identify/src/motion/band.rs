@@ -2,14 +2,10 @@
 
 use crate::motion::derivatives::mean_rate;
 use crate::motion::even::{is_even, resample_evenly};
+use crate::motion::thresholds::{
+    BAND_FEWEST_PERIODS, BAND_HIGHEST_SHARE, FORCE_BAND_FACTOR, MOTION_POWER_SHARE,
+};
 use crate::signal::hann_power;
-
-/// Share of the power of a position below the highest frequency of its motion. Positions decide and not rates,
-/// because noise of a clock or an encoder is a large part of rates.
-const PART: f64 = 0.999;
-/// Ratio of the band of forces to that of positions: forces contain accelerations, products of rates, and reversals
-/// of friction.
-const FORCE_BAND_FACTOR: f64 = 20.0;
 
 /// Highest frequency at which forces follow a motion, Hz; at most a fifth of the sampling rate. `None` if nothing
 /// moves.
@@ -29,15 +25,15 @@ pub(crate) fn motion_band<'a>(
         let mut sum = 0.0;
         let within = power.iter().position(|one| {
             sum += one;
-            sum > PART * total
+            sum > MOTION_POWER_SHARE * total
         })?;
         (total > 0.0).then(|| 0.5 * rate * within.max(1) as f64 / (power.len() - 1) as f64)
     });
     // The coordinate with the highest frequency decides; the result has limits from the length and the rate of the
     // recording.
     let reach = reach.fold(0.0, f64::max);
-    let highest = 0.2 * rate;
-    let lowest = (4.0 * rate / time.len() as f64).min(highest);
+    let highest = BAND_HIGHEST_SHARE * rate;
+    let lowest = (BAND_FEWEST_PERIODS * rate / time.len() as f64).min(highest);
     (reach > 0.0).then(|| (FORCE_BAND_FACTOR * reach).clamp(lowest, highest))
 }
 

@@ -7,17 +7,14 @@
 
 use std::f64::consts::{LN_10, PI, TAU};
 
+use crate::motion::thresholds::{
+    CUTOFF_ERROR_RATIO, CUTOFF_FEWEST_PERIODS, CUTOFF_FEWEST_SAMPLES, CUTOFF_HIGHEST_SHARE,
+    CUTOFF_NEGLIGIBLE_SQUARE, MOTION_NOISE_RATIO, TRIM_ONE_IN, TRIMMED_PERIODS,
+};
 use crate::signal::{float_to_count, hann_power, median};
 
-/// A band of the spectrum contains motion if its power exceeds the noise by this factor. In the narrowest bands noise
-/// exceeds it about once in a thousand.
-const ABOVE_NOISE: f64 = 4.0;
 /// Relative width of a band.
 const BAND: f64 = 0.15;
-/// Dropped samples at each end in periods of the cut-off; the transients fall to 0.1 % there.
-pub(crate) const TRIMMED_PERIODS: f64 = 3.0;
-/// At most this fraction of the samples is dropped at each end: one in six.
-pub(crate) const LONGEST_TRIM: f64 = 6.0;
 /// Number of cut-offs that are tried.
 const STEPS: u32 = 128;
 
@@ -50,7 +47,7 @@ pub(crate) fn choose_cutoff(
     order: usize,
 ) -> Option<f64> {
     let samples = signals.first()?.values.len();
-    if samples < 32 || !(rate_hz > 0.0 && rate_hz.is_finite()) {
+    if samples < CUTOFF_FEWEST_SAMPLES || !(rate_hz > 0.0 && rate_hz.is_finite()) {
         return None;
     }
     let spectra: Vec<AccelerationSpectrum> = signals
@@ -63,8 +60,8 @@ pub(crate) fn choose_cutoff(
         return None;
     }
     // Cut-offs in geometric steps, each with the sum of the squared relative errors of all signals.
-    let lowest = 4.0 * rate_hz / samples as f64;
-    let highest = 0.2 * rate_hz;
+    let lowest = CUTOFF_FEWEST_PERIODS * rate_hz / samples as f64;
+    let highest = CUTOFF_HIGHEST_SHARE * rate_hz;
     let costs: Vec<(f64, f64)> = (0..=STEPS)
         .map(|i| lowest * (highest / lowest).powf(f64::from(i) / f64::from(STEPS)))
         .map(|cutoff| {
@@ -82,7 +79,8 @@ pub(crate) fn choose_cutoff(
         .iter()
         .map(|(_, cost)| *cost)
         .fold(f64::INFINITY, f64::min);
-    let bearable = (1.25_f64.powi(2) * smallest).max(1e-7 * spectra.len() as f64);
+    let bearable = (CUTOFF_ERROR_RATIO.powi(2) * smallest)
+        .max(CUTOFF_NEGLIGIBLE_SQUARE * spectra.len() as f64);
     costs
         .into_iter()
         .filter(|(_, cost)| *cost <= bearable)
@@ -95,7 +93,7 @@ pub(crate) fn choose_cutoff(
 /// and the transient falls tenfold in each period.
 fn transient_error(cutoff: f64, samples: usize) -> f64 {
     let periods = cutoff * samples as f64;
-    let dropped = (periods / LONGEST_TRIM).min(TRIMMED_PERIODS);
+    let dropped = (periods / TRIM_ONE_IN).min(TRIMMED_PERIODS);
     10.0_f64.powf(-2.0 * dropped) / (LN_10 * (periods - 2.0 * dropped))
 }
 
@@ -148,7 +146,7 @@ impl AccelerationSpectrum {
             let width = float_to_count(BAND * start as f64).max(narrowest);
             let end = (start + width).min(bins);
             let band: f64 = (start..end).map(|k| power[k] / shape(k)).sum();
-            if band > ABOVE_NOISE * noise * (end - start) as f64 {
+            if band > MOTION_NOISE_RATIO * noise * (end - start) as f64 {
                 for k in start..end {
                     // The gain of differences of neighbours at this frequency.
                     let half = 0.5 * angle(k);

@@ -5,10 +5,9 @@
 //! times has an error of fourth order in the step, far below that of a filter. Source: C. de Boor, "A Practical Guide
 //! to Splines" (1978), chapter IV, with second derivatives of zero at the ends.
 
-/// Times that differ from an even grid by less than this share of a step count as even.
-const OFF_GRID: f64 = 1e-4;
-/// Most decimals that times may be rounded to.
-const MOST_DECIMALS: i32 = 9;
+use crate::motion::thresholds::{
+    EVEN_TIMES_TOLERANCE, ROUNDED_MOST_DECIMALS, ROUNDED_TIMES_TOLERANCE,
+};
 
 /// How the times of samples are spaced.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -31,7 +30,7 @@ pub(crate) fn sample_spacing(time: &[f64]) -> SampleSpacing {
     let step = (grid[n - 1] - grid[0]) / (n - 1) as f64;
     // The largest difference from the even grid decides.
     let off = (time.iter().zip(&grid)).fold(0.0_f64, |most, (t, even)| most.max((t - even).abs()));
-    if off <= OFF_GRID * step {
+    if off <= EVEN_TIMES_TOLERANCE * step {
         SampleSpacing::Even
     } else if off <= timestamp_resolution(time) {
         SampleSpacing::Rounded
@@ -45,7 +44,7 @@ pub(crate) fn is_even(time: &[f64]) -> bool {
     sample_spacing(time) != SampleSpacing::Uneven
 }
 
-/// Half a unit of the last decimal of the times; 0 if they have more than [`MOST_DECIMALS`].
+/// Half a unit of the last decimal of the times; 0 if they have more than [`ROUNDED_MOST_DECIMALS`].
 fn timestamp_resolution(time: &[f64]) -> f64 {
     let has = |decimals: i32| {
         let scale = 10.0_f64.powi(decimals);
@@ -53,10 +52,12 @@ fn timestamp_resolution(time: &[f64]) -> f64 {
             |t: &f64| (t * scale - (t * scale).round()).abs() < 1e-9 * (t * scale).abs().max(1.0);
         time.iter().all(is_whole)
     };
-    (0..=MOST_DECIMALS)
+    (0..=ROUNDED_MOST_DECIMALS)
         .find(|decimals| has(*decimals))
         // The line through rounded times has a small error itself.
-        .map_or(0.0, |decimals| 0.55 * 10.0_f64.powi(-decimals))
+        .map_or(0.0, |decimals| {
+            ROUNDED_TIMES_TOLERANCE * 10.0_f64.powi(-decimals)
+        })
 }
 
 /// As many even times as there are samples, on the least squares line through their times.

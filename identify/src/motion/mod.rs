@@ -20,6 +20,7 @@ mod remarks;
 mod run;
 mod series;
 mod smooth;
+mod thresholds;
 
 pub use decimation::{
     DECIMATION_PASSBAND, decimate, decimate_columns, decimate_table, decimate_time,

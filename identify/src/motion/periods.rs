@@ -7,15 +7,14 @@
 use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 
+use crate::motion::thresholds::{
+    FORCE_JUMP_INTERIOR, FORCE_JUMP_RATIO, PERIOD_FEWEST_SAMPLES, PERIOD_LEFT_DIFFERENCE,
+    PERIOD_MOST_DIFFERENCE, PERIOD_RETURNED_DIFFERENCE, PHASE_MOST_STEPS,
+};
 use crate::signal::{float_to_count, median};
 
 /// Points of the coarse search for a period.
 const GRID: usize = 2048;
-/// Largest difference of two motions one period apart, as a share of the variance of the motion.
-const SAME: f64 = 2e-3;
-
-/// A step of a force above this multiple of the median step is a jump.
-const JUMP: f64 = 8.0;
 
 /// How well a periodic run repeats.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -39,7 +38,7 @@ pub(crate) fn find_period(time: &[f64], positions: &[&[f64]]) -> Option<f64> {
         .map(|q| (*q, variance(q)))
         .filter(|(q, variance)| *variance > 0.0 && !is_noise(q, *variance))
         .collect();
-    if moving.is_empty() || time.len() < 16 {
+    if moving.is_empty() || time.len() < PERIOD_FEWEST_SAMPLES {
         return None;
     }
     let (start, end) = (time[0], time[time.len() - 1]);
@@ -51,7 +50,7 @@ pub(crate) fn find_period(time: &[f64], positions: &[&[f64]]) -> Option<f64> {
     loop {
         let found = coarse_period(&time[..samples], &moving)
             .map(|(period, step)| refine_period(time, &moving, period, step))
-            .filter(|(period, apart)| *apart < SAME && *period <= longest);
+            .filter(|(period, apart)| *apart < PERIOD_MOST_DIFFERENCE && *period <= longest);
         if let Some((period, _)) = found {
             return Some(period);
         }
@@ -98,9 +97,10 @@ fn coarse_period(time: &[f64], moving: &[(&[f64], f64)]) -> Option<(f64, f64)> {
     // Two lags more than half of the run, so that a minimum at half of the run can be recognised.
     let far: Vec<f64> = (0..=m / 2 + 2).map(apart).collect();
     // The motion must leave its start before it can return.
-    let left = far.iter().position(|d| *d > 0.3)?;
-    let candidate = (left + 1..far.len() - 1)
-        .find(|i| far[*i] < 0.1 && far[*i] <= far[i - 1] && far[*i] <= far[i + 1])?;
+    let left = far.iter().position(|d| *d > PERIOD_LEFT_DIFFERENCE)?;
+    let candidate = (left + 1..far.len() - 1).find(|i| {
+        far[*i] < PERIOD_RETURNED_DIFFERENCE && far[*i] <= far[i - 1] && far[*i] <= far[i + 1]
+    })?;
     Some((step * candidate as f64, step))
 }
 
@@ -150,7 +150,7 @@ pub(crate) fn measure_repeatability(
     for phase in 0..phases {
         let all = (0..periods).map(|k| {
             let t = start + period * (k as f64 + phase as f64 / phases as f64);
-            bracketing_sample(time, t, 1.5 * step)
+            bracketing_sample(time, t, PHASE_MOST_STEPS * step)
         });
         places.extend(all.collect::<Option<Vec<_>>>());
     }
@@ -160,7 +160,8 @@ pub(crate) fn measure_repeatability(
         // At a reversal of friction a force between two samples is not known.
         let usual = median(force.windows(2).map(|w| (w[1] - w[0]).abs()).collect());
         let jumps = |(i, part): &(usize, f64)| {
-            (0.02..0.98).contains(part) && (force[i + 1] - force[*i]).abs() > JUMP * usual
+            FORCE_JUMP_INTERIOR.contains(part)
+                && (force[i + 1] - force[*i]).abs() > FORCE_JUMP_RATIO * usual
         };
         let mut values = 0;
         for place in places.iter().filter(|place| !place.iter().any(jumps)) {

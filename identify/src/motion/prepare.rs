@@ -1,7 +1,7 @@
 //! Selects the smoothing that fits a recording, and prepares states with it: columns go in, positions with both
 //! derivatives come out.
 
-use crate::motion::cutoff::{DifferentiatedSignal, LONGEST_TRIM, TRIMMED_PERIODS, choose_cutoff};
+use crate::motion::cutoff::{DifferentiatedSignal, choose_cutoff};
 use crate::motion::derivatives::mean_rate;
 use crate::motion::even::{is_even, resample_evenly};
 use crate::motion::options::{SmoothingMethod, StatePreparation};
@@ -9,6 +9,10 @@ use crate::motion::prepared_as::PreparationRecord;
 use crate::motion::run::PreparedRun;
 use crate::motion::series::{self, PeriodicSeries};
 use crate::motion::smooth::{RecordedCoordinate, SmoothingFilter};
+use crate::motion::thresholds::{
+    CUTOFF_WITHOUT_MOTION_SHARE, PERIOD_LONGEST_DURATIONS, PERIOD_SHORTEST_STEPS,
+    PLANNED_MOST_HARMONICS, TRIM_ONE_IN, TRIMMED_PERIODS,
+};
 use crate::motion::{local_polynomials, periods};
 use crate::recording::{RecordingError, RecordingFault, RecordingNote, SignalRecording};
 use crate::signal::{LowPass, float_to_count};
@@ -71,7 +75,10 @@ impl SignalRecording {
         let chosen = || choose_cutoff_for(time, &incomplete, order);
         let cutoff = match &found {
             Some(found) => found.harmonics as f64 / found.period,
-            None => preparation.cutoff_hz.or_else(chosen).unwrap_or(0.1 * rate),
+            None => preparation
+                .cutoff_hz
+                .or_else(chosen)
+                .unwrap_or(CUTOFF_WITHOUT_MOTION_SHARE * rate),
         };
         design(cutoff)?;
         // With a cut-off period longer than the recording only a trend would remain.
@@ -101,7 +108,10 @@ impl SignalRecording {
                 let period = period.or_else(|| periods::find_period(time, &positions));
                 let period = period.ok_or_else(|| self.fault(RecordingFault::NoPeriod))?;
                 let duration = time[time.len() - 1] - time[0];
-                let (shortest, longest) = (4.0 / rate, 1.5 * duration);
+                let (shortest, longest) = (
+                    PERIOD_SHORTEST_STEPS / rate,
+                    PERIOD_LONGEST_DURATIONS * duration,
+                );
                 if !(shortest..longest).contains(&period) {
                     return Err(self.fault(RecordingFault::Period {
                         period,
@@ -184,7 +194,7 @@ impl SignalRecording {
         preparation: &StatePreparation,
         notes: &mut Vec<RecordingNote>,
     ) -> (usize, usize) {
-        let most = float_to_count(samples as f64 / LONGEST_TRIM);
+        let most = float_to_count(samples as f64 / TRIM_ONE_IN);
         let spoilt = (1..most).find(|count| *count as f64 >= TRIMMED_PERIODS * period);
         if spoilt.is_none() && preparation.trim.is_none() {
             notes.push(RecordingNote::warning(format!(
@@ -221,9 +231,6 @@ fn choose_cutoff_for(
         .collect();
     choose_cutoff(&even, rate, order)
 }
-
-/// A series with more harmonics is not a planned motion, but fits any motion; the forces must decide then.
-const MANY_HARMONICS: f64 = 25.5;
 
 /// The open choices in the preparation of a recording.
 #[derive(Debug, Clone, PartialEq)]
@@ -270,7 +277,7 @@ impl SignalRecording {
                 let harmonics = prepared
                     .period
                     .map_or(f64::INFINITY, |period| cutoff * period);
-                harmonics > MANY_HARMONICS
+                harmonics > PLANNED_MOST_HARMONICS
             });
             Some((mean_rate(&run.time), prepared.band_hz?, cutoff?))
         });

@@ -12,16 +12,12 @@ use crate::motion::periods;
 use crate::motion::run::PreparedRun;
 use crate::motion::series::PeriodicSeries;
 use crate::motion::smooth::RecordedCoordinate;
+use crate::motion::thresholds::{
+    ENCODER_EQUAL_ONE_IN, ENCODER_NOISE_SHARE, ENCODER_ON_GRID_SHARE, ENCODER_STEP_TOLERANCE,
+    MAX_SERIES_RESIDUAL, STANDSTILL_ONE_IN, STANDSTILL_RATE_SHARE,
+};
 use crate::recording::{RecordingNote, SignalRecording};
 use crate::words::{backquoted_list, count_of, seven_digits, with_digits};
-
-/// If the residual of a requested series exceeds this share of a motion, the series does not fit.
-const MAX_SERIES_RESIDUAL: f64 = 1e-2;
-
-/// Encoder steps are reported if their noise exceeds this share of the accelerations.
-const COARSE: f64 = 0.005;
-/// Positions are quantised if this share of their steps are integer multiples of one step.
-const ON_GRID: f64 = 0.99;
 
 /// The step of an encoder. `None` unless neighbouring positions are often equal and all others differ by integer
 /// multiples.
@@ -31,7 +27,7 @@ fn encoder_step(q: &[f64]) -> Option<f64> {
     let is_same = |step: &&f64| **step <= 1e-9 * largest;
     let same = steps.iter().filter(is_same).count();
     // Without equal neighbours the signal is not quantised visibly.
-    if 10 * same < steps.len() {
+    if ENCODER_EQUAL_ONE_IN * same < steps.len() {
         return None;
     }
     // The smallest difference is the step.
@@ -42,10 +38,10 @@ fn encoder_step(q: &[f64]) -> Option<f64> {
         .reduce(f64::min)?;
     let is_whole = |size: &&f64| {
         let multiple = **size / step;
-        (multiple - multiple.round()).abs() < 0.02
+        (multiple - multiple.round()).abs() < ENCODER_STEP_TOLERANCE
     };
     let whole = steps.iter().filter(is_whole).count();
-    (whole as f64 >= ON_GRID * steps.len() as f64).then_some(step)
+    (whole as f64 >= ENCODER_ON_GRID_SHARE * steps.len() as f64).then_some(step)
 }
 
 impl SignalRecording {
@@ -147,7 +143,7 @@ impl SignalRecording {
             let noise =
                 step / 12.0_f64.sqrt() * (2.0 / rate * TAU.powi(4) * cutoff.powi(5) / 5.0).sqrt();
             let size = (qdd.iter().map(|a| a * a).sum::<f64>() / qdd.len() as f64).sqrt();
-            if noise > COARSE * size && size > 0.0 {
+            if noise > ENCODER_NOISE_SHARE * size && size > 0.0 {
                 found.push(format!(
                     "`{}` of {} ({:.1} %)",
                     column.name,
@@ -188,10 +184,10 @@ impl SignalRecording {
             let fastest = qd.iter().map(|rate| rate.abs()).fold(0.0, f64::max);
             let slow = qd
                 .iter()
-                .filter(|rate| rate.abs() <= 0.01 * fastest)
+                .filter(|rate| rate.abs() <= STANDSTILL_RATE_SHARE * fastest)
                 .count();
             // A motion that reverses sometimes is slow for one or two percent of its time.
-            if fastest > 0.0 && 10 * slow > qd.len() {
+            if fastest > 0.0 && STANDSTILL_ONE_IN * slow > qd.len() {
                 resting.push(format!("`{name}` for {} %", 100 * slow / qd.len()));
             }
         }

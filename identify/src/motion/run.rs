@@ -14,19 +14,16 @@ use crate::motion::periods::RunRepeatability;
 use crate::motion::prepare::find_motion_series;
 use crate::motion::prepared_as::PreparationRecord;
 use crate::motion::smooth::RecordedCoordinate;
+use crate::motion::thresholds::{
+    BRIDGED_GAP_PART, JITTER_LONG_STEPS_PER_SHORT, JITTER_ONE_IN, JITTER_STEP_MARGIN,
+    MISSING_SAMPLE_STEP, SHORT_STEP,
+};
 use crate::recording::{
-    GAP, NoteSeverity, RecordingError, RecordingFault, RecordingNote, SignalRecording,
+    GAP_LEAST_STEPS, NoteSeverity, RecordingError, RecordingFault, RecordingNote, SignalRecording,
     sample_place_word,
 };
 use crate::signal::median;
 use crate::words::{backquoted_list, count_of};
-
-/// Gaps up to this part of a period of the highest frequency of the forces are interpolated by the spline.
-const BRIDGED_GAP_PART: f64 = 0.5;
-/// A step above this multiple of the median lacks samples.
-const MISSING_SAMPLE_STEP: f64 = 1.5;
-/// Times jitter if more than one step in this many is below half of the median.
-const JITTERS: usize = 100;
 
 /// States along a run, ready for the regressor. All columns have the length of `time`.
 #[derive(Debug, Clone, PartialEq)]
@@ -156,7 +153,7 @@ impl SignalRecording {
         let breaks = stretches[..stretches.len() - 1].iter();
         let places = breaks.filter_map(|stretch| stretch.line(stretch.samples() - 1));
         let mut says = format!(
-            "{} has {} in time of more than {GAP} usual steps that {} too long for this motion to be bridged, the first after \
+            "{} has {} in time of more than {GAP_LEAST_STEPS} usual steps that {} too long for this motion to be bridged, the first after \
              line {}: the {} segments are filtered and differentiated separately.",
             self.file(),
             count_of(stretches.len() - 1, "gap", "gaps"),
@@ -336,11 +333,12 @@ impl SignalRecording {
         // With jitter there are as many short steps as long ones, and no step is longer than the shortest one
         // suggests.
         let many = |is: &dyn Fn(f64) -> bool| steps.iter().filter(|step| is(**step)).count();
-        let short = many(&|step| step < 0.5 * median);
-        let jitters = 2 * short > many(&|step| step > MISSING_SAMPLE_STEP * median)
-            && JITTERS * short > steps.len();
+        let short = many(&|step| step < SHORT_STEP * median);
+        let jitters = JITTER_LONG_STEPS_PER_SHORT * short
+            > many(&|step| step > MISSING_SAMPLE_STEP * median)
+            && JITTER_ONE_IN * short > steps.len();
         let longer = if jitters {
-            (1.05 * (2.0 * median - shortest)).max(MISSING_SAMPLE_STEP * median)
+            (JITTER_STEP_MARGIN * (2.0 * median - shortest)).max(MISSING_SAMPLE_STEP * median)
         } else {
             MISSING_SAMPLE_STEP * median
         };

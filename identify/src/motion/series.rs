@@ -14,10 +14,12 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use crate::motion::derivatives::SmoothedCoordinate;
 use crate::motion::periods::find_period;
+use crate::motion::thresholds::{
+    MIN_LINE_POWER_RATIO, SERIES_CLOSED_STEPS, SERIES_FEWEST_SAMPLES, SERIES_HIGHEST_SHARE,
+    SERIES_MOST_HARMONICS, SERIES_SAMPLES_PER_COLUMN, WHITE_MEAN_SIGMAS,
+};
 use crate::signal::{float_to_count, hann_power};
 
-/// Most harmonics of a motion.
-const MOST_HARMONICS: usize = 100;
 /// Longer runs are not tried as a single period, because that takes long and such slow motions do not occur.
 const LONGEST_ALONE: usize = 1 << 18;
 /// Number of samples at the start of a long run in which harmonics are counted first.
@@ -26,9 +28,6 @@ const BEGINNING: usize = 1 << 16;
 const LANES: usize = 8;
 /// The iteration of the period ends when it changes by less than this part of a step.
 const CONVERGENCE_TOLERANCE: f64 = 1e-7;
-/// A line is significant if its power exceeds the mean of the noise by this factor; noise does so once in three
-/// million.
-const MIN_LINE_POWER_RATIO: f64 = 15.0;
 
 /// A periodic motion and the noise in its samples.
 #[derive(Debug, Clone, PartialEq)]
@@ -58,7 +57,8 @@ impl<'a> FourierBasis<'a> {
     /// distinguish them.
     fn new(time: &'a [f64], period: f64, harmonics: usize) -> Option<Self> {
         let columns = 2 * harmonics + 1;
-        if time.len() < 2 * columns || !(period > 0.0 && period.is_finite()) {
+        if time.len() < SERIES_SAMPLES_PER_COLUMN * columns || !(period > 0.0 && period.is_finite())
+        {
             return None;
         }
         // Products of sines and cosines are sums of those of up to twice as many harmonics. So all entries of the
@@ -242,7 +242,7 @@ pub(crate) fn find_series(time: &[f64], signals: &[&[f64]]) -> Option<PeriodicSe
         .copied()
         .filter(|values| values.iter().any(|v| v.total_cmp(&values[0]).is_ne()))
         .collect();
-    if moving.is_empty() || time.len() < 64 {
+    if moving.is_empty() || time.len() < SERIES_FEWEST_SAMPLES {
         return None;
     }
     let duration = time[time.len() - 1] - time[0];
@@ -280,7 +280,7 @@ fn is_closed(values: &[f64]) -> bool {
         .windows(2)
         .map(|w| (w[1] - w[0]).abs())
         .fold(0.0, f64::max);
-    (values[values.len() - 1] - values[0]).abs() <= 3.0 * largest
+    (values[values.len() - 1] - values[0]).abs() <= SERIES_CLOSED_STEPS * largest
 }
 
 /// The period near the given one, and the number of significant harmonics; `None` if their residual is not noise.
@@ -294,7 +294,7 @@ fn refine_series(
 ) -> Option<(f64, usize)> {
     let n = time.len();
     let step = (time[n - 1] - time[0]) / (n - 1) as f64;
-    let most = float_to_count(0.2 * period / step).min(MOST_HARMONICS);
+    let most = float_to_count(SERIES_HIGHEST_SHARE * period / step).min(SERIES_MOST_HARMONICS);
     if most == 0 {
         return None;
     }
@@ -378,7 +378,7 @@ fn white_variance(residual: &[f64], step: f64, up_to: f64) -> Option<f64> {
     let mean = lower.iter().sum::<f64>() / lower.len() as f64;
     // Padding and window correlate neighbouring bins; this is the number of independent ones.
     let independent = lower.len() as f64 * residual.len() as f64 / (3 * bins) as f64;
-    let is_flat = mean <= level * (1.0 + 5.0 / independent.sqrt().max(1.0));
+    let is_flat = mean <= level * (1.0 + WHITE_MEAN_SIGMAS / independent.sqrt().max(1.0));
     let stands_out = lower.iter().any(|p| *p > MIN_LINE_POWER_RATIO * level);
     let variance = residual.iter().map(|r| r * r).sum::<f64>() / residual.len() as f64;
     (is_flat && !stands_out && variance > 0.0).then_some(variance)

@@ -4,6 +4,7 @@
 use crate::motion::cutoff::DifferentiatedSignal;
 use crate::motion::derivatives::{SmoothedCoordinate, filter_and_differentiate};
 use crate::motion::even::{CubicSpline, SampleSpacing, even_times, sample_spacing, spread_times};
+use crate::motion::thresholds::SERIES_SAMPLES_PER_COLUMN;
 use crate::motion::{local_polynomials, series};
 use crate::words::{count_of, seven_digits};
 
@@ -168,7 +169,7 @@ impl SmoothingFilter {
         match self {
             Self::Butterworth { order } => 3 * (order + 1) + 1,
             Self::Polynomials { half_width } => 2 * half_width + 1,
-            Self::Series { harmonics, .. } => 2 * (2 * harmonics + 1),
+            Self::Series { harmonics, .. } => SERIES_SAMPLES_PER_COLUMN * (2 * harmonics + 1),
         }
     }
 }

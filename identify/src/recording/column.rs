@@ -3,16 +3,13 @@
 //! Readers of all formats push fields; a column with defects is refused only when it is used.
 
 use crate::recording::error::RecordingFault;
+use crate::recording::thresholds::LARGEST_NUMBER;
 use crate::words::nearest_name;
-
-/// Larger values count as not finite. No measured quantity in SI units is near this, and squares of smaller values
-/// cannot overflow.
-pub(crate) const LARGEST: f64 = 1e100;
 
 /// One field of a sample, whatever the format of the file.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum SampleField {
-    /// A finite number of at most [`LARGEST`].
+    /// A finite number of at most [`LARGEST_NUMBER`].
     Number(f64),
     /// NaN, infinite, empty or too large.
     NotFinite,
@@ -24,7 +21,7 @@ impl SampleField {
     /// A number, unless it is NaN, infinite or too large.
     pub(crate) fn finite(value: f64) -> Self {
         // The comparison is false for NaN.
-        if value.abs() <= LARGEST {
+        if value.abs() <= LARGEST_NUMBER {
             Self::Number(value)
         } else {
             Self::NotFinite

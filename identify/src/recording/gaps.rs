@@ -1,10 +1,8 @@
 //! Gaps in time: a recording goes in, the segments between its gaps come out.
 
 use crate::recording::SignalRecording;
+use crate::recording::thresholds::GAP_LEAST_STEPS;
 use crate::signal::median;
-
-/// Steps of time above this multiple of the median step are gaps. No filter is applied across a gap.
-pub(crate) const GAP: f64 = 5.0;
 
 impl SignalRecording {
     /// Splits the recording at its gaps in time that are also longer than `bridged`, s. Each segment keeps the lines
@@ -17,10 +15,9 @@ impl SignalRecording {
         let usual = median(time.windows(2).map(|w| w[1] - w[0]).collect());
         // Sample indices at which segments start, with both ends of the recording.
         let mut edges = vec![0];
-        edges.extend(
-            (1..time.len())
-                .filter(|i| time[*i] - time[*i - 1] > (GAP * usual).max(bridged) && usual > 0.0),
-        );
+        edges.extend((1..time.len()).filter(|i| {
+            time[*i] - time[*i - 1] > (GAP_LEAST_STEPS * usual).max(bridged) && usual > 0.0
+        }));
         edges.push(time.len());
         if edges.len() == 2 {
             return vec![self.clone()];

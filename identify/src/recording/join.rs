@@ -8,8 +8,8 @@
 //! would be too small.
 
 use crate::recording::error::RecordingFault;
-use crate::recording::gaps::GAP;
 use crate::recording::notes::RecordingNote;
+use crate::recording::thresholds::{EQUALLY_SLOW_SHARE, GAP_LEAST_STEPS};
 use crate::signal::median;
 use crate::words::{backquoted_list, count_of};
 
@@ -54,7 +54,7 @@ pub(crate) fn join_parts(
     let slowest = steps.iter().copied().fold(0.0, f64::max);
     // Among equally slow parts the one with the most columns is the base; among these the first.
     let base = (0..parts.len())
-        .filter(|i| steps[*i] >= 0.99 * slowest)
+        .filter(|i| steps[*i] >= EQUALLY_SLOW_SHARE * slowest)
         .rev()
         .max_by_key(|i| parts[*i].columns.len())
         .unwrap_or(0);
@@ -75,7 +75,7 @@ pub(crate) fn join_parts(
         let around: Vec<Option<(usize, f64)>> = base
             .time
             .iter()
-            .map(|t| find_sample(*t, &part.time, GAP * step.max(base_step)))
+            .map(|t| find_sample(*t, &part.time, GAP_LEAST_STEPS * step.max(base_step)))
             .collect();
         for (covered, around) in is_covered.iter_mut().zip(&around) {
             *covered &= around.is_some();

@@ -17,6 +17,7 @@ mod read;
 mod repair;
 mod table;
 mod tables;
+mod thresholds;
 mod together;
 
 use indexmap::IndexMap;
@@ -31,7 +32,7 @@ pub use tables::{ColumnInfo, TableInfo};
 pub use together::RecordingFiles;
 
 use column::{ColumnDefect, SignalColumn, missing_column_fault};
-pub(crate) use gaps::GAP;
+pub(crate) use thresholds::GAP_LEAST_STEPS;
 
 /// A recording in memory: columns of equal length by name, in the order of the file.
 #[derive(Debug, Clone, PartialEq)]

@@ -4,26 +4,17 @@
 
 use crate::recording::column::SignalColumn;
 use crate::recording::read::sample_place_word;
+use crate::recording::thresholds::{
+    JUMP_FEWEST_NEIGHBOURS, JUMP_GAP_STEPS, JUMP_LONGEST_STEP, JUMPS_LEAST_ALLOWED,
+    JUMPS_MOST_SHARE, MIN_JUMP_RATIO, REPAIR_NEIGHBOURHOODS, SPIKE_MOST_SAMPLES,
+    SPIKE_NOISE_SIGMAS, SPIKE_RANGE_SHARE, SPIKES_MOST_SHARE, TURN_TOLERANCE, ZERO_SHIFT_SHARE,
+};
 use crate::recording::{RecordingNote, SignalRecording};
 use crate::signal::{median, white_noise};
 use crate::words::{count_of, with_digits};
 
-/// A spike differs from its neighbours by at least this multiple of the noise.
-const ABOVE_NOISE: f64 = 20.0;
-/// A spike also differs by at least this share of the range of the force. Reversals of friction stay below it.
-const MIN_RANGE_SHARE: f64 = 0.5;
-/// Most consecutive samples of a spike; a longer event may be a contact.
-const LONGEST: usize = 3;
 /// Samples on each side that a value is compared with.
 const NEIGHBOURS: usize = 5;
-/// A jump is at least this multiple of the deviation of any other step from its neighbours.
-const MIN_JUMP_RATIO: f64 = 8.0;
-/// Most jumps of a position, as a share of its samples. A more frequent deviation is a property of the sensor.
-const RARE: f64 = 0.002;
-/// A step of time above this multiple of the median separates rates, because the motion has changed in the meantime.
-const GAP: f64 = 3.5;
-/// Least number of neighbours on each side of a rate next to a gap.
-const FEWEST: usize = 2;
 
 impl SignalRecording {
     /// Replaces missing values of forces, if `is_lacking_allowed`, and values of failed sensors by interpolation.
@@ -163,7 +154,7 @@ impl SignalRecording {
                 with_digits(largest.unwrap_or(0.0), 3),
                 self.lines[jumps[0].0],
                 if jumps.len() == 1 { "it is" } else { "they are" },
-                if off.abs() > 0.5 * largest.unwrap_or(0.0).abs() {
+                if off.abs() > ZERO_SHIFT_SHARE * largest.unwrap_or(0.0).abs() {
                     "; only the zero position of the machine shows which of the two is true"
                 } else {
                     ""
@@ -209,7 +200,7 @@ impl SignalColumn {
 fn find_spikes(force: &[f64], is_made: &dyn Fn(usize) -> bool) -> Option<(Vec<bool>, f64)> {
     let n = force.len();
     // Short recordings have too few samples for a noise estimate.
-    if n < 8 * NEIGHBOURS {
+    if n < REPAIR_NEIGHBOURHOODS * NEIGHBOURS {
         return None;
     }
     // Deviation of each sample from the median of its neighbours.
@@ -222,7 +213,7 @@ fn find_spikes(force: &[f64], is_made: &dyn Fn(usize) -> bool) -> Option<(Vec<bo
     let mut sorted = force.to_vec();
     sorted.sort_unstable_by(f64::total_cmp);
     let range = sorted[n - 1 - n / 100] - sorted[n / 100];
-    let bound = (ABOVE_NOISE * noise.max(white_noise(force))).max(MIN_RANGE_SHARE * range);
+    let bound = (SPIKE_NOISE_SIGMAS * noise.max(white_noise(force))).max(SPIKE_RANGE_SHARE * range);
     // A spike must exceed the bound relative to all its neighbours, and relative to each side.
     let mut spikes: Vec<bool> = (0..n)
         .map(|i| bound > 0.0 && off[i].abs() > bound && excess_over_neighbours(force, i) > bound)
@@ -231,13 +222,13 @@ fn find_spikes(force: &[f64], is_made: &dyn Fn(usize) -> bool) -> Option<(Vec<bo
     let mut i = 0;
     while i < n {
         let end = (i..n).find(|k| !spikes[*k]).unwrap_or(n);
-        if end - i > LONGEST {
+        if end - i > SPIKE_MOST_SAMPLES {
             spikes[i..end].fill(false);
         }
         i = end.max(i + 1);
     }
     // A frequent deviation is a property of the signal and not a fault.
-    if spikes.iter().filter(|spike| **spike).count() as f64 > 0.01 * n as f64 {
+    if spikes.iter().filter(|spike| **spike).count() as f64 > SPIKES_MOST_SHARE * n as f64 {
         return None;
     }
     // Spikes that the mechanism may cause are kept.
@@ -292,7 +283,7 @@ fn rate_neighbours(gaps: &[usize], k: usize, n: usize) -> Option<(usize, usize)>
         .map_or(NEIGHBOURS, |at| k - gaps[at] - 1);
     let behind = gaps.get(next).map_or(NEIGHBOURS, |gap| gap - k - 1);
     let reach = before.min(behind).min(NEIGHBOURS);
-    (reach >= FEWEST).then(|| (k.saturating_sub(reach), (k + reach + 1).min(n)))
+    (reach >= JUMP_FEWEST_NEIGHBOURS).then(|| (k.saturating_sub(reach), (k + reach + 1).min(n)))
 }
 
 /// Steps of a position that do not fit their neighbours, as pairs of the first sample behind and the size.
@@ -300,7 +291,7 @@ fn rate_neighbours(gaps: &[usize], k: usize, n: usize) -> Option<(usize, usize)>
 /// Full turns in rad or degrees are not jumps, because they are unwrapped elsewhere.
 fn find_jumps(time: &[f64], q: &[f64]) -> Vec<(usize, f64)> {
     let n = q.len();
-    if n < 8 * NEIGHBOURS || time.len() != n {
+    if n < REPAIR_NEIGHBOURHOODS * NEIGHBOURS || time.len() != n {
         return Vec::new();
     }
     // Rates of all steps, the median step of time, and the steps that are gaps.
@@ -308,9 +299,9 @@ fn find_jumps(time: &[f64], q: &[f64]) -> Vec<(usize, f64)> {
     let rates: Vec<f64> = (1..n)
         .map(|i| (q[i] - q[i - 1]) / (time[i] - time[i - 1]))
         .collect();
-    let is_short = |i: usize| time[i] - time[i - 1] < 1.5 * usual;
+    let is_short = |i: usize| time[i] - time[i - 1] < JUMP_LONGEST_STEP * usual;
     let cuts: Vec<usize> = (1..n)
-        .filter(|i| time[*i] - time[i - 1] > GAP * usual)
+        .filter(|i| time[*i] - time[i - 1] > JUMP_GAP_STEPS * usual)
         .map(|i| i - 1)
         .collect();
     // Deviation of each step from the one that the median rate of its neighbours predicts.
@@ -327,7 +318,7 @@ fn find_jumps(time: &[f64], q: &[f64]) -> Vec<(usize, f64)> {
     sizes.sort_unstable_by(f64::total_cmp);
     // The largest ordinary deviation: all but the rare ones, because the medians of their neighbours may be affected
     // as well.
-    let rare = crate::signal::float_to_count(RARE * n as f64).max(4);
+    let rare = crate::signal::float_to_count(JUMPS_MOST_SHARE * n as f64).max(JUMPS_LEAST_ALLOWED);
     let Some(largest) = sizes.len().checked_sub(rare + 1).map(|at| sizes[at]) else {
         return Vec::new();
     };
@@ -343,7 +334,7 @@ fn find_jumps(time: &[f64], q: &[f64]) -> Vec<(usize, f64)> {
     let is_turn = |size: f64| {
         turns
             .iter()
-            .any(|turn| (size.abs() / turn - 1.0).abs() < 0.08)
+            .any(|turn| (size.abs() / turn - 1.0).abs() < TURN_TOLERANCE)
     };
     let is_jump: Vec<bool> = (1..n)
         .map(|i| {
