@@ -21,6 +21,7 @@ mod joint;
 mod moments;
 mod search;
 mod segments;
+mod thresholds;
 
 pub use coloured::AutoregressiveNoise;
 pub use joint::{JointFit, JointRun, JointValues, fit_jointly};

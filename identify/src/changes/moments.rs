@@ -5,11 +5,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-/// A column is dependent if its squared residual after a fit of the others is below this share of it.
-const INDEPENDENCE_TOLERANCE: f64 = 1e-7;
-
-/// Coefficients of scaled columns below this are not counted as a dependence.
-const WEAK_DEPENDENCE: f64 = 1e-3;
+use crate::changes::thresholds::{CHANGE_INDEPENDENCE_TOLERANCE, WEAK_DEPENDENCE};
 
 /// Inner products of all columns of a least-squares problem among themselves and with the measured values.
 #[derive(Clone, Debug, PartialEq)]
@@ -307,7 +303,7 @@ impl SchurComplement {
 /// all others on it (Goodnight, The American Statistician 33, 1979). Returns whether it did.
 fn sweep(table: &mut DMatrix<f64>, k: usize) -> bool {
     let pivot = table[(k, k)];
-    if pivot < INDEPENDENCE_TOLERANCE {
+    if pivot < CHANGE_INDEPENDENCE_TOLERANCE {
         return false;
     }
     let n = table.nrows();

@@ -9,20 +9,10 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::changes::moments::{NormalEquations, NormalSolution, SchurComplement};
-
-/// Price of a value, in units of the logarithm of the number of rows. 1 is Schwarz' criterion, which is valid for white
-/// noise; the residual of real runs is never quite white.
-const STRICTER: f64 = 3.0;
-/// Share of a change's gain that must be confirmed on blocks that were not fitted.
-const MIN_VALIDATION_SHARE: f64 = 0.3;
-/// A change must explain this many times the differences within one run, since the motions of two runs have less in
-/// common than parts of one run.
-const MIN_SPREAD_RATIO: f64 = 2.0;
-/// A change must be this many standard deviations from zero. Standard deviations count noise only: parts of one run
-/// show many errors of the model, but not those along the other motion.
-const MIN_SIGNIFICANCE: f64 = 12.0;
-/// Changes whose cost differs by less than this share of the gain are indistinguishable.
-const RIVAL_TOLERANCE: f64 = 0.02;
+use crate::changes::thresholds::{
+    CHANCE_GAIN_RARITY, CHANGE_VALUE_PRICE, MIN_SIGNIFICANCE, MIN_SPREAD_RATIO,
+    MIN_VALIDATION_SHARE, RIVAL_TOLERANCE,
+};
 
 /// Two runs as normal equations of rows with variance 1, block by block and with the same columns.
 #[derive(Clone, Debug)]
@@ -163,7 +153,7 @@ pub fn within_run_spread(blocks: &[NormalEquations], search: &ChangeHypotheses) 
 /// Gain of the best of some changes by chance, which is rarely exceeded; `values` is the number of its values (Laurent
 /// and Massart, Annals of Statistics 28, 2000).
 fn chance_gain(values: usize, changes: usize) -> f64 {
-    let (k, tail) = (values as f64, (10.0 * changes as f64).ln());
+    let (k, tail) = (values as f64, (CHANCE_GAIN_RARITY * changes as f64).ln());
     k + 2.0 * (k * tail).sqrt() + 2.0 * tail
 }
 
@@ -280,7 +270,7 @@ impl<'a> ChangeSelector<'a> {
             complement: beside,
             starts,
             noise,
-            value_price: STRICTER * rows.max(2.0).ln(),
+            value_price: CHANGE_VALUE_PRICE * rows.max(2.0).ln(),
             min_gain: (MIN_SPREAD_RATIO * runs.within_run_spread * worth / noise)
                 .max(MIN_SIGNIFICANCE * MIN_SIGNIFICANCE),
             sums,

@@ -1,15 +1,9 @@
 //! Change points: where a series of uncertain values changed and stayed changed. Input: values with standard
 //! deviations; output: indices.
 
+use crate::changes::thresholds::{LONE_VALUE_DEVIATIONS, SEGMENT_FEWEST_VALUES, SEGMENT_PRICE};
 use crate::signal::median;
 
-/// Fewest values of a segment: a single outlying value is no lasting change.
-const SHORTEST: usize = 2;
-/// A value is an outlier if it differs from both neighbours by this many standard deviations. A nearer value does not
-/// gain enough for a segment with a neighbour.
-const OUTLIER_DEVIATIONS: f64 = 3.5;
-/// Price of a change, in units of the logarithm of the number of values.
-const STRICTER: f64 = 3.0;
 /// The median of the square of a number from the normal distribution.
 const MEDIAN_OF_SQUARE: f64 = 0.4549;
 
@@ -26,7 +20,7 @@ pub fn change_points(values: &[Option<UncertainValue>], among: usize) -> Vec<usi
         .filter(|(_, (x, deviation))| x.is_finite() && *deviation > 0.0)
         .collect();
     let n = known.len();
-    if n < 2 * SHORTEST {
+    if n < 2 * SEGMENT_FEWEST_VALUES {
         return Vec::new();
     }
     // Squared difference of neighbours, relative to its variance.
@@ -36,9 +30,9 @@ pub fn change_points(values: &[Option<UncertainValue>], among: usize) -> Vec<usi
     };
     let scatter = median(known.windows(2).map(square).collect()) / MEDIAN_OF_SQUARE;
     let scatter = scatter.max(1.0);
-    let known = drop_outliers(&known, OUTLIER_DEVIATIONS * scatter.sqrt());
+    let known = drop_outliers(&known, LONE_VALUE_DEVIATIONS * scatter.sqrt());
     let n = known.len();
-    if n < 2 * SHORTEST {
+    if n < 2 * SEGMENT_FEWEST_VALUES {
         return Vec::new();
     }
     // Values minus the first one, so that sums keep their digits.
@@ -54,11 +48,12 @@ pub fn change_points(values: &[Option<UncertainValue>], among: usize) -> Vec<usi
         let [w, wx, wxx] = std::array::from_fn(|i| sums[to][i] - sums[from][i]);
         (wxx - wx * wx / w).max(0.0)
     };
-    let price = STRICTER * ((n * among.max(1)) as f64).ln();
+    let price = SEGMENT_PRICE * ((n * among.max(1)) as f64).ln();
     // Least cost of the values up to each one, and the start of the last segment.
     let mut best: Vec<(f64, usize)> = vec![(-price, 0)];
     for end in 1..=n {
-        let starts = (0..end).filter(|start| end - start >= SHORTEST && best[*start].0.is_finite());
+        let starts = (0..end)
+            .filter(|start| end - start >= SEGMENT_FEWEST_VALUES && best[*start].0.is_finite());
         let cost = |start: usize| (best[start].0 + left(start, end) + price, start);
         let least = starts.map(cost).min_by(|a, b| a.0.total_cmp(&b.0));
         best.push(least.unwrap_or((f64::INFINITY, 0)));

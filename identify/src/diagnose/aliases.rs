@@ -4,17 +4,9 @@
 use super::bench::{EffectSelector, ScoredEffectSet, SelectedEffect, n_columns};
 use super::beside::ConditioningSet;
 use super::problem::{ColumnSource, LocatedEffect};
-
-/// A set is distinguishable from the best one if its criterion is worse by this much (twice the logarithm of the
-/// likelihood, with the effective number of samples).
-pub(crate) const MIN_DISTINCTION: f64 = 9.0;
-/// An alternative must explain at least this share of what the effect explains.
-const MIN_SUBSTITUTE_SHARE: f64 = 0.8;
-/// A force signal fault or a body is evaluated with a column at its estimated value, if the squares of its set are
-/// below this factor times those of the best set.
-const CLOSE: f64 = 3.0;
-/// An effect that explains less than this share of the squares has no alternatives.
-const NEGLIGIBLE_SHARE: f64 = 1e-6;
+use super::thresholds::{
+    MIN_DISTINCTION, MIN_SUBSTITUTE_SHARE, NEGLIGIBLE_EFFECT_SHARE, SUBSTITUTE_MOST_RATIO,
+};
 
 /// An effect that cannot be distinguished from one that was found.
 #[derive(Clone, Debug, PartialEq)]
@@ -59,7 +51,7 @@ impl EffectSelector<'_> {
                     let worse = worth * (trial.squares / squares.max(f64::MIN_POSITIVE)).ln();
                     // An effect that explains nothing cannot be replaced.
                     let own = left - squares;
-                    let stands_in = own > NEGLIGIBLE_SHARE * left
+                    let stands_in = own > NEGLIGIBLE_EFFECT_SHARE * left
                         && left - trial.squares > MIN_SUBSTITUTE_SHARE * own;
                     (worse < MIN_DISTINCTION && stands_in && trial.is_possible()).then_some(worse)
                 };
@@ -190,7 +182,7 @@ impl EffectSelector<'_> {
             source,
             ColumnSource::ReadingFault(_) | ColumnSource::Body(_)
         );
-        if !is_sized || tried.squares > CLOSE * squares {
+        if !is_sized || tried.squares > SUBSTITUTE_MOST_RATIO * squares {
             return tried;
         }
         let refreshed = self.refresh_columns(tried.picks);

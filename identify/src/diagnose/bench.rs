@@ -15,12 +15,7 @@ use super::problem::{
     CandidateEffect, ColumnChoice, ColumnProvider, ColumnSource, DiagnosisProblem, EffectParameter,
     SignConstraint,
 };
-
-/// If an estimate with the wrong sign explains less than this share of the squared error, its sign is random.
-const SIGN_IS_CHANCE: f64 = 0.05;
-
-/// Two effects at a place cancel if their sum has less than this share of the squares of the larger one.
-const CANCELLATION_SHARE: f64 = 0.25;
+use super::thresholds::{CANCELLATION_SHARE, RANDOM_SIGN_SHARE};
 
 /// A candidate with the columns for one choice of its constants.
 #[derive(Clone, Debug, PartialEq)]
@@ -338,7 +333,7 @@ impl<'a> EffectSelector<'a> {
             picks[i].rank = picks[i].rank.saturating_sub(1).max(1);
             let less;
             (factors, less) = fit(&picks);
-            if less > squares * (1.0 + SIGN_IS_CHANCE) {
+            if less > squares * (1.0 + RANDOM_SIGN_SHARE) {
                 break;
             }
             trial = self.score_set(picks.clone(), factors.as_slice(), less);

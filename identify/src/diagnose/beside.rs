@@ -7,9 +7,8 @@ use super::bench::{EffectSelector, SelectedEffect};
 use super::column::ForceColumn;
 use super::factored::GramFactor;
 use super::pool::{FitScope, solve_gram};
+use super::thresholds::EFFECT_INDEPENDENCE_TOLERANCE;
 
-/// A column is dependent if less than this share of its squares remains after the projection on the others.
-const INDEPENDENCE_TOLERANCE: f64 = 1e-6;
 /// A smaller share of a column's squares than this is rounding.
 const ROUNDING: f64 = 1e-7;
 
@@ -94,7 +93,7 @@ impl EffectSelector<'_> {
         let values = left.symmetric_eigenvalues();
         values
             .iter()
-            .filter(|value| **value > INDEPENDENCE_TOLERANCE)
+            .filter(|value| **value > EFFECT_INDEPENDENCE_TOLERANCE)
             .count()
     }
 
@@ -113,7 +112,7 @@ impl EffectSelector<'_> {
             let mut which: Vec<usize> = (0..others.len()).collect();
             which.push(k);
             let gram = left.select_rows(&which).select_columns(&which);
-            solve_gram(&gram).1 <= INDEPENDENCE_TOLERANCE * products.own[(k, k)]
+            solve_gram(&gram).1 <= EFFECT_INDEPENDENCE_TOLERANCE * products.own[(k, k)]
         })
     }
 

@@ -8,22 +8,16 @@ use super::disturbance::{Disturbance, EstimatedQuantity};
 use super::hum::{self, SlowSpectralLine};
 use super::pool::{ColumnPool, FitScope, dot, solve_gram};
 use super::problem::DiagnosisProblem;
+use super::thresholds::{
+    FORCE_OUTLIER_DEVIATIONS, OUTLIER_LEAST_FORCE_SHARE, OUTLIERS_MOST_SHARE,
+    QUANTISED_FEWEST_REPEATS, QUANTISED_FEWEST_VALUES, QUANTISED_LEAST_NOISE_PART,
+    QUANTISED_MOST_OFF_STEP, REVERSAL_OUTLIER_SAMPLES, REVERSAL_UNDECIDED_SAMPLES,
+    REVERSALS_MOST_SHARE,
+};
 use crate::signal::median;
 
 /// Number of samples around an outlier whose median it is compared with.
 const NEIGHBOURS: usize = 9;
-/// Least distance of an outlier from that median, in robust standard deviations.
-const OUTLIER_DEVIATIONS: f64 = 7.0;
-/// Distances below this share of the rms force are rounding.
-const ROUNDING_SHARE: f64 = 1e-3;
-/// If a larger share of the samples stands out, they are part of the force and no outliers.
-const RARE: f64 = 0.05;
-/// Number of samples on either side of a reversal in which no outliers are searched.
-const REVERSAL: usize = 4;
-/// Number of samples on either side of a reversal that decide nothing, and the largest share of all samples that they
-/// may be.
-const JUMP: usize = 1;
-const MOST_JUMPS: f64 = 0.1;
 
 /// Removes outliers and spectral lines from the measured forces and reports them.
 pub(crate) fn clean_forces(problem: &mut DiagnosisProblem) -> Vec<Disturbance> {
@@ -112,20 +106,20 @@ fn remove_outliers(problem: &mut DiagnosisProblem) -> Vec<Disturbance> {
         let rest = base_residual(problem);
         let mut more = false;
         for (d, rest) in rest.iter().enumerate() {
-            let reverses = reversal_samples(problem, d, REVERSAL);
+            let reverses = reversal_samples(problem, d, REVERSAL_OUTLIER_SAMPLES);
             // Distance from the local median, compared with the noise of the channel.
             let apart = deviation_from_neighbours(problem, rest);
             // 1.4826 times the median of absolute values is the standard deviation of normal noise.
             let spread = 1.4826 * median(apart.iter().map(|x| x.abs()).collect());
             let force = problem.measured_force(d);
             let size = (dot(&force, &force) / force.len().max(1) as f64).sqrt();
-            let bound =
-                (OUTLIER_DEVIATIONS * spread.max(problem.noise[d])).max(ROUNDING_SHARE * size);
+            let bound = (FORCE_OUTLIER_DEVIATIONS * spread.max(problem.noise[d]))
+                .max(OUTLIER_LEAST_FORCE_SHARE * size);
             let new: Vec<usize> = (0..rest.len())
                 .filter(|i| apart[*i].abs() > bound && !reverses[*i])
                 .collect();
             // Frequent large distances belong to the force, for example stick-slip.
-            let is_rare = (new.len() as f64) < RARE * rest.len() as f64;
+            let is_rare = (new.len() as f64) < OUTLIERS_MOST_SHARE * rest.len() as f64;
             let Some(values) = problem.measured.0[d].as_mut().filter(|_| is_rare) else {
                 continue;
             };
@@ -207,16 +201,19 @@ pub fn quantisation_step(values: &[f64], noise: f64) -> Option<f64> {
     let largest = sorted.first()?.abs().max(sorted.last()?.abs());
     sorted.dedup_by(|a, b| (*a - *b).abs() <= 1e-9 * largest);
     // Quantised values repeat; many different values mean a fine resolution.
-    if sorted.len() < 3 || 4 * sorted.len() > values.len() {
+    if sorted.len() < QUANTISED_FEWEST_VALUES
+        || QUANTISED_FEWEST_REPEATS * sorted.len() > values.len()
+    {
         return None;
     }
     let gaps = sorted.windows(2).map(|pair| pair[1] - pair[0]);
     // The smallest difference is the step, if all others are multiples of it.
     let step = gaps.fold(f64::INFINITY, f64::min);
-    let is_multiple = |gap: f64| (gap / step - (gap / step).round()).abs() < 1e-3;
+    let is_multiple =
+        |gap: f64| (gap / step - (gap / step).round()).abs() < QUANTISED_MOST_OFF_STEP;
     let all = sorted.windows(2).all(|pair| is_multiple(pair[1] - pair[0]));
     // A quantisation step q adds an error of standard deviation q / sqrt(12).
-    (all && step / 12.0_f64.sqrt() > 0.3 * noise).then_some(step)
+    (all && step / 12.0_f64.sqrt() > QUANTISED_LEAST_NOISE_PART * noise).then_some(step)
 }
 
 impl DiagnosisProblem {
@@ -224,10 +221,10 @@ impl DiagnosisProblem {
     /// derivative of positions shows on which side of the jump a sample lies.
     pub(crate) fn find_reversal_samples(&mut self) {
         let of = |d: usize| {
-            let jumps = reversal_samples(self, d, JUMP);
+            let jumps = reversal_samples(self, d, REVERSAL_UNDECIDED_SAMPLES);
             // Leave out reversals only if few samples are lost.
             let count = jumps.iter().filter(|jumps| **jumps).count() as f64;
-            if count < MOST_JUMPS * jumps.len() as f64 {
+            if count < REVERSALS_MOST_SHARE * jumps.len() as f64 {
                 jumps
             } else {
                 Vec::new()

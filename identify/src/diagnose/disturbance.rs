@@ -4,6 +4,7 @@ use super::bench::{EffectSelector, SelectedEffect};
 use super::noise::effective_samples;
 use super::pool::dot;
 use super::problem::{CandidateNature, DiagnosisProblem};
+use super::thresholds::{COLOURED_LEAST_VARIANCE_RATIO, COLOURED_MOST_EFFECTIVE_SHARE};
 
 /// A named value of a disturbance or an effect.
 #[derive(Clone, Debug, PartialEq)]
@@ -60,14 +61,9 @@ pub struct ResidualBudget {
     pub force: f64,
 }
 
-/// The noise of a residual is coloured if its effective number of samples is below this share.
-const COLOURED: f64 = 0.5;
-/// The variance of coloured noise must exceed that of the white noise by this factor.
-const ABOVE_WHITE: f64 = 1.5;
-
 /// Whether a variance is not larger than that of the white noise of its channel.
 pub(crate) fn is_white(problem: &DiagnosisProblem, channel: usize, variance: f64) -> bool {
-    variance < ABOVE_WHITE * problem.noise[channel].powi(2)
+    variance < COLOURED_LEAST_VARIANCE_RATIO * problem.noise[channel].powi(2)
 }
 
 impl EffectSelector<'_> {
@@ -158,7 +154,7 @@ impl EffectSelector<'_> {
         }
         // Share of samples that are independent.
         let worth = effective_samples(rest) / rest.len().max(1) as f64;
-        if worth > COLOURED {
+        if worth > COLOURED_MOST_EFFECTIVE_SHARE {
             return None;
         }
         // Coefficient a of a first-order process with (1 + a) / (1 - a) samples per independent one; it gives the

@@ -8,13 +8,10 @@ use nalgebra::DMatrix;
 
 use super::bench::{EffectSelector, SelectedEffect};
 use super::pool::FitScope;
-
-/// Largest odds, as twice their logarithm.
-const MAX_LOG_ODDS: f64 = 20.0;
-/// Probability that another cause, which is no candidate, explains what an effect explains: if the residual is noise,
-/// and if a repeatable part of it is unexplained.
-const UNKNOWN_CAUSE_PROBABILITY: f64 = 0.02;
-const UNKNOWN_CAUSE_IF_UNEXPLAINED: f64 = 0.25;
+use super::thresholds::{
+    ESTIMATE_MOST_VARIANCE_RATIO, MAX_LOG_ODDS, UNKNOWN_CAUSE_IF_UNEXPLAINED,
+    UNKNOWN_CAUSE_PROBABILITY,
+};
 
 impl EffectSelector<'_> {
     /// Estimates of each member's parameters with their standard deviations, `[effect][parameter]`; the deviation is
@@ -52,7 +49,9 @@ impl EffectSelector<'_> {
                 let variance = inverse.as_ref().map_or(f64::NAN, |inverse| inverse[(k, k)]);
                 let deviation = variance.sqrt() / scale[k];
                 // An estimate whose uncertainty is far above what its column alone would give is not determined.
-                let is_known = deviation.is_finite() && variance < 1e9 && factors[k] != 0.0;
+                let is_known = deviation.is_finite()
+                    && variance < ESTIMATE_MOST_VARIANCE_RATIO
+                    && factors[k] != 0.0;
                 (factors[k], is_known.then_some(deviation))
             };
             all.push((at..at + pick.columns.len()).map(of).collect());

@@ -22,30 +22,14 @@ use serde::Serialize;
 
 use super::bench::{EffectSelector, SelectedEffect};
 use super::pool::{FitScope, dot, solve_gram};
+use super::thresholds::{
+    BLOCKS_LEAST_T, EXPLICABLE_LEAST_NOISE_RATIO, LARGE_GAIN, LEAST_GAIN, LEAST_SHARES_T,
+    MIN_SHARE_OF_FORCE, MIN_SHARE_OF_OTHERS, NOISE_LEAST_GAIN_VARIANCES, NOISE_LEAST_T,
+    WHITE_LEAST_EFFECTIVE_SHARE, WHITE_MOST_NOISE_RATIO,
+};
 
 /// Number of blocks into which the error of a segment is divided.
 const BLOCKS: usize = 12;
-/// A change must lower the squared error on its channels by this share where it was not fitted.
-pub(crate) const LEAST_GAIN: f64 = 0.02;
-/// If the residual is white noise, the least gain is this many times its variance on data that was not fitted. Blocks
-/// then need a lower t value, since only noise makes them differ.
-const LEAST_OF_NOISE: f64 = 8.0;
-const LEAST_T_OF_NOISE: f64 = 1.0;
-/// A residual is white noise if its effective samples are this share of its samples, and if it is at most this many
-/// times the noise between neighbouring samples.
-const WHITE: f64 = 0.5;
-const LIKE_NOISE: f64 = 1.5;
-/// A gain below this part of the squares that other effects explain may come from the uncertainty of these effects.
-const MIN_SHARE_OF_OTHERS: f64 = 1e-4;
-/// A gain below this part of a force's squares may come from the smoothing of the positions.
-const MIN_SHARE_OF_FORCE: f64 = 1e-5;
-/// Squared errors below this, relative to the variance of the noise, contain nothing to explain.
-const BELOW_NOISE: f64 = 0.8;
-/// Least t value of the gain: its mean over the blocks, divided by its standard error.
-const LEAST_T: f64 = 2.5;
-/// From this gain on, it is enough that the blocks gain relative to their own error, with at least the t value below.
-const LARGE_GAIN: f64 = 0.15;
-const LEAST_SHARES_T: f64 = 4.0;
 
 /// Evidence for one set of effects compared with another.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -74,12 +58,14 @@ impl SelectionEvidence {
         self.gain >= self.least_gain
             && self.is_steady()
             && self.bic > 0.0
-            && self.above_noise > BELOW_NOISE
+            && self.above_noise > EXPLICABLE_LEAST_NOISE_RATIO
     }
 
     /// Whether a change that was accepted before is worth keeping.
     pub(crate) fn is_worth_keeping(&self) -> bool {
-        let is_large = self.gain >= LARGE_GAIN && self.bic > 0.0 && self.above_noise > BELOW_NOISE;
+        let is_large = self.gain >= LARGE_GAIN
+            && self.bic > 0.0
+            && self.above_noise > EXPLICABLE_LEAST_NOISE_RATIO;
         self.is_sufficient() || is_large
     }
 
@@ -87,9 +73,9 @@ impl SelectionEvidence {
     /// block.
     fn is_steady(&self) -> bool {
         let least_t = if self.least_gain < LEAST_GAIN {
-            LEAST_T_OF_NOISE
+            NOISE_LEAST_T
         } else {
-            LEAST_T
+            BLOCKS_LEAST_T
         };
         self.blocks_t >= least_t || self.gain >= LARGE_GAIN && self.shares_t >= LEAST_SHARES_T
     }
@@ -97,7 +83,7 @@ impl SelectionEvidence {
     /// Why the evidence is not sufficient, in words; `None` if it is. `has_check` selects the name of the validation
     /// method.
     pub fn insufficiency_reason(&self, has_check: bool) -> Option<&'static str> {
-        if self.above_noise <= BELOW_NOISE {
+        if self.above_noise <= EXPLICABLE_LEAST_NOISE_RATIO {
             Some("what is left is rounding")
         } else if self.gain <= 0.0 || !self.is_steady() {
             Some(if has_check {
@@ -181,7 +167,7 @@ impl EffectSelector<'_> {
             above_noise: self.squares_over_noise(&old_rest, channels),
             least_gain: {
                 // Weights are one over the variance of the residual, which is the noise where it is known.
-                let of_noise = LEAST_OF_NOISE / total.max(f64::MIN_POSITIVE);
+                let of_noise = NOISE_LEAST_GAIN_VARIANCES / total.max(f64::MIN_POSITIVE);
                 if !self.is_above_smoothing_error(old_squares - new_squares, channels) {
                     f64::INFINITY
                 } else if is_noise_known {
@@ -197,8 +183,8 @@ impl EffectSelector<'_> {
     fn is_white(&self, rest: &[Vec<f64>], channels: &[usize]) -> bool {
         channels.iter().all(|d| {
             let counted = rest[*d].iter().filter(|r| **r != 0.0).count() as f64;
-            self.effective_equations(rest, &[*d]) > WHITE * counted
-                && self.squares_over_noise(rest, &[*d]) < LIKE_NOISE
+            self.effective_equations(rest, &[*d]) > WHITE_LEAST_EFFECTIVE_SHARE * counted
+                && self.squares_over_noise(rest, &[*d]) < WHITE_MOST_NOISE_RATIO
         })
     }
 

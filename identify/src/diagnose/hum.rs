@@ -11,32 +11,17 @@ use super::column::ForceColumn;
 use super::disturbance::{Disturbance, EstimatedQuantity, is_white};
 use super::pool::{ColumnPool, FitScope, dot, solve_gram};
 use super::problem::DiagnosisProblem;
+use super::thresholds::{
+    LINE_LOW_HZ, LINE_LOWEST_HZ, LINE_MAIN_SHARE, MIN_LINE_RATIO, MIN_LINE_SHARE, MOST_LINES,
+    SLOW_LINE_LEAST_PERIODS, SLOW_LINE_LEAST_SEGMENT_SHARE, SLOW_LINE_MOST_REMAINING_SHARE,
+    SLOW_LINE_PARTS,
+};
 use crate::signal::{hann_power, median};
 
-/// Least ratio of a line to the median of the spectrum around it.
-const MIN_LINE_RATIO: f64 = 60.0;
 /// Half width of the neighbourhood of a line, and of the line itself, in steps of the spectrum.
 const NEIGHBOURHOOD: usize = 48;
 const LINE: usize = 6;
-/// Lines below the first frequency, Hz, may come from the motion, and so may lines if there are many. Below the second
-/// frequency a line must be most of the residual of a channel.
-const LOWEST: f64 = 3.0;
-const LOW: f64 = 8.0;
-const MIN_RESIDUAL_SHARE: f64 = 0.6;
-const MOST_LINES: usize = 6;
-/// Least share of a channel's squared residual that all of its lines together must explain.
-const MIN_LINE_SHARE: f64 = 0.02;
-/// Least number of periods of a slow line in every segment.
-const TURNS: f64 = 4.0;
-/// Number of parts of every segment in which a slow line must explain most of the residual, with the same amplitude and
-/// phase.
-const PARTS: usize = 4;
-/// Largest share of the non-repeatable residual that may remain after a line, where a part of the residual is
-/// repeatable.
-const MAX_REMAINING_SHARE: f64 = 0.5;
-/// Least share of every segment that a line must explain before its frequency is refined, and the number of
-/// refinements.
-const MIN_SEGMENT_SHARE: f64 = 0.3;
+/// Number of refinements of the frequency of a slow line.
 const NARROWED: usize = 10;
 
 /// Removes spectral lines from the measured forces, with their own phase in every segment, and reports them. `rest` is
@@ -47,7 +32,7 @@ pub(crate) fn remove_lines(problem: &mut DiagnosisProblem, rest: &[Vec<f64>]) ->
     let mut left = rest.to_vec();
     let mut frequencies: Vec<f64> = Vec::new();
     // Subtract one line after the other, the most prominent first.
-    let mut lowest = LOWEST;
+    let mut lowest = LINE_LOWEST_HZ;
     while frequencies.len() <= MOST_LINES {
         // The most prominent line of all channels.
         let Some(frequency) = (0..channels)
@@ -71,11 +56,11 @@ pub(crate) fn remove_lines(problem: &mut DiagnosisProblem, rest: &[Vec<f64>]) ->
         }
         // Whether the line is most of the residual of a channel.
         let is_most = |(before, after): (&Vec<f64>, &Vec<f64>)| {
-            dot(after, after) < (1.0 - MIN_RESIDUAL_SHARE) * dot(before, before)
+            dot(after, after) < (1.0 - LINE_MAIN_SHARE) * dot(before, before)
         };
         // A line at a low frequency that is not most of a residual comes from the motion; look above that range only.
-        if frequency < LOW && !left.iter().zip(&without).any(is_most) {
-            lowest = LOW;
+        if frequency < LINE_LOW_HZ && !left.iter().zip(&without).any(is_most) {
+            lowest = LINE_LOW_HZ;
             continue;
         }
         left = without;
@@ -148,7 +133,8 @@ pub(crate) fn slow_lines(
         };
         // In a channel with unexplained repeatable residual, a line must leave less than half of the non-repeatable
         // part.
-        let explains_more = dot(&wave.residual, &wave.residual) < MAX_REMAINING_SHARE * by_no_state;
+        let explains_more =
+            dot(&wave.residual, &wave.residual) < SLOW_LINE_MOST_REMAINING_SHARE * by_no_state;
         if explains_more || !unexplained.contains(&channel) {
             found.push(SlowSpectralLine {
                 channel,
@@ -281,12 +267,15 @@ impl<'a> SinusoidFitter<'a> {
         let lasts = self.problem.layout.segments.iter();
         let lasts: Vec<f64> = lasts.map(|s| s.samples as f64 * s.step).collect();
         // Fewer periods than this could be a motion or a drift.
-        if lasts.iter().any(|lasts| lasts * about < TURNS) {
+        if lasts
+            .iter()
+            .any(|lasts| lasts * about < SLOW_LINE_LEAST_PERIODS)
+        {
             return None;
         }
         // The starting frequency must already explain a part of every segment.
         let mut best = (about, self.fit_sinusoid(about));
-        if self.least_explained_share(&best.1, 1) < MIN_SEGMENT_SHARE {
+        if self.least_explained_share(&best.1, 1) < SLOW_LINE_LEAST_SEGMENT_SHARE {
             return None;
         }
         // Narrow the frequency, starting below the resolution of the longest segment.
@@ -300,7 +289,7 @@ impl<'a> SinusoidFitter<'a> {
             }
             step *= 0.6;
         }
-        (self.least_explained_share(&best.1, PARTS) >= MIN_RESIDUAL_SHARE).then_some(best)
+        (self.least_explained_share(&best.1, SLOW_LINE_PARTS) >= LINE_MAIN_SHARE).then_some(best)
     }
 }
 

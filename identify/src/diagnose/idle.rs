@@ -3,9 +3,10 @@
 //! the problem; output: the noise of its idle channels.
 
 use super::bench::EffectSelector;
-use super::noise::{ROUNDING, white_noise};
+use super::noise::white_noise;
 use super::pool::{FitScope, dot};
 use super::problem::{DiagnosisProblem, NoColumnProvider};
+use super::thresholds::FORCE_ROUNDING;
 
 impl DiagnosisProblem {
     /// Whether a channel has no force signal.
@@ -68,7 +69,7 @@ impl EffectSelector<'_> {
         let rest = self.residual(&[], &factors);
         // The noise is not below rounding.
         let noise = |(d, size): (&usize, &f64)| {
-            let rounding = ROUNDING * size.max(mean(&rest[*d])).sqrt();
+            let rounding = FORCE_ROUNDING * size.max(mean(&rest[*d])).sqrt();
             (*d, white_noise(&rest[*d]).max(rounding))
         };
         idle.iter().zip(&sizes).map(noise).collect()

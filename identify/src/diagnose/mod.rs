@@ -50,6 +50,7 @@ mod readings;
 mod reproducible;
 mod search;
 mod settle;
+mod thresholds;
 mod tile;
 mod tilt;
 mod tuning;
@@ -67,25 +68,23 @@ pub use evidence::SelectionEvidence;
 pub use laws::{
     LawFactor, LawProduct, LawProposal, LawShape, LawSite, LawTerm, LawVariable, SiteLaw,
 };
-pub use noise::{ROUNDING, effective_samples, white_noise};
+pub use noise::{effective_samples, white_noise};
 pub use problem::{
     CandidateEffect, CandidateNature, ColumnChoice, ColumnProvider, ColumnSource, DiagnosisProblem,
     EffectParameter, ForceReadingFault, LoadDependentQuery, LocatedEffect, NoColumnProvider,
     ReadingFaultKind, SampleLayout, SampleSegment, SignConstraint,
 };
 pub use readings::reading_fault_candidates;
+pub use thresholds::FORCE_ROUNDING;
 pub use tilt::{ForceSensitivity, TiltCandidate};
 
 use bench::{EffectSelector, SelectedEffect};
-use evidence::LEAST_GAIN;
 use pool::{FitScope, dot};
 use reproducible::repeatable_shares;
+use thresholds::{EFFECT_LEAST_UNEXPLAINED_RATIO, LEAST_GAIN, REPLACING_LAW_LEAST_SHARE};
 
 /// Kinds of friction of which a drift is a change.
 const FRICTION: [&str; 2] = ["viscous_friction", "coulomb_friction"];
-
-/// A proposed law that explains at least this share of the residual may replace effects that it makes unnecessary.
-const MIN_LAW_SHARE: f64 = 0.5;
 
 /// Reason for rejecting an effect whose estimate has a sign that is physically impossible. Reasons are values of the
 /// JSON, which stay; printers spell them out.
@@ -254,9 +253,9 @@ fn diagnose_cleaned(
         let (sites_then, laws_then) = bench.find_laws(&needed, &left_then);
         let stands = |law: &LawProposal| {
             let is_its = |then: &LawProposal| {
-                then.channels == law.channels && then.law.gain >= MIN_LAW_SHARE
+                then.channels == law.channels && then.law.gain >= REPLACING_LAW_LEAST_SHARE
             };
-            law.law.gain < MIN_LAW_SHARE || laws_then.iter().any(is_its)
+            law.law.gain < REPLACING_LAW_LEAST_SHARE || laws_then.iter().any(is_its)
         };
         if laws.iter().all(stands) {
             ladder.push(bench.selection_step(&picks, &needed, None));
@@ -424,7 +423,7 @@ impl EffectSelector<'_> {
         let is_part = |pick: &SelectedEffect, proposal: &LawProposal| {
             let channels = self.affected_channels(std::slice::from_ref(pick));
             let effect = &self.candidate(pick).effect;
-            proposal.law.gain >= MIN_LAW_SHARE
+            proposal.law.gain >= REPLACING_LAW_LEAST_SHARE
                 && proposal.law.replaced_effects.contains(effect)
                 && channels.iter().all(|d| proposal.channels.contains(d))
         };
@@ -466,7 +465,9 @@ impl EffectSelector<'_> {
                     .iter()
                     .map(|d| squares(&rest, *d) - squares(&left.residual, *d));
                 let share = gains.sum::<f64>() / stays;
-                if share < 1.0 && least.as_ref().is_none_or(|(other, _)| share < *other) {
+                if share < EFFECT_LEAST_UNEXPLAINED_RATIO
+                    && least.as_ref().is_none_or(|(other, _)| share < *other)
+                {
                     least = Some((share, fewer));
                 }
             }

@@ -2,9 +2,6 @@
 
 pub use crate::signal::white_noise;
 
-/// Errors below this share of a force are rounding, of the recording or of its simulation.
-pub const ROUNDING: f64 = 3e-6;
-
 /// Effective number of independent values of a series: `n / (1 + 2 sum of its autocorrelations)`, summed as long as the
 /// sum of two neighbouring autocorrelations is positive (C. J. Geyer, Statistical Science 7, 1992). Between 2 and `n`.
 pub fn effective_samples(values: &[f64]) -> f64 {

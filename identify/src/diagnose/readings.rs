@@ -1,6 +1,5 @@
 //! Faults of force signals: a delay, a low-pass, or a wrong scale. Their columns are computed from the fitted forces.
 
-use super::aliases::MIN_DISTINCTION;
 use super::bench::{EffectSelector, ScoredEffectSet, SelectedEffect};
 use super::column::ForceColumn;
 use super::pool::FitScope;
@@ -8,6 +7,7 @@ use super::problem::{
     CandidateEffect, CandidateNature, ColumnSource, DiagnosisProblem, EffectParameter,
     ForceReadingFault, LocatedEffect, ReadingFaultKind, SignConstraint,
 };
+use super::thresholds::MIN_DISTINCTION;
 
 /// Below this delay, in samples, a derivative is accurate enough.
 const SLIGHT: f64 = 0.1;

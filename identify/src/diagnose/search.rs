@@ -7,27 +7,16 @@ use super::bench::{EffectSelector, ProjectedGram, ScoredEffectSet, SelectedEffec
 use super::evidence::SelectionEvidence;
 use super::pool::FitScope;
 use super::problem::{ColumnSource, DiagnosisProblem};
+use super::thresholds::{
+    OTHER_KIND_SHARE, OTHER_SET_LEAST_ADVANTAGE, OTHER_SET_LEAST_GAIN, PLACE_PRICE,
+    RIVAL_FINER_GAIN_FACTOR, RIVAL_MOST_GRID_RATIO, RIVAL_MOST_RATIO, SIMPLER_KIND_SHARE,
+    SIMPLER_SET_MOST_LOSS,
+};
 
 /// Sets that are followed at the same time (width of the beam).
 const BEAM: usize = 6;
 /// Sets of one size that are tested on validation data before the search stops.
 const TESTED: usize = 10;
-/// A rival whose squares are within this factor is tried with finer constants.
-const CLOSE: f64 = 1.5;
-/// The same for a rival whose constant has only been searched on a grid so far.
-const CLOSE_ON_A_GRID: f64 = 20.0;
-/// A rival is tried with finer constants if this factor times what it explains with a constant of the grid would be
-/// enough.
-const FINER_EXPLAINS: f64 = 2.0;
-/// A simpler kind comes before a more general one that contains it, if it reaches this share of the gain.
-const SIMPLER_KIND_SHARE: f64 = 0.97;
-/// Another simple kind comes before a refinement of a member, if it reaches this share of the gain.
-const OTHER_KIND_SHARE: f64 = 0.7;
-/// By how much the criterion (twice the logarithm of the likelihood) of another set must be below that of a set that
-/// only grows.
-const MUCH_BETTER: f64 = 20.0;
-/// Share of the squared error on its channels by which such a set must improve on the grown one.
-const LARGE_CHANGE: f64 = 0.1;
 /// Number of candidates whose pairs are all tried: those that explain most in addition to the accepted set.
 const PAIRED: usize = 140;
 /// Number of pairs that join the other trial sets.
@@ -196,16 +185,16 @@ impl EffectSelector<'_> {
         let chosen = self.first_supported_set(accepted, &mut additions, refused);
         // A set with other members must be much better than one that only grows.
         // Sets with other members are tested only if their criterion is far below.
-        let bound = chosen
-            .as_ref()
-            .map_or(f64::INFINITY, |next| next.trial.score - MUCH_BETTER);
+        let bound = chosen.as_ref().map_or(f64::INFINITY, |next| {
+            next.trial.score - OTHER_SET_LEAST_ADVANTAGE
+        });
         let mut others = exchanged.into_iter().filter(|t| t.score < bound);
         let other = self.first_supported_set(accepted, &mut others, &mut Vec::new());
         // Compare the other set directly with the grown one.
         let other = other.filter(|other| {
             chosen.as_ref().is_none_or(|grown| {
                 let evidence = self.evidence_between(&grown.trial.picks, &other.trial.picks);
-                evidence.is_sufficient() && evidence.gain > LARGE_CHANGE
+                evidence.is_sufficient() && evidence.gain > OTHER_SET_LEAST_GAIN
             })
         });
         other.or(chosen)
@@ -527,7 +516,9 @@ impl EffectSelector<'_> {
                 // A rival with a searched constant is compared at its own best constant.
                 let tuned = if is_searched(self, &set[i]) || is_kin(self, &set[i]) {
                     self.choose_constants(set)
-                } else if self.fit_from_gram(&table, set.clone()).squares > CLOSE * best.squares {
+                } else if self.fit_from_gram(&table, set.clone()).squares
+                    > RIVAL_MOST_RATIO * best.squares
+                {
                     continue;
                 } else {
                     set
@@ -537,10 +528,10 @@ impl EffectSelector<'_> {
                 let squares = self.fit_set(tuned.clone()).squares;
                 // Only rivals that are close on the grid are worth a fine search.
                 let is_close = if kind(&tuned[i]) == kind(&own) {
-                    squares <= CLOSE_ON_A_GRID * best.squares
+                    squares <= RIVAL_MOST_GRID_RATIO * best.squares
                 } else {
-                    squares <= CLOSE * best.squares
-                        && FINER_EXPLAINS * (without - squares) >= without - best.squares
+                    squares <= RIVAL_MOST_RATIO * best.squares
+                        && RIVAL_FINER_GAIN_FACTOR * (without - squares) >= without - best.squares
                 };
                 if !is_close {
                     continue;
@@ -682,7 +673,7 @@ impl EffectSelector<'_> {
             let channels = self.affected_channels(&news);
             // Twice the logarithm of the likelihood ratio must be small.
             let ratio = trial.squares / chosen.0.squares.max(f64::MIN_POSITIVE);
-            if chosen.1.effective_samples * ratio.ln() > 2.0 {
+            if chosen.1.effective_samples * ratio.ln() > SIMPLER_SET_MOST_LOSS {
                 continue;
             }
             let own = self.evidence(accepted, &trial.picks, &channels);
@@ -713,9 +704,6 @@ pub(crate) fn criterion(problem: &DiagnosisProblem, trial: &ScoredEffectSet, wor
         + wrong
 }
 
-/// Penalty per place, which decides only between sets that are otherwise equal.
-const PLACE: f64 = 0.01;
-
 /// Small penalty for sets in which one kind acts twice at a place, which a simpler set describes as well, and for many
 /// places.
 fn overlap(problem: &DiagnosisProblem, picks: &[SelectedEffect]) -> f64 {
@@ -732,7 +720,7 @@ fn overlap(problem: &DiagnosisProblem, picks: &[SelectedEffect]) -> f64 {
         others.count() as f64
     };
     let places: usize = picks.iter().map(|pick| effect(pick).at.len()).sum();
-    picks.iter().enumerate().map(twice).sum::<f64>() + PLACE * places as f64
+    picks.iter().enumerate().map(twice).sum::<f64>() + PLACE_PRICE * places as f64
 }
 
 /// Members of a set whose candidate is not in another; the complete set if there are none.

@@ -8,11 +8,7 @@ use super::bench::{EffectSelector, SelectedEffect, n_columns};
 use super::pool::FitScope;
 use super::problem::{ColumnSource, ForceReadingFault, ReadingFaultKind};
 use super::search::criterion;
-
-/// Least decrease of the criterion for an exchange of members.
-const EXCHANGED: f64 = 1.0;
-/// Two members whose criteria differ by less than this are equally good.
-const AS_GOOD: f64 = 5.0;
+use super::thresholds::{EQUALLY_GOOD_DIFFERENCE, EXCHANGE_LEAST_DECREASE};
 
 impl EffectSelector<'_> {
     /// Replaces members by simpler kinds if no evidence supports the general one.
@@ -217,7 +213,7 @@ impl EffectSelector<'_> {
             let for_both = self.evidence(&trial.picks, picks, &channels);
             if trial.is_possible()
                 && !for_both.is_sufficient()
-                && for_both.bic < AS_GOOD
+                && for_both.bic < EQUALLY_GOOD_DIFFERENCE
                 && self
                     .evidence(&others, &trial.picks, &channels)
                     .is_sufficient()
@@ -263,7 +259,7 @@ impl EffectSelector<'_> {
             self.update_choices(&others);
             let table = self.projected_gram(&picks);
             let now = self.fit_set(picks.clone());
-            let bound = criterion(self.problem, &now, worth) - EXCHANGED;
+            let bound = criterion(self.problem, &now, worth) - EXCHANGE_LEAST_DECREASE;
             // Best rival so far: its criterion less the preference, the preference, and the fitted set.
             let mut best = (bound, 0.0, None);
             for rival in self.current_choices.iter().flatten() {
@@ -276,7 +272,7 @@ impl EffectSelector<'_> {
                 let score = criterion(self.problem, &trial, worth);
                 // A preferred cause gets an advantage.
                 let ahead = if self.is_preferred_reading(rival, &picks[i]) {
-                    AS_GOOD
+                    EQUALLY_GOOD_DIFFERENCE
                 } else {
                     0.0
                 };

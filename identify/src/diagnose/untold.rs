@@ -8,11 +8,10 @@ use nalgebra::{DMatrix, DVector};
 use super::bench::{EffectSelector, SelectedEffect};
 use super::pool::dot;
 use super::problem::{CandidateNature, ColumnSource, LocatedEffect};
+use super::thresholds::{UNDETERMINED_LEAST_SHARE, UNDETERMINED_MOST_VARIANCES};
 
 /// Largest number of samples that are used.
 const MOST: usize = 2000;
-/// Shares of squares below this are rounding: the column is a combination of the others along any motion.
-const ROUNDING: f64 = 1e-18;
 
 impl EffectSelector<'_> {
     /// Effects that a set with the residual `rest` cannot decide. Only effects with one choice of columns at one place
@@ -30,7 +29,7 @@ impl EffectSelector<'_> {
             let column = self.stacked_column(k, every);
             let left = project_out(&basis, &column);
             let size = left.norm();
-            if size * size > ROUNDING * column.norm_squared() {
+            if size * size > UNDETERMINED_LEAST_SHARE * column.norm_squared() {
                 basis.push(left / size);
             }
         }
@@ -71,7 +70,10 @@ impl EffectSelector<'_> {
                 .sum();
             // Undecidable if the uncertainty of its force exceeds the force of the drives. The weights make both
             // relative to the residual.
-            if share > ROUNDING && self.effective_equations(rest, &channels) * share * force < 1.0 {
+            if share > UNDETERMINED_LEAST_SHARE
+                && self.effective_equations(rest, &channels) * share * force
+                    < UNDETERMINED_MOST_VARIANCES
+            {
                 untold.push(candidate.effect.clone());
             }
         }
@@ -129,7 +131,7 @@ fn least_share(basis: &[DVector<f64>], columns: &[DVector<f64>]) -> Option<f64> 
     let squares = shares
         .iter()
         .map(|s| s * s)
-        .filter(|share| *share > ROUNDING);
+        .filter(|share| *share > UNDETERMINED_LEAST_SHARE);
     squares.min_by(f64::total_cmp)
 }
 

@@ -30,6 +30,7 @@ use crate::estimate::error::LeastSquaresError;
 use crate::estimate::lags::{BartlettWindows, LagProducts, bandwidth, lags_for_bandwidth};
 use crate::estimate::rows::{RowVisitor, check_rows};
 use crate::estimate::solution::RegressionSolution;
+use crate::estimate::thresholds::FEWEST_ROWS;
 
 /// Uncertainty of a solution. Lists are in the order of the regressor's columns.
 #[derive(Debug, Clone, PartialEq)]
@@ -52,9 +53,6 @@ pub struct ParameterUncertainty {
     /// least the classical ones, and still too small if neighbouring residuals are correlated.
     pub few_samples: bool,
 }
-
-/// Equations per parameter below which the influences of samples cancel too much to be summed over lags.
-pub const FEWEST_ROWS: usize = 20;
 
 /// Standard deviations of `solution`. `show` presents its rows again, block by block and in order of time; it is called
 /// twice.

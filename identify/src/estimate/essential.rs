@@ -14,6 +14,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::estimate::deviations::ParameterUncertainty;
 use crate::estimate::error::LeastSquaresError;
 use crate::estimate::solution::RegressionSolution;
+use crate::estimate::thresholds::{ESSENTIAL_SIGNIFICANCE, ESSENTIAL_WELL_DETERMINED};
 use crate::estimate::triangle::RFactor;
 
 /// Limits for essential parameters.
@@ -28,8 +29,8 @@ pub struct EssentialOptions {
 impl Default for EssentialOptions {
     fn default() -> Self {
         Self {
-            well_determined: 0.1,
-            significance: 0.05,
+            well_determined: ESSENTIAL_WELL_DETERMINED,
+            significance: ESSENTIAL_SIGNIFICANCE,
         }
     }
 }

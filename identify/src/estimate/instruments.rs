@@ -19,9 +19,7 @@ use crate::estimate::error::LeastSquaresError;
 use crate::estimate::least_squares::LeastSquares;
 use crate::estimate::rows::{RowVisitor, check_rows};
 use crate::estimate::solution::RegressionSolution;
-
-/// Canonical correlations below this contain no information.
-const MIN_CORRELATION: f64 = 1e-6;
+use crate::estimate::thresholds::INSTRUMENT_LEAST_CORRELATION;
 
 /// Result of an estimate with instruments.
 #[derive(Debug, Clone)]
@@ -144,7 +142,7 @@ fn solve_instrumental(
     let b_inverse = b
         .clone()
         .try_inverse()
-        .filter(|_| strength > MIN_CORRELATION)
+        .filter(|_| strength > INSTRUMENT_LEAST_CORRELATION)
         .ok_or(weak(strength))?;
     let r_inverse = r_z
         .solve_upper_triangular(&DMatrix::identity(n, n))

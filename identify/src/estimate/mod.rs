@@ -29,12 +29,13 @@ mod reflections;
 mod reweighted;
 mod rows;
 mod solution;
+mod thresholds;
 mod triangle;
 mod undetermined;
 mod weighted_rows;
 
 pub use body_matrices::{BodyMatrix, MatrixMap, planar_pseudo_inertia, pseudo_inertia};
-pub use deviations::{FEWEST_ROWS, ParameterUncertainty, uncertainty_with_autocorrelation};
+pub use deviations::{ParameterUncertainty, uncertainty_with_autocorrelation};
 pub use divergence::BaseMap;
 pub use error::{LeastSquaresError, PhysicalError};
 pub use essential::{DroppedParameter, EssentialOptions, EssentialParameters, select_essential};
@@ -46,9 +47,10 @@ pub use numeric_rank::{
 };
 pub use physical::{NOMINAL_WEIGHT, PhysicalParameters, physical_parameters};
 pub use prior::{ParameterPrior, solve_with_prior};
-pub use reweighted::{EstimateOptions, HUBER_BOUND, WeightedEstimate, estimate};
+pub use reweighted::{EstimateOptions, WeightedEstimate, estimate};
 pub use rows::RowVisitor;
-pub use solution::{RANK_TOLERANCE, RegressionSolution};
+pub use solution::RegressionSolution;
+pub use thresholds::{FEWEST_ROWS, HUBER_BOUND, RANK_TOLERANCE};
 pub use triangle::RFactor;
 pub use undetermined::NullDirection;
 pub use weighted_rows::RowWeighting;

@@ -8,6 +8,7 @@ use nalgebra::{ColPivQR, DMatrix};
 use serde::{Deserialize, Serialize};
 
 use crate::estimate::error::LeastSquaresError;
+use crate::estimate::thresholds::NOISE_COLUMN_TOLERANCE;
 
 /// Rank of a regressor by its singular values.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -145,15 +146,11 @@ pub fn reduce_numerically(
     })
 }
 
-/// Columns whose norm is below this fraction of the largest one's are rounding noise and count as zero: scaled to norm
-/// 1 they would look like information.
-pub(crate) const NOISE_TOLERANCE: f64 = 1e-12;
-
 /// Sets norms to zero that are rounding noise relative to the largest one.
 pub(crate) fn zero_noise_columns(norms: &mut [f64]) {
     let largest = norms.iter().copied().fold(0.0, f64::max);
     for norm in norms {
-        if *norm < NOISE_TOLERANCE * largest {
+        if *norm < NOISE_COLUMN_TOLERANCE * largest {
             *norm = 0.0;
         }
     }

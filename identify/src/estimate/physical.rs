@@ -29,13 +29,11 @@ use crate::estimate::divergence::{BaseMap, MisfitFunction, step_scales};
 use crate::estimate::error::PhysicalError;
 use crate::estimate::prior::variance_inflation;
 use crate::estimate::solution::RegressionSolution;
+use crate::estimate::thresholds::{INDIVIDUAL_MOST_OUTSIDE, PHYSICAL_SPAN_TOLERANCE};
 use crate::estimate::triangle::RFactor;
 
 /// Final weight `g` of the nominal values.
 pub const NOMINAL_WEIGHT: f64 = 0.01;
-
-/// Directions whose singular value is below this share of the largest one are rounding.
-const SPAN_TOLERANCE: f64 = 1e-10;
 
 /// Physically possible parameters with their uncertainty.
 #[derive(Debug, Clone, PartialEq)]
@@ -159,13 +157,16 @@ fn individually_determined(rows: &DMatrix<f64>) -> Vec<bool> {
     };
     let mut within = vec![0.0; rows.ncols()];
     for (direction, value) in span.row_iter().zip(svd.singular_values.iter()) {
-        if *value > SPAN_TOLERANCE * largest {
+        if *value > PHYSICAL_SPAN_TOLERANCE * largest {
             for (sum, component) in within.iter_mut().zip(direction.iter()) {
                 *sum += component * component;
             }
         }
     }
-    within.iter().map(|share| *share > 1.0 - 1e-6).collect()
+    within
+        .iter()
+        .map(|share| *share > 1.0 - INDIVIDUAL_MOST_OUTSIDE)
+        .collect()
 }
 
 /// Pseudo-inverse of a symmetric matrix with its diagonal scaled to 1; directions without information are left out.

@@ -19,9 +19,6 @@ use crate::estimate::weighted_rows::{
     RowWeighting, WeightedRows, outlier_share, residual_scales, reweight_rows, show_weighted,
 };
 
-/// Huber's bound for 95 % efficiency under normal residuals, in standard deviations.
-pub const HUBER_BOUND: f64 = 1.345;
-
 /// Solutions that change by less than this share of a standard deviation have converged.
 const CONVERGENCE_TOLERANCE: f64 = 1e-3;
 
@@ -155,6 +152,7 @@ mod tests {
 
     use super::*;
     use crate::estimate::prior::{ParameterPrior, solve_with_prior};
+    use crate::estimate::thresholds::HUBER_BOUND;
     use crate::estimate::weighted_rows::dot;
     use crate::test_noise::TestNoise;
 

@@ -5,11 +5,8 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::estimate::error::LeastSquaresError;
 use crate::estimate::numeric_rank::zero_noise_columns;
+use crate::estimate::thresholds::RANK_TOLERANCE;
 use crate::estimate::undetermined::{NullDirection, null_directions};
-
-/// Singular values of the column-scaled regressor below this fraction of the largest one count as zero. Rounding causes
-/// about 1e-15; larger values are information, and the standard deviations show how weak it is.
-pub const RANK_TOLERANCE: f64 = 1e-11;
 
 /// Number of rows of a regression.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

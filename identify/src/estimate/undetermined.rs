@@ -2,6 +2,7 @@
 
 use nalgebra::DMatrix;
 
+use crate::estimate::thresholds::PARTICIPATION_TOLERANCE;
 use crate::words::with_digits;
 
 /// A change of the parameters that changes no row of the regressor.
@@ -37,9 +38,6 @@ impl NullDirection {
         }
     }
 }
-
-/// Entries of unit null vectors below this are rounding.
-const PARTICIPATION_TOLERANCE: f64 = 1e-6;
 
 /// Whether each parameter is outside of all null vectors, and a sparse basis of the null space.
 ///

@@ -16,6 +16,7 @@ mod measure;
 mod random;
 mod search;
 pub mod separate;
+mod thresholds;
 
 use std::fmt;
 

@@ -15,10 +15,8 @@
 
 use nalgebra::DMatrix;
 
-/// A column is in the span of others if less than this share remains after the projection.
-const SPAN_TOLERANCE: f64 = 1e-9;
-/// A difference below this share of the effect is rounding: the other side explains the same.
-pub const ROUNDING: f64 = 1e-6;
+pub use super::thresholds::SEPARATION_ROUNDING;
+use super::thresholds::SEPARATION_SPAN_TOLERANCE;
 
 /// An effect and its rivals along a motion. Rows are samples and drives, in N or N m; if drives differ in their noise,
 /// rows are divided by it.
@@ -54,17 +52,17 @@ pub struct SeparationMeasure {
 impl SeparationMeasure {
     /// Whether the base alone explains the effect.
     pub fn is_in_base(&self) -> bool {
-        self.outside_base <= ROUNDING * self.effect
+        self.outside_base <= SEPARATION_ROUNDING * self.effect
     }
 
     /// Whether base and rival together explain the effect.
     pub fn is_mimicked(&self) -> bool {
-        self.residual <= ROUNDING * self.effect
+        self.residual <= SEPARATION_ROUNDING * self.effect
     }
 
     /// Whether base and effect together explain the rival.
     pub fn can_explain_rival(&self) -> bool {
-        self.reverse_residual <= ROUNDING * self.effect
+        self.reverse_residual <= SEPARATION_ROUNDING * self.effect
     }
 }
 
@@ -137,7 +135,7 @@ pub fn fit_coefficients(base: &DMatrix<f64>, effect: &DMatrix<f64>, forces: &[f6
     let scaled = DMatrix::from_fn(base.nrows(), n, |i, k| column(k)[i] / norms[k]);
     let forces = nalgebra::DVector::from_column_slice(forces);
     let svd = scaled.svd(true, true);
-    let found = svd.solve(&forces, SPAN_TOLERANCE);
+    let found = svd.solve(&forces, SEPARATION_SPAN_TOLERANCE);
     found.map_or_else(
         |_| vec![0.0; n],
         |x| x.iter().zip(&norms).map(|(x, norm)| x / norm).collect(),
@@ -194,7 +192,7 @@ fn orthonormal_extension(span: &DMatrix<f64>, columns: &DMatrix<f64>) -> DMatrix
             }
         }
         let norm = column.norm();
-        if norm.is_finite() && norm > SPAN_TOLERANCE * size {
+        if norm.is_finite() && norm > SEPARATION_SPAN_TOLERANCE * size {
             found.push(column / norm);
         }
     }

@@ -7,14 +7,13 @@
 use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 
+use super::thresholds::TRIMMED_PART;
 use super::{ErrorAccumulator, ErrorFigures};
 use crate::motion::{is_even, mean_rate, resample_evenly};
 use crate::signal::{FilterError, LowPass, float_to_count};
 
 /// Order of the low-pass in one direction.
 const ORDER: usize = 4;
-/// Share of the samples that is dropped at each end, where the filter has transients.
-pub const TRIMMED_PART: f64 = 0.05;
 
 /// Error figures after both forces passed the same low-pass.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -8,6 +8,11 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::thresholds::{
+    BIN_FEWEST_SAMPLES, DENSE_PARTS_LEAST_SHARE, FEWEST_PARTS, MOST_REGIONS, PART_DENSITY_SHARE,
+    PART_FEWEST_SAMPLES, RECURRENCE_PARTS, REGION_LEAST_DENSITY, REGION_LEAST_EXCESS,
+    ZERO_REGION_LEAST_SHARE,
+};
 use crate::words::with_digits;
 
 /// A region with a larger share of a channel's squared error than of the samples.
@@ -45,15 +50,12 @@ impl Default for LocateOptions {
     fn default() -> Self {
         Self {
             bins: 40,
-            excess: 0.15,
-            density: 1.5,
-            most: 3,
+            excess: REGION_LEAST_EXCESS,
+            density: REGION_LEAST_DENSITY,
+            most: MOST_REGIONS,
         }
     }
 }
-
-/// Number of parts of the recording; a region must be dense in most of the parts in which it has samples.
-const PARTS: usize = 4;
 
 /// Name of the time column, for which repetition is not required.
 pub const TIME_COLUMN: &str = "t";
@@ -113,7 +115,7 @@ fn densest_region(
         .collect();
     order.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
     let n = order.len();
-    let bins = options.bins.min(n / 25);
+    let bins = options.bins.min(n / BIN_FEWEST_SAMPLES);
     if bins < 2 {
         return None;
     }
@@ -139,7 +141,7 @@ fn densest_region(
         for fraction in [40, 20, 10, 5] {
             let bound = sizes[n / fraction];
             let (zero_share, zero_samples) = excess_of([-bound, bound]);
-            if zero_share - zero_samples > 0.9 * (share - samples) {
+            if zero_share - zero_samples > ZERO_REGION_LEAST_SHARE * (share - samples) {
                 (range, share, samples) = ([-bound, bound], zero_share, zero_samples);
             }
         }
@@ -213,8 +215,8 @@ fn best_interval(order: &[usize], squares: &[f64], total: f64, edges: &[usize]) 
 
 /// Whether the region is denser than the rest in most parts of the recording that have samples in it, at least two.
 fn is_recurrent(squares: &[f64], values: &[f64], range: [f64; 2], density: f64) -> bool {
-    let length = squares.len().div_ceil(PARTS).max(1);
-    let (mut visited, mut dense) = (0, 0);
+    let length = squares.len().div_ceil(RECURRENCE_PARTS).max(1);
+    let (mut visited, mut dense) = (0_usize, 0_usize);
     for (squares, values) in squares.chunks(length).zip(values.chunks(length)) {
         let inside: Vec<f64> = values
             .iter()
@@ -223,17 +225,17 @@ fn is_recurrent(squares: &[f64], values: &[f64], range: [f64; 2], density: f64) 
             .map(|(_, square)| *square)
             .collect();
         let total: f64 = squares.iter().sum();
-        if inside.len() < 5 || total <= 0.0 {
+        if inside.len() < PART_FEWEST_SAMPLES || total <= 0.0 {
             continue;
         }
         visited += 1;
         let share = inside.iter().sum::<f64>() / total;
-        // In a single part, half of the required density is enough.
-        let enough = 1.0 + (density - 1.0) / 2.0;
+        // In a single part of the recording, less than the required density is enough.
+        let enough = 1.0 + PART_DENSITY_SHARE * (density - 1.0);
         dense +=
             usize::from(share >= (enough * inside.len() as f64 / squares.len() as f64).min(1.0));
     }
-    visited >= 2 && 4 * dense >= 3 * visited
+    visited >= FEWEST_PARTS && dense as f64 >= DENSE_PARTS_LEAST_SHARE * visited as f64
 }
 
 #[cfg(test)]

@@ -12,20 +12,20 @@ mod filtered;
 mod fit_error;
 mod fit_file;
 mod locate;
+mod thresholds;
 
 use std::fmt;
 
 use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 
-pub use filtered::{
-    BandError, FilteredChannelFigures, FilteredFigures, TRIMMED_PART, add_filtered_forces,
-};
+pub use filtered::{BandError, FilteredChannelFigures, FilteredFigures, add_filtered_forces};
 pub use fit_error::{FitFault, FitFileError};
 pub use fit_file::{
     EstimatorOutput, FitFile, FitParameter, ParameterInfo, ParameterStatus, fit_parameters,
 };
 pub use locate::{ErrorRegion, LocateOptions, TIME_COLUMN, locate_errors};
+pub use thresholds::TRIMMED_PART;
 
 /// Error figures of a comparison.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -12,6 +12,7 @@
 
 mod nearest;
 mod roots;
+mod thresholds;
 
 use std::fmt;
 
@@ -20,6 +21,7 @@ use num_rational::BigRational;
 use num_traits::Zero;
 
 use crate::estimate::{NullDirection, null_directions};
+use thresholds::{FREE_DIRECTION_SINGULAR_VALUE, MULTIPLE_SOLUTION_RATIO};
 
 pub use modelmill_algebra::polynomial::{Polynomial, exact_decimal};
 
@@ -211,7 +213,7 @@ fn standard_deviations(
         jacobian.column_mut(i).unscale_mut(*scale);
     }
     let singular = jacobian.clone().singular_values();
-    if singular.min() < 1e-12 * singular.max() {
+    if singular.min() < MULTIPLE_SOLUTION_RATIO * singular.max() {
         return None;
     }
     // Undo the scaling.
@@ -316,7 +318,7 @@ fn find_undetermined(
     order.sort_by(|a, b| svd.singular_values[*a].total_cmp(&svd.singular_values[*b]));
     let n_null = order
         .iter()
-        .filter(|i| svd.singular_values[**i] < 1e-10)
+        .filter(|i| svd.singular_values[**i] < FREE_DIRECTION_SINGULAR_VALUE)
         .count()
         .max(at_least);
     let null_space = DMatrix::from_fn(n_null, n, |r, i| v_t[(order[r], i)]);

@@ -7,6 +7,9 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::roots::{RealSolutions, solve};
+use super::thresholds::{
+    MINIMUM_MOST_GRADIENT, SAME_MINIMUM_NOMINAL_PART, SAME_MINIMUM_PART, SOLUTION_MOST_ERROR,
+};
 use super::{
     InterpretationProblem, PhysicalInterpretation, PhysicalSolution, equation, jacobian_at,
     residuals, roots_of_diagonal, whiten_rows,
@@ -45,9 +48,11 @@ pub(crate) fn solve_least_squares(
         // Minima that agree to six digits are the same.
         let is_known = solutions.iter().any(|known| {
             let pairs = known.values.iter().zip(&values);
-            pairs
-                .zip(&system.nominal)
-                .all(|((a, b), x0)| (a - b).abs() <= 1e-6 * (a.abs() + b.abs() + 1e-3 * x0.abs()))
+            pairs.zip(&system.nominal).all(|((a, b), x0)| {
+                (a - b).abs()
+                    <= SAME_MINIMUM_PART
+                        * (a.abs() + b.abs() + SAME_MINIMUM_NOMINAL_PART * x0.abs())
+            })
         });
         if !is_known {
             solutions.push(PhysicalSolution {
@@ -121,7 +126,7 @@ fn descend(
     // A point at which the descent stopped without a zero gradient is no minimum.
     let gradient = jacobian.transpose() * &e;
     let scale = jacobian.norm() * e.norm();
-    if gradient.norm() > 1e-6 * scale && e.norm() > 1e-9 {
+    if gradient.norm() > MINIMUM_MOST_GRADIENT * scale && e.norm() > SOLUTION_MOST_ERROR {
         return None;
     }
     // Covariance of a least squares estimate with whitened rows.

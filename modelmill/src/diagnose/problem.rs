@@ -4,8 +4,8 @@
 use modelmill_codegen::ModelEvaluator;
 use modelmill_identify::diagnose::{
     CandidateOutcome, ColumnChoice, ColumnProvider, ColumnSource, DiagnosisProblem, Disturbance,
-    ForceColumn, LawSite, LoadDependentQuery, ModelDiagnosis, ROUNDING, diagnose, drift_candidates,
-    reading_fault_candidates, white_noise,
+    FORCE_ROUNDING, ForceColumn, LawSite, LoadDependentQuery, ModelDiagnosis, diagnose,
+    drift_candidates, reading_fault_candidates, white_noise,
 };
 
 use crate::along::drive_rates;
@@ -368,5 +368,5 @@ fn noise_levels(measured: &[Vec<f64>], all: &SegmentList<'_>) -> Outcome<Vec<f64
 fn noise(force: &[f64]) -> f64 {
     let squares = force.iter().map(|f| f * f).sum::<f64>();
     let size = (squares / force.len().max(1) as f64).sqrt();
-    white_noise(force).max(ROUNDING * size)
+    white_noise(force).max(FORCE_ROUNDING * size)
 }

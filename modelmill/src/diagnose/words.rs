@@ -2,7 +2,7 @@
 //! diagnosis, output is English text without line breaks.
 
 use modelmill_identify::diagnose::{
-    DiagnosisVerdict, Disturbance, LocatedEffect, ModelDiagnosis, ROUNDING, SelectionStep,
+    DiagnosisVerdict, Disturbance, FORCE_ROUNDING, LocatedEffect, ModelDiagnosis, SelectionStep,
 };
 
 use crate::audit::SUSPICIONS;
@@ -70,7 +70,7 @@ pub fn rung(rung: &SelectionStep) -> String {
 
 /// Whether a noise floor, relative to the force, is no more than the rounding of the recorded numbers.
 fn is_rounding(noise_floor: f64) -> bool {
-    noise_floor <= NOISE_FREE_ROUNDINGS * ROUNDING
+    noise_floor <= NOISE_FREE_ROUNDINGS * FORCE_ROUNDING
 }
 
 /// The noise floor as a sentence; errors are compared with it.

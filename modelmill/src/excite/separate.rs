@@ -21,7 +21,7 @@ use crate::error::{Error, Outcome};
 use crate::excite::plant::ModelPlant;
 use crate::model::Model;
 use crate::stretch::RecordingSegment;
-use modelmill_identify::diagnose::ROUNDING;
+use modelmill_identify::diagnose::FORCE_ROUNDING;
 
 /// What is to be told apart, derived.
 pub(crate) struct SeparationSetup {
@@ -188,7 +188,7 @@ impl SeparationSetup {
             let noise = |force: &Vec<f64>| {
                 let squares: f64 = force.iter().map(|f| f * f).sum();
                 let size = (squares / force.len().max(1) as f64).sqrt();
-                white_noise(force).max(ROUNDING * size)
+                white_noise(force).max(FORCE_ROUNDING * size)
             };
             let noise: Vec<f64> = measured.iter().map(noise).collect();
             self.noise = noise.iter().all(|n| *n > 0.0).then_some(noise);

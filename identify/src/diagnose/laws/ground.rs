@@ -9,9 +9,8 @@ use super::features::{
 };
 use super::shapes::LawVariable;
 use crate::diagnose::bench::{EffectSelector, SelectedEffect};
+use crate::diagnose::thresholds::LAW_INDEPENDENCE_TOLERANCE;
 
-/// A column is dependent if less than this share of its squares remains after the projection.
-const INDEPENDENCE_TOLERANCE: f64 = 1e-5;
 /// Number of columns that are scored at the same time.
 const BATCH: usize = 64;
 
@@ -395,7 +394,8 @@ impl SiteProjection {
             let own = product(i, i);
             // Whether a column depends on what is projected out.
             let is_said = |own: f64, k: usize| {
-                !own.is_finite() || own <= INDEPENDENCE_TOLERANCE * matrix.column(k).norm_squared()
+                !own.is_finite()
+                    || own <= LAW_INDEPENDENCE_TOLERANCE * matrix.column(k).norm_squared()
             };
             if is_said(own, i) {
                 return 0.0;

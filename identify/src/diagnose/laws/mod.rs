@@ -24,11 +24,14 @@ use std::collections::BTreeMap;
 pub use features::{LawFactor, LawProduct, LawSite};
 pub use shapes::{LawShape, LawVariable};
 
-use super::aliases::MIN_DISTINCTION;
 use super::bench::{EffectSelector, SelectedEffect};
-use super::evidence::LEAST_GAIN;
 use super::pool::{FitScope, dot};
 use super::problem::{CandidateNature, ColumnProvider, LocatedEffect};
+use super::thresholds::{
+    LAW_HOPEFUL_PART, LAW_INDEPENDENT_COLUMNS, LAW_LEAST_NOISE_RATIO, LAW_LEAST_REPEATABLE_SHARE,
+    LAW_LEAST_SHARE_ALONE, LAW_MOST_CHANCE, LAW_SAME_SHARE, LEAST_GAIN, MAX_NEAR_TIES,
+    MIN_DISTINCTION, SECOND_TERM_LEAST_T,
+};
 use features::ProductForm;
 use ground::{LawProjection, LawSamples, ScoredProduct, SiteProjection};
 use held_out::{BlockValidation, ValidatedLaw};
@@ -83,25 +86,6 @@ const STEPS: [f64; 2] = [0.06, 0.002];
 const WORTH_A_STEP: f64 = 1e-4;
 /// Largest number of rounds over all constants of a form.
 const MOST_ROUNDS: usize = 40;
-/// From this mean square of the residual on, relative to white noise, a law is searched even if nothing else shows that
-/// the residual is repeatable.
-const SUSPICIOUS: f64 = 4.0;
-/// Least share of the repeatable residual that a law must explain, and of the total residual where nothing else shows
-/// that it is repeatable.
-const LEAST_PART: f64 = 0.5;
-const LEAST_ALONE: f64 = 0.6;
-/// Share of that which a term must reach with its first constants, for a search of better ones.
-const HOPEFUL: f64 = 0.2;
-/// Number of independent columns of the grammar, and the largest probability that one of them does as well by chance.
-const FORMS_THERE_ARE: f64 = 1e5;
-const CHANCE: f64 = 1e-3;
-/// Standard deviations over the blocks by which two terms must be better than one.
-const LEAST_T: f64 = 3.0;
-/// Differences below this share of what the best law explains are not significant: errors of sensors and derivatives
-/// are not noise.
-const SAME: f64 = 0.002;
-/// Largest number of nearly equal laws that are reported.
-const MAX_NEAR_TIES: usize = 8;
 
 /// A set of effects in whose presence laws are searched, prepared for scoring and validation.
 struct LawBaseline {
@@ -203,7 +187,7 @@ impl ResidualView<'_> {
     fn open_channels(&self, noise: &[f64]) -> Vec<usize> {
         let is_suspicious = |d: &usize| {
             !self.unexplained.contains(d)
-                && self.squares_per_sample(*d) > SUSPICIOUS * noise[*d].powi(2)
+                && self.squares_per_sample(*d) > LAW_LEAST_NOISE_RATIO * noise[*d].powi(2)
         };
         let others = (0..self.residual.len()).filter(is_suspicious);
         self.unexplained.iter().copied().chain(others).collect()
@@ -261,13 +245,13 @@ pub(crate) fn propose_laws(
             let channels = many.channels(site);
             if channels.iter().any(|d| left.unexplained.contains(d)) {
                 let again = squares(&many, site, &|d| left.repeatable_share[d]);
-                LEAST_PART * again / squares(&many, site, &|_| 1.0)
+                LAW_LEAST_REPEATABLE_SHARE * again / squares(&many, site, &|_| 1.0)
             } else {
-                LEAST_ALONE
+                LAW_LEAST_SHARE_ALONE
             }
         };
         let is_hopeful = |one: &ScoredProduct| {
-            one.score >= HOPEFUL * least(one.site) * squares(&few, one.site, &|_| 1.0)
+            one.score >= LAW_HOPEFUL_PART * least(one.site) * squares(&few, one.site, &|_| 1.0)
         };
         let without = bases[0].held_out.validate_law(&many, 0, &[]);
         let tried = try_laws(bench, &bases, [&few, &many], &felt, &is_hopeful);
@@ -289,9 +273,9 @@ pub(crate) fn propose_laws(
             let gain = gain(one);
             // The best of many unrelated columns explains this much of few samples by chance.
             let worth = bench.effective_equations(left.residual, &channels);
-            let by_chance = FORMS_THERE_ARE * (1.0 - gain).max(0.0).powf(0.5 * worth);
+            let by_chance = LAW_INDEPENDENT_COLUMNS * (1.0 - gain).max(0.0).powf(0.5 * worth);
             let (off, deviation) = without.excess_over(&one.validation);
-            gain >= least(one.site) && off > deviation && by_chance < CHANCE
+            gain >= least(one.site) && off > deviation && by_chance < LAW_MOST_CHANCE
         };
         let Some((chosen, near_ties)) = select_law(tried, &without, &many, &is_one, &scatter)
         else {
@@ -509,7 +493,7 @@ fn select_law(
     // Two terms replace one only if they are clearly better.
     if let (Some(one), Some(two)) = (least(&laws), least(&double)) {
         let (more, deviation) = laws[one].validation.excess_over(&double[two].validation);
-        if more > LEAST_T * deviation && more > LEAST_GAIN * without.total() {
+        if more > SECOND_TERM_LEAST_T * deviation && more > LEAST_GAIN * without.total() {
             laws = double;
         }
     } else if laws.is_empty() {
@@ -522,7 +506,8 @@ fn select_law(
     }
     // Keep all laws within the noise of the best, then choose the simplest.
     let less = without.total() - first.validation.total();
-    let most = first.validation.total() + (MIN_DISTINCTION * scatter(first)).max(SAME * less);
+    let most =
+        first.validation.total() + (MIN_DISTINCTION * scatter(first)).max(LAW_SAME_SHARE * less);
     laws.retain(|one| one.validation.total() <= most);
     let simplest = (0..laws.len()).min_by_key(|k| laws[*k].size)?;
     let chosen = laws.remove(simplest);
