@@ -79,6 +79,7 @@ fn run(host: &Host, command: &ProgramCommand) -> CommandOutcome {
         #[cfg(feature = "experiment")]
         ProgramCommand::Experiment(args) => commands::experiment::run(host, args),
         ProgramCommand::Completions(args) => commands::completions::run(args),
+        #[cfg(feature = "workbench")]
         ProgramCommand::Work(args) => commands::work::run(host, args),
         ProgramCommand::Tour(args) => commands::tour::run(host, args),
     }

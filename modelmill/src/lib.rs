@@ -170,10 +170,12 @@ pub mod diagnose;
 pub mod error;
 pub mod evaluate;
 pub mod excite;
+#[cfg(feature = "import")]
 pub mod export;
 pub mod generate;
 pub mod host;
 pub mod identify;
+#[cfg(feature = "import")]
 pub mod import;
 pub mod interpret;
 pub mod model;
@@ -181,10 +183,12 @@ pub mod picture;
 pub mod print;
 pub mod progress;
 pub mod recording;
+#[cfg(feature = "import")]
 pub mod reduce;
 mod regressors;
 pub mod report;
 pub mod runs;
+#[cfg(feature = "rig")]
 pub mod simulate;
 pub mod states;
 pub mod stretch;

@@ -12,6 +12,7 @@ pub(crate) mod preparation;
 mod rig;
 pub(crate) mod runs;
 pub(crate) mod separate;
+#[cfg(feature = "workbench")]
 pub(crate) mod work;
 
 use std::path::PathBuf;
@@ -22,6 +23,7 @@ use drawing::DrawingArgs;
 use effects::{AddArgs, EffectsArgs};
 use preparation::PreparationArgs;
 use runs::RunsArgs;
+#[cfg(feature = "workbench")]
 use work::WorkArgs;
 
 pub(crate) use code::{AtlasArgs, EquationsArgs, EquationsFormat, GenerateArgs};
@@ -173,6 +175,7 @@ pub(crate) enum ProgramCommand {
         --data recordings/spidermill-mbs/with-rods-fit.csv \\\n      \
         --check recordings/spidermill-mbs/with-rods-check.csv --out report")]
     Report(ReportArgs),
+    #[cfg(feature = "workbench")]
     /// Open a workbench in the browser: edit the model file, see mechanism, equations, error and findings follow
     #[command(after_help = work::HELP)]
     Work(WorkArgs),

@@ -97,6 +97,7 @@ impl PreparationArgs {
     }
 
     /// The options that were given, as the command line has them, each with a space before it.
+    #[cfg(feature = "workbench")]
     pub(crate) fn to_flags(&self) -> String {
         let mut all = String::new();
         let mut option = |name: &str, value: Option<String>| {

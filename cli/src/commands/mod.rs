@@ -25,6 +25,7 @@ pub(crate) mod report;
 pub(crate) mod runs;
 pub(crate) mod simulate;
 pub(crate) mod tour;
+#[cfg(feature = "workbench")]
 pub(crate) mod work;
 
 use std::path::{Path, PathBuf};

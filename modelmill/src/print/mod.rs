@@ -13,6 +13,7 @@ mod identification;
 mod interpretation;
 pub(crate) mod laws;
 mod next_step;
+#[cfg(feature = "import")]
 mod reduction;
 mod runs;
 mod spelling;

@@ -2,16 +2,25 @@
 //!
 //! To add one, implement [`RecordingFormat`] in a file of its own and add it to [`FORMATS`].
 
+#[cfg(feature = "logs")]
 mod bag;
 mod csv;
+#[cfg(not(all(feature = "parquet", feature = "hdf5", feature = "logs")))]
+mod disabled;
+#[cfg(feature = "hdf5")]
 mod hdf5;
 mod matlab;
 mod matlab_arrays;
+#[cfg(feature = "logs")]
 mod mcap;
 mod packing;
+#[cfg(feature = "parquet")]
 mod parquet;
+#[cfg(feature = "parquet")]
 mod parquet_pages;
+#[cfg(feature = "logs")]
 mod rosbag;
+#[cfg(feature = "logs")]
 mod sqlite;
 
 use std::fs::File;
@@ -23,11 +32,23 @@ use crate::recording::{ReadOptions, SignalRecording};
 
 /// All formats, in the order in which their signatures are compared. Text is last and accepts everything.
 pub(crate) const FORMATS: [&dyn RecordingFormat; 8] = [
+    #[cfg(feature = "parquet")]
     &parquet::ParquetFormat,
+    #[cfg(not(feature = "parquet"))]
+    &disabled::PARQUET,
     &matlab::Matlab5Format,
+    #[cfg(feature = "hdf5")]
     &hdf5::Hdf5Format,
+    #[cfg(not(feature = "hdf5"))]
+    &disabled::HDF5,
+    #[cfg(feature = "logs")]
     &mcap::McapFormat,
+    #[cfg(not(feature = "logs"))]
+    &disabled::MCAP,
+    #[cfg(feature = "logs")]
     &rosbag::Rosbag2Format,
+    #[cfg(not(feature = "logs"))]
+    &disabled::ROSBAG2,
     &packing::CompressedFormat(packing::CompressionMethod::Gzip),
     &packing::CompressedFormat(packing::CompressionMethod::Zstd),
     &csv::CsvFormat,

@@ -41,8 +41,10 @@ pub(super) enum CompressionMethod {
     /// Zstandard, possibly with several frames.
     Zstd,
     /// Brotli, in Parquet files.
+    #[cfg(feature = "parquet")]
     Brotli,
     /// LZ4 frames, in MCAP files.
+    #[cfg(any(feature = "parquet", feature = "logs"))]
     Lz4,
 }
 
@@ -52,12 +54,15 @@ impl CompressionMethod {
         match self {
             Self::Gzip => Box::new(MultiGzDecoder::new(packed)),
             Self::Zstd => Box::new(ZstdReader::new(packed)),
+            #[cfg(feature = "parquet")]
             Self::Brotli => Box::new(brotli_decompressor::Decompressor::new(packed, 1 << 16)),
+            #[cfg(any(feature = "parquet", feature = "logs"))]
             Self::Lz4 => Box::new(lz4_flex::frame::FrameDecoder::new(packed)),
         }
     }
 
     /// Decompresses bytes; fails when the result is longer than `most` bytes.
+    #[cfg(any(feature = "parquet", feature = "logs"))]
     pub(super) fn decompress(self, packed: &[u8], most: u64) -> io::Result<Vec<u8>> {
         let mut bytes = Vec::new();
         // One byte more than allowed shows that the result is too long.
@@ -77,7 +82,9 @@ impl CompressionMethod {
         match self {
             Self::Gzip => "a file compressed by gzip",
             Self::Zstd => "a file compressed by zstd",
+            #[cfg(feature = "parquet")]
             Self::Brotli => "a file compressed by brotli",
+            #[cfg(any(feature = "parquet", feature = "logs"))]
             Self::Lz4 => "a file compressed by lz4",
         }
     }
@@ -277,7 +284,11 @@ impl RecordingFormat for CompressedFormat {
                 first.starts_with(&[0x28, 0xB5, 0x2F, 0xFD])
                     || (first.len() > 3 && first[0] >> 4 == 5 && first[1..4] == [0x2A, 0x4D, 0x18])
             }
-            CompressionMethod::Brotli | CompressionMethod::Lz4 => false,
+            // Only pages of Parquet and chunks of MCAP are compressed in these ways.
+            #[cfg(feature = "parquet")]
+            CompressionMethod::Brotli => false,
+            #[cfg(any(feature = "parquet", feature = "logs"))]
+            CompressionMethod::Lz4 => false,
         }
     }
 
