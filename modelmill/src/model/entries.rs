@@ -1,4 +1,5 @@
-//! The entries of a model as pairs of a name and a text, so that two models can be compared.
+//! The entries of a model as pairs of a name and a text, so that two models can be compared. Each function describes
+//! one group of tables of the model file.
 
 use modelmill_spec::{
     CoordinateIdx, DriveKind, EffectPlace, ExactAngle, ExactExpression, ExactLength, FrameAxis,
@@ -6,12 +7,12 @@ use modelmill_spec::{
     TwistAxes,
 };
 
-/// Entries as they are collected.
+/// Collects entries: pairs of a name and a text, in the order of the file.
 #[derive(Default)]
 struct ModelEntries(Vec<(String, String)>);
 
 impl ModelEntries {
-    /// Entries of the same name are told apart by their place in the file.
+    /// Adds an entry. Entries of the same name get a number, by their order in the file.
     fn add(&mut self, kind: &str, name: &str, text: String) {
         let mut key = format!("{kind} {name}").trim().to_owned();
         let mut twin = 1;
@@ -33,6 +34,7 @@ pub(crate) fn entries(m: &Mechanism) -> Vec<(String, String)> {
     entries.0
 }
 
+/// Gravity, constants, parameters and coordinates.
 fn quantities(m: &Mechanism, entries: &mut ModelEntries) {
     entries.add("gravity", "", triple(m, &m.gravity));
     for c in &m.constants {
@@ -49,6 +51,7 @@ fn quantities(m: &Mechanism, entries: &mut ModelEntries) {
     }
 }
 
+/// Frames and points.
 fn geometry(m: &Mechanism, entries: &mut ModelEntries) {
     for f in &m.frames {
         if f.convention == FrameConvention::Base {
@@ -63,12 +66,14 @@ fn geometry(m: &Mechanism, entries: &mut ModelEntries) {
         let what = format!("on {}, {steps}", m.frames[f.parent.0].name);
         entries.add("frame", &f.name, what);
     }
+    // Points are given in the axes of their frame.
     for p in &m.points {
         let what = format!("on {} at {}", m.frames[p.frame.0].name, triple(m, &p.at));
         entries.add("point", &p.name, what);
     }
 }
 
+/// Parts and lumped masses.
 fn bodies(m: &Mechanism, entries: &mut ModelEntries) {
     for p in &m.parts {
         let inertial = match &p.inertial {
@@ -96,6 +101,7 @@ fn bodies(m: &Mechanism, entries: &mut ModelEntries) {
         let what = format!("on {}, {inertial}", m.frames[p.frame.0].name);
         entries.add("part", &p.name, what);
     }
+    // A lumped mass may act at different places in the two balances.
     for l in &m.lumped_masses {
         let places = if l.force_at == l.moment_at {
             format!("at {}", triple(m, &l.force_at))
@@ -112,6 +118,7 @@ fn bodies(m: &Mechanism, entries: &mut ModelEntries) {
     }
 }
 
+/// Loops, couplings, drives, effects, retained products and columns of recordings.
 fn actuation(m: &Mechanism, entries: &mut ModelEntries) {
     for l in &m.loops {
         let [a, b] = l.joins.map(|p| m.points[p.0].name.clone());
@@ -136,6 +143,7 @@ fn actuation(m: &Mechanism, entries: &mut ModelEntries) {
         };
         entries.add("drive", &d.name, how);
     }
+    // The places belong to the name of an effect, since a kind may occur several times.
     for e in &m.effects {
         let name = format!("{} at {}", e.kind, places(m, e));
         entries.add("effect", &name, terms(m, e));
@@ -149,15 +157,18 @@ fn actuation(m: &Mechanism, entries: &mut ModelEntries) {
     }
 }
 
+/// A vector as `(x, y, z)`.
 fn triple(m: &Mechanism, vector: &[ExactExpression; 3]) -> String {
     let entries: Vec<String> = vector.iter().map(|e| text(m, e)).collect();
     format!("({})", entries.join(", "))
 }
 
+/// An exact expression in the names of the model.
 fn text(m: &Mechanism, exact: &ExactExpression) -> String {
     exact.to_text(&|symbol| m.symbol_name(symbol).to_owned())
 }
 
+/// A product of powers of parameters, such as `m1*dc1^2`.
 fn product(m: &Mechanism, powers: &[(modelmill_spec::ParameterIdx, u32)]) -> String {
     let factors: Vec<String> = powers
         .iter()
@@ -169,6 +180,7 @@ fn product(m: &Mechanism, powers: &[(modelmill_spec::ParameterIdx, u32)]) -> Str
     factors.join("*")
 }
 
+/// The entries of an inertia that are not zero, such as `xx I1, zz I3`.
 fn tensor(m: &Mechanism, inertia: &[ExactExpression; 6]) -> String {
     let entries: Vec<String> = ["xx", "xy", "xz", "yy", "yz", "zz"]
         .iter()
@@ -183,6 +195,7 @@ fn tensor(m: &Mechanism, inertia: &[ExactExpression; 6]) -> String {
     }
 }
 
+/// One step of a frame: a rotation, a translation, or a free body.
 fn step(m: &Mechanism, step: &FrameStep) -> String {
     let letter = |axis: &FrameAxis| match axis {
         FrameAxis::X => "x",
@@ -214,6 +227,7 @@ fn step(m: &Mechanism, step: &FrameStep) -> String {
     }
 }
 
+/// An angle: a linear combination of symbols and of pi.
 fn angle_text(m: &Mechanism, angle: &ExactAngle) -> String {
     let mut terms: Vec<String> = angle
         .terms
@@ -227,6 +241,7 @@ fn angle_text(m: &Mechanism, angle: &ExactAngle) -> String {
     join(&terms)
 }
 
+/// A length: a linear combination of coordinates, and an offset.
 fn length_text(m: &Mechanism, length: &ExactLength) -> String {
     let mut terms: Vec<String> = length
         .coordinates
@@ -244,6 +259,7 @@ fn length_text(m: &Mechanism, length: &ExactLength) -> String {
     join(&terms)
 }
 
+/// A factor times a symbol, without a factor of one.
 fn times(factor: &str, what: &str) -> String {
     match factor {
         "1" => what.to_owned(),
@@ -252,6 +268,7 @@ fn times(factor: &str, what: &str) -> String {
     }
 }
 
+/// A sum of terms; `0` without terms.
 fn join(terms: &[String]) -> String {
     if terms.is_empty() {
         return "0".to_owned();
@@ -259,13 +276,14 @@ fn join(terms: &[String]) -> String {
     terms.join(" + ").replace("+ -", "- ")
 }
 
+/// The names of an effect's places.
 fn places(m: &Mechanism, effect: &ModelEffect) -> String {
     let names = effect.places.iter().map(|place| m.place_name(*place));
     names.collect::<Vec<_>>().join(", ")
 }
 
-/// The name of a symbol of an effect. Where there is only one place, its quantities are called as the columns of a
-/// recording are.
+/// The name of a symbol of an effect. If the effect has one place, its quantities have the names of the columns of a
+/// recording.
 fn symbol_name_at_place(m: &Mechanism, effect: &ModelEffect, symbol: ModelSymbol) -> String {
     let (ModelSymbol::Place(quantity), [place]) = (symbol, effect.places.as_slice()) else {
         return m.symbol_name(symbol).to_owned();
@@ -288,7 +306,10 @@ fn symbol_name_at_place(m: &Mechanism, effect: &ModelEffect, symbol: ModelSymbol
     }
 }
 
+/// The force of an effect in its parameters; for effects with mechanics of their own, the names of
+/// their parameters and
 fn terms(m: &Mechanism, effect: &ModelEffect) -> String {
+    /// the values of their constants.
     if effect.mechanics.is_some() {
         let names = effect.terms.iter().map(|term| {
             let parameter = &m.parameters[term.parameter.0];
@@ -306,6 +327,7 @@ fn terms(m: &Mechanism, effect: &ModelEffect) -> String {
             let expression = term
                 .expression
                 .to_text(&|symbol| symbol_name_at_place(m, effect, symbol));
+            // Expressions with blanks or quotients need brackets behind a parameter.
             match expression.as_str() {
                 "1" => name.clone(),
                 expression if expression.contains([' ', '/']) => format!("{name}*({expression})"),
