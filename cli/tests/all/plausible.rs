@@ -646,7 +646,7 @@ fn a_rank_without_a_clear_gap_is_said_to_be_none() {
     assert!(gap > 1.0 && gap < 1e3, "{gap}");
     for command in ["check", "equations"] {
         let said = ran(&[command, &file]).err;
-        assert!(said.contains("stands on a small gap of"), "{said}");
+        assert!(said.contains("is based on a small gap of"), "{said}");
     }
     // The condition of the columns that are retained is poor, and the note beside the page says what the rank is worth.
     let said = ran(&["equations", &file]).err;
