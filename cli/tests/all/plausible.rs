@@ -247,11 +247,11 @@ fn a_recording_given_twice_is_said() {
     std::fs::copy(&data, &copy).expect("a copy");
     remarked(
         &["identify", &model, "--data", &data, "--data", &copy],
-        &["copy.csv are the same recording", "it counts twice"],
+        &["copy.csv are the same recording", "it has double weight"],
     );
     remarked(
         &["identify", &model, "--data", &data, "--check", &data],
-        &["such a check proves nothing"],
+        &["such a validation proves nothing"],
     );
     let (err, _) = both(&["identify", &model, "--data", &data, "--check", &other]);
     assert_eq!(err, "");

@@ -68,7 +68,7 @@ impl SmootherCandidate {
                 significant(period, 5),
                 self.frequency_text()
             ),
-            None => format!("is smoothed at {}", self.frequency_text()),
+            None => format!("is smoothed by a low-pass at {}", self.frequency_text()),
         }
     }
 }
