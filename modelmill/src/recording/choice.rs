@@ -216,7 +216,7 @@ impl SmootherSearch<'_> {
         others.extend(tried.neighbours().chain(other));
         let others = others.join(", ");
         let every = if decimate > 1 {
-            format!(", and decimated by {decimate} after the same filter on forces and regressor")
+            format!(", and decimated by {decimate} after a low-pass on forces and regressor")
         } else {
             String::new()
         };
