@@ -151,7 +151,7 @@ fn faults_of_sensors_are_named_and_treated() {
         "{says}"
     );
     // Spikes of a million newtons would have moved parameters by many of their deviations.
-    assert!(says.contains("Left in, the faults of sensors in"), "{says}");
+    assert!(says.contains("Without their repair, the sensor faults in"), "{says}");
     let (_, says) = identified(&write("sound.csv", &all), &[]);
     assert!(!says.contains("Left in"), "{says}");
     // A motor's force before a gear of 60 is another quantity.

@@ -189,12 +189,12 @@ fn impossible_values_are_pointed_out() {
     let data = whole("negative", 1500, 3.0, -0.5);
     remarked(
         &["identify", &model, "--data", &data],
-        &["p2_min = Fv comes out as -0.", "must be positive"],
+        &["p2_min = Fv is estimated as -0.", "must be positive"],
     );
     let data = whole("heavy", 1500, -3.0, 0.5);
     remarked(
         &["identify", &model, "--data", &data],
-        &["p1_min = M comes out as -", "must be positive"],
+        &["p1_min = M is estimated as -", "must be positive"],
     );
     let (err, _) = both(&["identify", &model, "--data", &whole("fine", 1500, 3.0, 0.5)]);
     assert!(!err.contains("physical sense"), "{err}");
@@ -293,7 +293,7 @@ fn undetermined_parameters_stay_where_it_is_said() {
     });
     let (err, _) = both(&["identify", &model, "--data", &data]);
     assert!(
-        err.contains("nearest to the nominal ones are taken: p1_min = ")
+        err.contains("nearest to the nominal ones are used: p1_min = ")
             && err.contains("(nominal 3.00000)"),
         "{err}"
     );

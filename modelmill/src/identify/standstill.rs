@@ -1,5 +1,5 @@
-//! Equations at standstill: while a drive hardly moves its friction takes any value, and the sign of its rate is noise,
-//! so that they may be left out of a fit.
+//! Equations at standstill: while a drive hardly moves, its friction may have any value and the sign of its rate is
+//! noise. Such equations may be excluded from a fit.
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{OptionName, Remedy};
@@ -11,9 +11,10 @@ use crate::model::Model;
 use crate::stretch::RecordingSegment;
 use crate::text::table::count;
 
-/// Gives equations at standstill the weight 0, and says how many there are.
+/// Gives equations at standstill the weight 0, and adds a note with their number.
 ///
-/// `part` is the share of a drive's fastest rate below which it stands still.
+/// `part` is the fraction of a drive's fastest rate below which it is at standstill. Fails when all equations of a
+/// drive would be excluded.
 pub(crate) fn exclude_standstill(
     model: &Model,
     data: &mut [RecordingSegment],
@@ -28,6 +29,7 @@ pub(crate) fn exclude_standstill(
             Ok(rates.into_iter().map(pick).collect())
         })
         .collect::<Outcome<_>>()?;
+    // The fastest rate of each drive is taken over all recordings.
     let fastest: Vec<f64> = (0..drives.len())
         .map(|d| {
             let all = rates.iter().flat_map(|run| &run[d]);
@@ -55,16 +57,16 @@ pub(crate) fn exclude_standstill(
     for (drive, out) in drives.iter().zip(out) {
         if out == of {
             return Err(Error::input(message!(
-                "`{drive}` stands still in all recordings of the fit, so {} leaves nothing of it; \
-                 use a recording in which it moves, or leave {} out",
+                "`{drive}` is at standstill in all recordings of the fit, so {} excludes all its equations; \
+                 use a recording in which it moves, or omit {}",
                 standstill,
                 standstill
             )));
         }
         if out > 0 {
             data[0].note(model, RecordingNote::info(message!(
-                "Of the {} of `{drive}` {out} are left out of the fit: it is slower there than {part} of its fastest \
-                 ({}). Error figures count them.",
+                "Of the {} of `{drive}`, {out} are left out of the fit: its rate there is below {part} of its fastest \
+                 ({}). Error figures include them.",
                 count(of, "equation", "equations"),
                 standstill,
             )));

@@ -1,5 +1,5 @@
-//! Physical consistency of a model file's bodies: what must be positive definite, and base parameters as functions of the
-//! physical ones.
+//! Refinement: physical consistency of bodies. Pseudo-inertias and positive effect parameters are constrained to be
+//! positive definite, and base parameters are functions of the physical ones.
 
 use modelmill_identify::estimate::{
     BaseMap, BodyMatrix, PhysicalParameters, WeightedEstimate, physical_parameters,
@@ -30,7 +30,7 @@ pub(super) fn refine(
     solution.values.clone_from(&physical.base);
     solution.residual_norm = physical.residual_norm;
     deviations.std.clone_from(&physical.base_std);
-    // Nominal values say what the recordings do not.
+    // Directions that the recordings do not determine are fixed by nominal values.
     solution.undetermined.clear();
     solution.determined = physical.base.iter().map(|_| true).collect();
     Ok(RefinementResult::Physical(
@@ -40,7 +40,7 @@ pub(super) fn refine(
     ))
 }
 
-/// Physical parameters that bodies can have, with the names of the bodies.
+/// Solves for physical parameters that bodies can have; also returns the names of the bodies.
 fn solve_physical(
     model: &Model,
     triangle: &RFactor,
@@ -50,9 +50,10 @@ fn solve_physical(
 ) -> Outcome<(PhysicalParameters, Vec<String>)> {
     let mechanism = &model.derivation.mechanism;
     let start = start_values(model, solution, deviations, unknown);
+    // Bodies are constrained as matrices, effect parameters as matrices of one entry.
     let mut bodies = bodies(mechanism);
     for p in model.positive_effects() {
-        // One whose nominal value is not given and whose column repeats another's stays free.
+        // A parameter without a start value, whose column repeats another's, is not constrained.
         if start[p] > 0.0 {
             bodies.push(BodyMatrix {
                 name: mechanism.parameters[p].name.clone(),
@@ -68,7 +69,7 @@ fn solve_physical(
     Ok((found, bodies.into_iter().map(|body| body.name).collect()))
 }
 
-/// Nominal values; where the file gives none for a parameter of an effect, what least squares found.
+/// Start values: nominal ones; for positive effect parameters without a nominal value, the least-squares estimate.
 fn start_values(
     model: &Model,
     solution: &RegressionSolution,
@@ -77,6 +78,7 @@ fn start_values(
 ) -> Vec<f64> {
     let parameters = &model.derivation.mechanism.parameters;
     let mut start: Vec<f64> = parameters.iter().map(|p| p.nominal).collect();
+    // The estimate exists only if the parameter is a base parameter of its own.
     for p in model.positive_effects() {
         if start[p] > 0.0 {
             continue;
@@ -97,7 +99,7 @@ fn start_values(
     start
 }
 
-/// Base parameters and their derivatives.
+/// The base parameters `unknown` at the physical parameters `x`, and their Jacobian.
 fn base_map(model: &Model, unknown: &[usize], x: &[f64]) -> (DVector<f64>, DMatrix<f64>) {
     let mut values = DVector::zeros(unknown.len());
     let mut slopes = DMatrix::zeros(unknown.len(), x.len());
@@ -109,6 +111,7 @@ fn base_map(model: &Model, unknown: &[usize], x: &[f64]) -> (DVector<f64>, DMatr
                 .map(|(p, n)| (*p, i32::try_from(*n).unwrap_or(i32::MAX)))
                 .collect();
             values[row] += factor * powers.iter().map(|(p, n)| x[*p].powi(*n)).product::<f64>();
+            // The derivative of a product of powers, factor by factor.
             for (at, (p, n)) in powers.iter().enumerate() {
                 let others = powers.iter().enumerate().filter(|(other, _)| *other != at);
                 let others: f64 = others.map(|(_, (q, m))| x[*q].powi(*m)).product();
@@ -119,12 +122,13 @@ fn base_map(model: &Model, unknown: &[usize], x: &[f64]) -> (DVector<f64>, DMatr
     (values, slopes)
 }
 
+/// A scalar as a matrix of one entry.
 fn scalar_matrix(value: f64) -> DMatrix<f64> {
     DMatrix::from_element(1, 1, value)
 }
 
-/// What must be positive definite: the pseudo-inertia of a part that has all three moments, mass and inertia about the
-/// centre of one that is only seen turning about one axis, and masses of points.
+/// The matrices that must be positive definite: the pseudo-inertia of a part with all three moments; mass and inertia
+/// about the centre for a part with one moment; the mass of a lumped mass.
 fn bodies(mechanism: &Mechanism) -> Vec<BodyMatrix<'_>> {
     let mut bodies = Vec::new();
     for part in &mechanism.parts {
@@ -146,6 +150,7 @@ fn bodies(mechanism: &Mechanism) -> Vec<BodyMatrix<'_>> {
     bodies
 }
 
+/// Adds the constraints of one part; none if it has no parameter.
 fn add_part<'a>(
     mechanism: &'a Mechanism,
     name: &str,
@@ -162,6 +167,7 @@ fn add_part<'a>(
         first_moment: place,
         inertia,
     }) = inertial;
+    // A part of numbers only cannot be inconsistent with a fit.
     let all = std::iter::once(mass).chain(place).chain(inertia);
     if !all.clone().any(has_parameter) {
         return;
@@ -177,6 +183,7 @@ fn add_part<'a>(
     let moments: Vec<usize> = (0..3)
         .filter(|axis| !inertia[diagonal[*axis]].is_zero())
         .collect();
+    // The number of moments of inertia decides which constraint applies.
     match moments.as_slice() {
         [] if has_mass => bodies.push(BodyMatrix {
             name,
@@ -206,6 +213,7 @@ fn add_part<'a>(
             }),
             copies: 1.0,
         }),
+        // Two moments, or no mass: each value is only constrained to be positive.
         axes => {
             for axis in axes {
                 let moment = &inertia[diagonal[*axis]];
@@ -226,7 +234,7 @@ fn add_part<'a>(
     }
 }
 
-/// Mass, first moment and inertia about the frame's origin.
+/// Mass, first moment and inertia about the frame's origin, at the parameters `x`.
 fn about_origin(
     mechanism: &Mechanism,
     inertial: &PartInertia,
@@ -268,6 +276,7 @@ fn about_origin(
     }
 }
 
+/// The value of an expression at the parameters `x` and the constants of the file.
 fn value(mechanism: &Mechanism, exact: &ExactExpression, x: &[f64]) -> f64 {
     exact.evaluate(&|symbol| match symbol {
         ModelSymbol::Parameter(p) => x[p.0],
@@ -276,12 +285,13 @@ fn value(mechanism: &Mechanism, exact: &ExactExpression, x: &[f64]) -> f64 {
     })
 }
 
+/// Whether an expression contains a parameter.
 fn has_parameter(exact: &ExactExpression) -> bool {
     exact.mentions(&|symbol| matches!(symbol, ModelSymbol::Parameter(_)))
 }
 
 impl Model {
-    /// Parameters of effects that must be positive, ascending.
+    /// Indices of the effect parameters that must be positive, ascending.
     fn positive_effects(&self) -> Vec<usize> {
         let effects = &self.derivation.mechanism.effects;
         let mut found: Vec<usize> = effects
