@@ -27,7 +27,7 @@ pub enum SettingValue {
 
 impl Model {
     /// The model with effects added to its file; [`Model::text`] of the result is the edited file. All else is kept
-    /// byte for byte. No file is written. byte for byte. Nothing is written.
+    /// byte for byte. No file is written.
     ///
     /// Fails when the edited file is invalid: an unknown kind or place, a missing value, or an effect given twice.
     pub fn with_added_effects(&self, effects: &[NewEffect]) -> Outcome<Model> {

@@ -107,8 +107,8 @@ pub fn variables(model: &Model, data: &RecordingSegment) -> Outcome<Vec<(String,
 
 /// Columns of numbers along a segment, evaluated block by block: `[column][sample]`.
 ///
+/// Fails at the first pose without a solution, and at the first value that is not finite.
 pub fn columns(
-    /// Fails at the first pose without a solution, and at the first value that is not finite.
     model: &Model,
     data: &RecordingSegment,
     mut evaluate: impl FnMut(&MotionStates<'_>) -> Result<Vec<Vec<f64>>, PoseFault>,

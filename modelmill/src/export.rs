@@ -14,8 +14,8 @@ use crate::model::Model;
 #[derive(Clone, Debug, PartialEq)]
 pub struct ExportedRobot {
     /// Its text.
+    pub text: String,
     /// What the format cannot express, and inertias that no body can have.
-    /// What the format does not say, and what no body can be.
     pub notes: Vec<RecordingNote>,
 }
 

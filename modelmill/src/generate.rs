@@ -82,8 +82,7 @@ pub struct CodeOptions {
 
 impl Model {
     /// The model as source files: one module in Rust, a header and a source in C99, or a crate with a copy of the
-    /// runtime, so that its folder can be moved freely. anywhere. Paths are relative to that folder. Paths are
-    /// relative to that folder.
+    /// runtime, so that its folder can be moved freely. Paths are relative to that folder.
     ///
     /// Fails when the language lacks a requested part, or the equations cannot be derived for the mechanism.
     pub fn generate(&self, code: &CodeOptions) -> Outcome<Vec<EmittedFile>> {

@@ -70,8 +70,8 @@ impl Model {
 
 /// Indices of the unknown parameters, in the requested order.
 ///
+/// Fails when a name is not a parameter of the model or is given twice.
 pub fn unknown_indices(model: &Model, names: &[String]) -> Outcome<Vec<usize>> {
-    /// Fails when a name is not a parameter of the model or is given twice.
     let parameters = &model.derivation.mechanism.parameters;
     let mut found = Vec::new();
     for name in names.iter().map(|name| name.trim()) {

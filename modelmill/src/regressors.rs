@@ -68,8 +68,8 @@ pub(crate) fn regressor_of(
 
 /// Columns along one segment, drive by drive; `None` where a column is zero throughout, as most are on most drives.
 ///
+/// Fails when the mechanism cannot reach a pose.
 fn nonzero_columns(
-    /// Fails when the mechanism cannot reach a pose.
     one: &RecordingSegment,
     evaluator: &ModelEvaluator<'_>,
     model: &Model,

@@ -244,8 +244,9 @@ impl ModelFunctions {
 
     /// Positions, rates, accelerations and forces as far as the function reads them.
     ///
+    /// Fails when one of them is missing or has another number of rows or columns.
     fn checked_inputs<'a>(
-        /// Fails when one of them is missing or has another number of rows or columns. &self,
+        &self,
         function: ModelFunction,
         given: &StateSamples<'a>,
     ) -> Outcome<[Option<StateMatrix<'a>>; 4]> {
@@ -366,7 +367,7 @@ fn fill(
             evaluator.forward_dynamics(dynamics, &given, values, &forces)?
         }
         (ModelFunction::Reactions, _, Some(reactions)) => evaluator.reactions(reactions, &given)?,
-        // The regressor is large: it is written block by block and not held as columns.
+        // The regressor is large: it is written block by block, without its columns in memory.
         (ModelFunction::Regressor, ..) => {
             let mut start = 0;
             return evaluator.regressor_blocks(&given, |len, columns| {

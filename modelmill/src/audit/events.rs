@@ -29,7 +29,7 @@ const FEWEST_TOGETHER: usize = 5;
 const MOST_TOGETHER: usize = 11;
 /// An event exceeds the usual residual by this factor.
 const ABOVE: f64 = 5.0;
-/// Four fifths of the run stay below the usual residual.
+/// The usual residual is the one that this fraction of the run stays below.
 const USUAL: f64 = 0.8;
 /// An event is at least this fraction of the drive's force.
 const LEAST: f64 = 0.02;
@@ -40,13 +40,12 @@ const LONGEST: f64 = 0.15;
 /// Shortest event, s.
 const SHORTEST: f64 = 0.1;
 /// Number of samples of an event that are compared with the rest of the run.
-/// states, with less than this part of what is left.
-/// Number of nearest samples of the rest for each of them.
 const COMPARED: usize = 40;
-/// Largest distance of such a neighbour, in standard deviations of the states.
+/// Number of nearest samples of the rest for each of them.
 const NEIGHBOURS: usize = 5;
-/// Neighbours with less than this fraction of the residual show that it does not repeat.
+/// Largest distance of such a neighbour, in standard deviations of the states.
 const NEAR: f64 = 1.0;
+/// Neighbours with less than this fraction of the residual show that it does not repeat.
 const ALIKE: f64 = 0.4;
 /// Fraction of its fastest rate below which a drive may be reversing.
 const SLOW: f64 = 0.1;
@@ -222,14 +221,14 @@ struct UnexplainedForces {
 }
 
 /// The residual of a drive along a run.
-/// Median of the magnitude over neighbouring samples, N or N m; zero at reversals.
 struct ResidualLevel {
-    /// Whether the drive reverses or stands still, for each sample.
+    /// Median of the magnitude over neighbouring samples, N or N m; zero at reversals.
     values: Vec<f64>,
-    /// Usual size of the values.
+    /// Whether the drive reverses or is at standstill, for each sample.
     reverses: Vec<bool>,
-    /// Size above which a value belongs to an event.
+    /// Usual size of the values.
     usual: f64,
+    /// Size above which a value belongs to an event.
     bound: f64,
 }
 

@@ -304,8 +304,8 @@ struct ColumnHypothesis {
     /// What happened, as a clause.
     says: String,
     /// What to do about it.
-    /// What it does to the motion.
     advice: Message,
+    /// What it does to the motion.
     change: Box<MotionChange<'static>>,
 }
 

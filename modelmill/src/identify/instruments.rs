@@ -23,8 +23,8 @@ pub enum Instruments<'a> {
 
 /// One segment of instruments for each of `data`; none without instruments.
 ///
+/// Fails when the weights do not allow instruments, or when the times of the instruments differ.
 pub(crate) fn instrument_segments(
-    /// Fails when the weights do not allow instruments, or when the times of the instruments differ.
     data: &[RecordingSegment],
     instruments: &Instruments<'_>,
     options: &EstimatorOptions,
@@ -75,8 +75,8 @@ fn check_same_times(data: &[RecordingSegment], instruments: &[RecordingSegment])
         let step = a
             .windows(2)
             .map(|w| w[1] - w[0])
-            // Times may differ by rounding only.
             .fold(f64::INFINITY, f64::min);
+        // Times may differ by rounding only.
         let apart = a
             .iter()
             .zip(b)
@@ -107,9 +107,9 @@ fn check_same_times(data: &[RecordingSegment], instruments: &[RecordingSegment])
 
 /// The recording with the states of the next period; near its end with those of the period before.
 ///
+/// Fails when the recording is shorter than one and a half periods, or has no sample one period
+/// away.
 fn shift_by_period(data: &RecordingSegment, period: f64) -> Outcome<RecordingSegment> {
-    /// Fails when the recording is shorter than one and a half periods, or has no sample one period
-    /// away.
     let time = &data.run.time;
     let n = time.len();
     let span = time

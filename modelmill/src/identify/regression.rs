@@ -56,10 +56,10 @@ pub struct InstrumentStatistics {
 /// Identifies the base parameters of a model from recordings, eq. (12). Base parameters that are numbers of the model
 /// file are no unknowns: their force is subtracted from the measured one. `instruments` has one segment for each of
 /// `data`, or none.
+///
+/// Fails when nothing is unknown, and as [`Model::identify`] does.
 pub fn identify(
-    ///
     model: &Model,
-    /// Fails when nothing is unknown, and as [`Model::identify`] does.
     data: &[RecordingSegment],
     instruments: &[RecordingSegment],
     args: &EstimatorOptions,

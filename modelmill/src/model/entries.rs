@@ -306,10 +306,9 @@ fn symbol_name_at_place(m: &Mechanism, effect: &ModelEffect, symbol: ModelSymbol
     }
 }
 
-/// The force of an effect in its parameters; for effects with mechanics of their own, the names of
-/// their parameters and
+/// The force of an effect in its parameters; for effects with mechanics of their own, the names of their
+/// parameters and the values of their constants.
 fn terms(m: &Mechanism, effect: &ModelEffect) -> String {
-    /// the values of their constants.
     if effect.mechanics.is_some() {
         let names = effect.terms.iter().map(|term| {
             let parameter = &m.parameters[term.parameter.0];

@@ -436,10 +436,10 @@ impl Model {
 
     /// The model with other values of its base parameters, such as those of a fit, in its order.
     ///
-    #[must_use]
     /// # Panics
+    /// If the number of values is not that of the base parameters.
+    #[must_use]
     pub fn with_values(&self, values: &[f64]) -> Self {
-        /// If the number of values is not that of the base parameters.
         assert_eq!(
             values.len(),
             self.base.len(),

@@ -21,10 +21,10 @@ const SAMPLES: usize = 40;
 /// Largest distance from the nominal pose, rad or m; reduced if loops cannot close.
 const REACH: f64 = 1.0;
 /// Range of rates, per s.
-/// Range of accelerations, per s^2.
 const RATE: f64 = 2.0;
-/// Range of loads, N or N m.
+/// Range of accelerations, per s^2.
 const ACCELERATION: f64 = 5.0;
+/// Range of loads, N or N m.
 const LOAD: f64 = 100.0;
 
 /// Below this ratio of the last singular value that counts to the first that does not, the rank is unclear.
@@ -210,10 +210,10 @@ fn is_pose_dependent(fault: &PoseFault) -> bool {
 
 /// The regressors at states that are evaluated one by one. In a row, Newton's method would start from the state before,
 /// but random states are not neighbours. A state where the mechanism is singular is replaced by another one.
+///
+/// Fails when as many states as wanted were left out.
 fn regressors_state_by_state(
-    ///
     evaluator: &ModelEvaluator<'_>,
-    /// Fails when as many states as wanted were left out.
     sampling: &mut StateSampling,
     wanted: usize,
 ) -> Result<(DMatrix<f64>, DMatrix<f64>), String> {
@@ -287,8 +287,8 @@ impl StateSampling {
 
     /// Draws until there are as many states as wanted.
     ///
+    /// Fails when too many poses cannot be reached; the error is the reason as text.
     fn draw(&mut self, evaluator: &ModelEvaluator<'_>, wanted: usize) -> Result<(), String> {
-        /// Fails when too many poses cannot be reached; the error is the reason as text.
         let n = self.active.len();
         let zero = vec![0.0; n.max(self.n_drives)];
         let resting = |n: usize| zero[..n].iter().map(std::slice::from_ref).collect();

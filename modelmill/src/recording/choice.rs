@@ -370,9 +370,9 @@ impl SmootherSearch<'_> {
             let thin = floor_to_count(rate / (4.0 * passed.min(self.open.band_hz * 4.0))).max(1);
             if folds.is_empty() {
                 folds = vec![FoldSums::new(one.forces.ncols(), one.regressor.ncols()); FOLDS];
-                // Filtered rows are correlated, so that only some of them are added.
             }
             let fold_of = |i: usize| ((before + i) * FOLDS / total).min(FOLDS - 1);
+            // Filtered rows are correlated, so that only some of them are added.
             for i in (margin..n - margin).step_by(thin) {
                 folds[fold_of(i)].add(&filtered, i);
             }
@@ -524,13 +524,17 @@ impl SmootherSearch<'_> {
 
 /// An interval of time, s.
 struct TimeWindow {
+    /// First time.
     from: f64,
+    /// Last time.
     to: f64,
 }
 
 /// Rows of the regressor, one per sample and drive, and forces, one row per sample and one column per drive.
 struct WindowSamples {
+    /// Row `sample * n_drives + drive`, with the columns of friction and offset behind those of the model.
     regressor: DMatrix<f64>,
+    /// `[sample, drive]`.
     forces: DMatrix<f64>,
 }
 
@@ -567,8 +571,11 @@ impl WindowSamples {
 /// Inner products of measured force and model force in one octave of one drive.
 #[derive(Clone, Default)]
 struct OctavePower {
+    /// Sum of squares of the measured force.
     measured: f64,
+    /// Inner product of both forces.
     product: f64,
+    /// Sum of squares of the model force.
     model: f64,
 }
 
@@ -607,14 +614,14 @@ struct FoldSums {
 
 /// Normal equations of one drive.
 #[derive(Clone)]
-/// Gram matrix of the columns, lower triangle.
 struct DriveNormalEquations {
-    /// Inner products of columns and force.
+    /// Gram matrix of the columns, lower triangle.
     normal: DMatrix<f64>,
-    /// Sum of squares of the force.
+    /// Inner products of columns and force.
     right: DVector<f64>,
-    /// Number of rows.
+    /// Sum of squares of the force.
     size: f64,
+    /// Number of rows.
     rows: usize,
 }
 

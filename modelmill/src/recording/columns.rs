@@ -1,5 +1,4 @@
 //! Assigns columns of a recording to the names of the model: first by the user's options, then by the model file.
-//! that the file has.
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{Message, OptionName, Remedy};
@@ -11,6 +10,7 @@ use crate::error::{Error, Outcome};
 use crate::model::Model;
 
 /// Options for reading a recording with the columns `header`; `file` is its name in messages.
+///
 /// Fails when a mapping is not possible for this model, or uses columns that do not exist.
 pub(crate) fn read_options(
     model: &Model,
@@ -133,10 +133,10 @@ fn combined_error(mut faults: Vec<Error>) -> Option<Error> {
 
 /// The assignments that were found.
 #[derive(Default)]
-/// Names of the model with the column that is read for each.
 struct ColumnMapping {
-    /// Names of the model with a sum of columns.
+    /// Names of the model with the column that is read for each.
     renames: Vec<(String, String)>,
+    /// Names of the model with a sum of columns.
     computed: Vec<ComputedColumn>,
 }
 

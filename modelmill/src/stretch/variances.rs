@@ -14,8 +14,8 @@ pub fn column(drive: &str) -> String {
 
 /// Variances for the samples of a run, `[drive][sample]`; `None` unless all drives have them.
 ///
+/// Fails when the samples of the run cannot be matched with lines of the file.
 pub fn recorded_variances(
-    /// Fails when the samples of the run cannot be matched with lines of the file.
     recording: &SignalRecording,
     run: &PreparedRun,
     drives: &[String],
@@ -57,8 +57,8 @@ pub fn recorded_variances(
 
 /// Weights of the rows: the inverse standard deviation, interleaved per sample; every `every`-th sample.
 ///
+/// Fails at a variance that is not positive.
 pub fn factors(
-    /// Fails at a variance that is not positive.
     variance: &[Vec<f64>],
     run: &PreparedRun,
     drives: &[String],

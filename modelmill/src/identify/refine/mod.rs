@@ -58,8 +58,8 @@ impl RefinementResult {
 
 /// Refines the least-squares estimate of the base parameters `unknown`, with their nominal values.
 ///
+/// Fails without degrees of freedom, and as the refinement does.
 pub(crate) fn refine(
-    /// Fails without degrees of freedom, and as the refinement does.
     model: &Model,
     found: &mut WeightedEstimate,
     unknown: &[usize],

@@ -11,8 +11,8 @@ use crate::text::table::percent;
 
 /// Adds nominal values as measurements with the relative standard deviation `sigma`, and solves again.
 ///
+/// Fails when no base parameter has a nominal value other than 0.
 pub(super) fn refine(
-    /// Fails when no base parameter has a nominal value other than 0.
     model: &Model,
     found: &mut WeightedEstimate,
     unknown: &[usize],
