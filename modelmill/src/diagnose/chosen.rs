@@ -1,5 +1,5 @@
-//! An effect that the user names, such as `coulomb_friction@motor:Fc=25.9`: it is derived like a candidate. Output are its columns
-//! along recordings.
+//! An effect that the user names, such as `coulomb_friction@motor:Fc=25.9`: it is derived like a candidate.
+//! Output are its columns along recordings.
 
 use modelmill_codegen::ModelEvaluator;
 use modelmill_identify::diagnose::{
@@ -40,6 +40,7 @@ impl NamedEffect {
              coulomb_friction@motor:Fc=25.9"
                 .to_owned()
         };
+        // Kind and places come before the first colon, values after it.
         let mut parts = text.split(':');
         let (kind, places) = parts
             .next()
@@ -119,6 +120,7 @@ pub(crate) fn derive_effect(
         )));
     }
     let all = candidate_places(mechanism);
+    // Stage 1: find the places by their names.
     let of_kind = named.effect.at.iter().enumerate().map(|(k, place)| {
         // The second place of a kind is only an argument of its expression; the effect does not act there.
         let moves = |one: &&CandidatePlace| {
@@ -130,6 +132,7 @@ pub(crate) fn derive_effect(
         }
     });
     let places: Vec<CandidatePlace> = of_kind.collect::<Outcome<_>>()?;
+    // Stage 2: one entry, or one for each place, in the variant that its evaluation needs.
     let mut singles = Vec::new();
     let mut variants: [CandidateVariant; 3] = Default::default();
     let mut tilt = None;
@@ -157,6 +160,7 @@ pub(crate) fn derive_effect(
             singles: (0..singles.len()).collect(),
         });
     }
+    // Stage 3: derive the variants; those without effects are empty.
     let own = mechanism.effects.len();
     let [known, searched, carried] = variants;
     Ok(ChosenEffect {
@@ -177,6 +181,7 @@ pub(crate) fn derive_effect(
 
 /// Fails for what `add` would refuse: an unknown kind, place or symbol, or an effect that the model has.
 fn check_effect(model: &Model, named: &NamedEffect) -> Outcome {
+    // The same edit that `add` would make detects all faults.
     let kinds = &model.loaded.kinds;
     let mut effect = NewEffect {
         kind: named.effect.kind.clone(),
@@ -222,6 +227,7 @@ fn find_place(
     all: &[CandidatePlace],
     name: &str,
 ) -> Outcome<CandidatePlace> {
+    // The kind must be able to act at the place.
     let suits = |spot: &&CandidatePlace| spot.name == name && kind.on.contains(&spot.sort);
     if let Some(spot) = all.iter().find(suits) {
         return Ok(spot.clone());
@@ -244,8 +250,8 @@ fn find_place(
     )))
 }
 
-/// Constants with a value: given ones and, if none are searched for, default ones. Constants that enter linearly, such as the neutral
-/// position of a spring, are always estimated with the parameters.
+/// Constants with a value: given ones and, if none are searched for, default ones. Constants that enter
+/// linearly, such as the neutral position of a spring, are always estimated with the parameters.
 fn fixed_constants(
     kind: &EffectKind,
     named: &NamedEffect,
@@ -260,6 +266,7 @@ fn fixed_constants(
             .values
             .iter()
             .find(|(symbol, _)| *symbol == constant.symbol);
+        // Defaults of the library are texts, which may be expressions.
         let usual = constant
             .value
             .as_ref()
@@ -285,8 +292,8 @@ fn fixed_constants(
 }
 
 impl ChosenEffect {
-    /// The effect along recordings, with its columns for each value of a constant that is searched for; `None` if all columns are zero.
-    /// `load` is the force that the drives transmit, N or N m.
+    /// The effect along recordings, with its columns for each value of a constant that is searched for; `None`
+    /// if all columns are zero. `load` is the force that the drives transmit, N or N m.
     pub(crate) fn candidate(
         &self,
         model: &Model,
@@ -322,7 +329,7 @@ impl ChosenEffect {
                     .next()
                     .map_or_else(Vec::new, |(_, choices)| choices)
             }
-            // A tilt has one column for each axis: the change of all base_columns columns times their nominal values.
+            // A tilt has one column for each axis: the change of all base columns times their nominal values.
             ColumnSource::Tilt(tilt) => {
                 let level = vec![0.0; tilt.axes.len()];
                 let sum = |direction: [f64; 3]| {
@@ -359,6 +366,7 @@ pub(crate) fn base_columns(
     // The load is the force of all bodies; the known force is subtracted before a fit.
     let (mut load, mut known) = (none.clone(), none);
     let mut free = Vec::new();
+    // Bodies make the load; effects such as friction do not.
     for (k, column) in every.into_iter().enumerate() {
         if !model.is_effect(k) {
             load.add(model.nominal[k], &column);
@@ -370,6 +378,7 @@ pub(crate) fn base_columns(
         }
     }
     let samples = all.iter().map(|(one, _)| one.time().len()).sum();
+    // Drives without load have zeros, so that load-dependent effects can be evaluated.
     for channel in &mut load.0 {
         channel.get_or_insert_with(|| vec![0.0; samples]);
     }

@@ -36,6 +36,7 @@ pub(crate) fn candidate_columns(
             .iter()
             .any(|c| c.2 == ConstantSearch::Linear)
     };
+    // Stage 1: the values of constants, and the rounds in which they are evaluated.
     let grids = grids(candidates, model, all)?;
     // Without linear constants one evaluation of the known effects is enough.
     let of_known = if candidates.singles.iter().any(is_linear) {
@@ -60,6 +61,7 @@ pub(crate) fn candidate_columns(
         })
         .filter(|(_, _, of_round): &(_, _, Vec<usize>)| !of_round.is_empty())
         .collect();
+    // Stage 2: evaluate all rounds.
     let made: Vec<Outcome<Vec<Vec<ForceColumn>>>> = jobs
         .par_iter()
         .map(|(sort, round, of_round)| {
@@ -70,12 +72,14 @@ pub(crate) fn candidate_columns(
             single_columns(candidates, of_round, model, all, *sort, &value)
         })
         .collect();
+    // Stage 3: collect columns by single candidate and round, in the order of the rounds.
     let mut found: Vec<Vec<Vec<ForceColumn>>> = vec![Vec::new(); candidates.singles.len()];
     for ((_, _, of_round), columns) in jobs.iter().zip(made) {
         for (k, columns) in of_round.iter().zip(columns?) {
             found[*k].push(columns);
         }
     }
+    // Stage 4: candidates are sums of single entries; those without finite values are reported.
     let (mut made, mut origins, mut undefined) = (Vec::new(), Vec::new(), Vec::new());
     for (k, entry) in candidates.entries.iter().enumerate() {
         if let Some((candidate, felt)) = candidate(candidates, entry, &found, &grids) {
@@ -91,6 +95,7 @@ pub(crate) fn candidate_columns(
     }
     // The candidates have copies, so this memory can be freed before the tilt is computed.
     drop(found);
+    // Stage 5: tilt and delay, which change the model.
     if let Some((change, derivation)) = &candidates.tilt {
         let tilt = tilt(derivation, model, all)?;
         if !tilt.axes.is_empty() {
@@ -140,6 +145,7 @@ fn grids(
     model: &Model,
     all: &SegmentList<'_>,
 ) -> Outcome<Vec<Vec<f64>>> {
+    // Without constants no motion needs to be evaluated.
     let is_known = |single: &SingleCandidate| single.constants.is_empty();
     if candidates.singles.iter().all(is_known) {
         return Ok(vec![vec![1.0]; candidates.singles.len()]);
@@ -167,8 +173,8 @@ fn effect(candidates: &DerivedCandidates, entry: &CandidateEntry) -> LocatedEffe
     }
 }
 
-/// Largest rate and travel of the place of each single candidate. Places that may share a constant use one grid, that of the place that
-/// moves most.
+/// Largest rate and travel of the place of each single candidate. Places that may share a constant use one
+/// grid, that of the place that moves most.
 fn shared_scales(candidates: &DerivedCandidates, motions: &PlaceMotions) -> Vec<[f64; 2]> {
     let own = |single: &SingleCandidate| motions.scale(single.spots[0].place);
     let mut scales: Vec<[f64; 2]> = candidates.singles.iter().map(own).collect();
@@ -200,8 +206,8 @@ pub(crate) struct CandidateColumns {
     pub(crate) grids: Vec<Vec<f64>>,
 }
 
-/// The entry of the candidates that a candidate in numbers comes from, and which of its parameters have an effect; `None`
-/// where it changes the model rather than adds columns.
+/// The entry of the candidates that a candidate in numbers comes from, and which of its parameters have an
+/// effect; `None` where it changes the model rather than adds columns.
 pub(crate) type CandidateOrigin = Option<(usize, Vec<bool>)>;
 
 /// A candidate that changes the model instead of adding columns.
@@ -252,8 +258,10 @@ fn single_columns(
     }
     let evaluator = ModelEvaluator::with_constants(derivation, constants);
     let reduction = &derivation.reduction;
+    // Each parameter of a candidate enters products with the power 1.
     let holds =
         |product: usize, parameter: usize| reduction.products[product].0.contains(&(parameter, 1));
+    // All other columns of the derivation are zero in this round.
     let wanted = |k: usize| {
         let mut parameters = which
             .iter()
@@ -302,6 +310,7 @@ pub(crate) fn unit_forces(
         EvaluationFrequency::Known,
         &|_, _| 1.0,
     )?;
+    // A force offset has one column.
     let of = |(k, columns): (&usize, Vec<ForceColumn>)| {
         let column = columns.into_iter().next()?;
         Some((candidates.singles[*k].spots[0].clone(), column))
@@ -347,6 +356,7 @@ fn candidate(
         };
         return Some((candidate, felt));
     }
+    // Places of an entry share their parameters, so that their columns are added.
     let sum = |round: usize| -> Vec<ForceColumn> {
         let mut columns = found[entry.singles[0]][round].clone();
         for other in &entry.singles[1..] {
@@ -357,6 +367,7 @@ fn candidate(
         }
         columns
     };
+    // One choice for each value of the searched constant.
     let searched = first.range();
     let mut choices: Vec<ColumnChoice> = match searched {
         Some(symbol) => (grids[entry.singles[0]].iter().enumerate())
@@ -375,7 +386,8 @@ fn candidate(
         .iter()
         .find(|c| c.2 == ConstantSearch::Linear);
     if let (None, Some((symbol, _, _))) = (searched, linear) {
-        // A column is affine in a linear constant, so the difference of its values at 1 and 0 is the column of the product.
+        // A column is affine in a linear constant, so the difference of its values at 1 and 0 is the column of
+        // the product.
         let mut shifts = sum(1);
         for (shift, column) in shifts.iter_mut().zip(&choices[0].columns) {
             shift.add(-1.0, column);
@@ -425,8 +437,8 @@ fn is_part_of_load(kind: &EffectKind) -> bool {
     (kind.mechanics).map_or(kind.on.contains(&ActsOn::Point), Mechanics::is_part_of_load)
 }
 
-/// Columns of candidates that depend on the load of the drives, of all or of one entry. Loads are stacked and decimated like the forces;
-/// `tried` gives the values of the constant of each single candidate.
+/// Columns of candidates that depend on the load of the drives, of all or of one entry. Loads are stacked and
+/// decimated like the forces; `tried` gives the values of the constant of each single candidate.
 pub(crate) fn load_dependent_columns(
     candidates: &DerivedCandidates,
     model: &Model,
@@ -436,6 +448,7 @@ pub(crate) fn load_dependent_columns(
     tried: &dyn Fn(usize) -> Vec<f64>,
 ) -> Outcome<Vec<(usize, Vec<ColumnChoice>)>> {
     let is_wanted = |k: &usize| only.is_none_or(|e| candidates.entries[e].singles.contains(k));
+    // Only candidates that depend on the load are evaluated.
     let which: Vec<usize> = (0..candidates.singles.len())
         .filter(|k| {
             candidates.singles[*k].sort == EvaluationFrequency::LoadDependent && is_wanted(k)
@@ -462,6 +475,7 @@ pub(crate) fn load_dependent_columns(
         loaded.push((one, *is_check));
         start += kept;
     }
+    // The segments with the current loads.
     let all: Vec<(&RecordingSegment, bool)> =
         loaded.iter().map(|(one, check)| (one, *check)).collect();
     let tried: Vec<Vec<f64>> = which.iter().map(|k| tried(*k)).collect();
@@ -488,6 +502,7 @@ pub(crate) fn load_dependent_columns(
             found[k].push(columns);
         }
     }
+    // Single candidates are summed to entries, as for the other candidates.
     let mut made = Vec::new();
     let wanted = candidates.entries.iter().enumerate();
     for (k, entry) in wanted.filter(|(k, _)| only.is_none_or(|only| only == *k)) {
@@ -539,6 +554,7 @@ pub(crate) fn refined_columns(
     entry: &CandidateEntry,
     constant: f64,
 ) -> Option<Vec<ForceColumn>> {
+    // Only the searched constant changes.
     let value = |_: usize, search: &ConstantSearch| match search {
         ConstantSearch::Linear => 0.0,
         ConstantSearch::Range { .. } => constant,

@@ -1,5 +1,6 @@
-//! Faults of recordings that are known before the search: contacts, coarse quantisation, and differences between recordings of the
-//! machine. All are reported and subtracted or left out, so that none is mistaken for an effect.
+//! Faults of recordings that are known before the search: contacts, coarse quantisation, and differences
+//! between recordings of the machine. All are reported and subtracted or left out, so that none is mistaken for
+//! an effect.
 
 use modelmill_identify::changes::NormalEquations;
 use modelmill_identify::diagnose::{
@@ -53,8 +54,10 @@ pub(crate) fn subtract_known(
         }
         problem.disturbances.push(difference(one));
     }
+    // Noise of quantisation and events come from the signals themselves.
     add_quantisation_noise(problem, model, all)?;
     remove_contact_events(problem, all);
+    // Faults from the preparation are listed once, with all of their recordings.
     for one in all.iter().flat_map(|(one, _)| &one.faults) {
         if one.kind == "contact_event" {
             continue;
@@ -80,6 +83,7 @@ pub(crate) fn subtract_known(
 
 /// A difference of two recordings as a disturbance.
 fn difference(one: &RecordingDifference) -> Disturbance {
+    // Changes of load and clock have kinds of their own, all others share one.
     let (_, at, values) = one.changed.change.parts(one.changed.unit);
     let kind = match one.changed.change {
         PhysicalChange::Payload { .. } => "payload_change",
@@ -129,6 +133,7 @@ fn add_quantisation_noise(
         for (one, _) in all {
             recorded.extend_from_slice(&one.run.measured_forces()?[d]);
         }
+        // A low-pass removes the steps, so that decimated forces show none.
         let is_decimated = all.iter().any(|(one, _)| one.decimation() > 1);
         let Some(step) = quantisation_step(&recorded, problem.noise[d]).filter(|_| !is_decimated)
         else {
@@ -148,13 +153,14 @@ fn add_quantisation_noise(
     Ok(())
 }
 
-/// Leaves out contacts and pushes: events that are not a function of a position. An end stop acts at every visit of its place, a push
-/// only once.
+/// Leaves out contacts and pushes: events that are not a function of a position. An end stop acts at every
+/// visit of its place, a push only once.
 fn remove_contact_events(problem: &mut DiagnosisProblem, all: &SegmentList<'_>) {
     let events: Vec<Disturbance> = merge_events(all);
     if events.is_empty() {
         return;
     }
+    // Stage 1: which samples belong to an event, with and without a margin, and the positions there.
     let (mut inside, mut about, mut positions) = (Vec::new(), Vec::new(), Vec::new());
     for (one, _) in all {
         let is_in = |event: &Disturbance, time: f64, margin: f64| {
@@ -172,6 +178,7 @@ fn remove_contact_events(problem: &mut DiagnosisProblem, all: &SegmentList<'_>) 
             positions.push(one.run.q.iter().map(|q| q[at]).collect::<Vec<f64>>());
         }
     }
+    // Stage 2: an end stop would explain the force by the position of one coordinate.
     let channels = problem.layout.channels.iter().enumerate();
     let concerned: Vec<usize> = channels
         .filter(|(_, name)| events.iter().any(|event| event.at.contains(name)))
@@ -195,12 +202,14 @@ fn remove_contact_events(problem: &mut DiagnosisProblem, all: &SegmentList<'_>) 
     if (0..coordinates).any(|i| explains(i, 1.0) || explains(i, -1.0)) {
         return;
     }
+    // Stage 3: a push is excluded for all drives, since it acts through the mechanism.
     problem.left_out = vec![about; problem.layout.channels.len()];
     problem.disturbances.extend(events);
 }
 
-/// Whether the force of an event is that of a stop: the line over the depth, fitted during the event, also predicts the force beyond
-/// the place at other times. Without other times the event is not believed. The model is fitted to the samples before the place.
+/// Whether the force of an event is that of a stop: the line over the depth, fitted during the event, also
+/// predicts the force beyond the place at other times. Without other times the event is not believed. The model
+/// is fitted to the samples before the place.
 fn is_force_beyond_place(
     problem: &DiagnosisProblem,
     channel: usize,
@@ -225,6 +234,7 @@ fn is_force_beyond_place(
     let mut moments = NormalEquations::new(columns.len());
     moments.add_rows(&picked, &some(measured));
     let factors = moments.solve().values;
+    // The residual of the model at any sample.
     let rest = |i: usize| {
         let said = columns.iter().zip(factors.iter());
         let said = said.map(|(column, factor)| column.map_or(0.0, |values| factor * values[i]));

@@ -1,5 +1,5 @@
-//! Laws for the residual that are in no library, with the names of a model: the places where they may act, their formulas over
-//! coordinates, drives and loads, and the entry of a library with which `add` can add them.
+//! Laws for the residual that are in no library, with the names of a model: the places where they may act,
+//! their formulas over coordinates, drives and loads, and the entry of a library with which `add` can add them.
 
 use std::fmt::Write as _;
 
@@ -55,6 +55,7 @@ pub(crate) fn sites(
         });
         places.push(spot);
     }
+    // Positions, rates and accelerations of the places, recording by recording.
     for (one, _) in all {
         let motions = motions(model, one, &places)?;
         for (site, [position, rate, acceleration]) in sites.iter_mut().zip(motions) {
@@ -89,6 +90,7 @@ fn motions(
     } else {
         along::columns(model, one, |states| evaluator.passive_motion(states))?
     };
+    // Active coordinates are recorded, passive ones are computed.
     let of_coordinate = |i: usize| -> Option<[Vec<f64>; 3]> {
         let run = &one.run;
         if let Some(k) = active.iter().position(|a| *a == i) {
@@ -99,6 +101,7 @@ fn motions(
         Some([k, n + k, 2 * n + k].map(|at| of_passive[at].clone()))
     };
     let kept = |values: Vec<f64>| values.into_iter().step_by(one.decimation()).collect();
+    // The acceleration of a linear drive is the derivative of its rate.
     let motion = |spot: &CandidatePlace| {
         let found = match spot.place {
             EffectPlace::Coordinate(i) => of_coordinate(i.0),
@@ -135,14 +138,15 @@ fn slopes(values: &[f64], time: &[f64]) -> Vec<f64> {
 /// A law that would explain the residual; a hypothesis.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ProposedLaw {
-    /// The force that it adds at its place, as a formula over coordinates, rates (`_d`), lengths of drives (`_length`) and loads of drives
-    /// (by the names of the drives).
+    /// The force that it adds at its place, as a formula over coordinates, rates (`_d`), lengths of drives
+    /// (`_length`) and loads of drives (by the names of the drives).
     pub expression: String,
     /// The drive or coordinate on which it acts.
     pub at: String,
     /// Its parameters.
     pub parameters: Vec<EffectEstimate>,
-    /// Share of the squared residual that it explains on data that were not fitted, on the drives on which it has an effect.
+    /// Share of the squared residual that it explains on data that were not fitted, on the drives on which it
+    /// has an effect.
     pub gain: f64,
     /// Effects found that become unnecessary with it.
     pub instead_of: Vec<LocatedEffect>,
@@ -190,6 +194,7 @@ pub(crate) fn hypotheses(model: &Model, diagnosis: &ModelDiagnosis) -> Vec<LawHy
 /// A law of the search with the names of the model.
 fn law(model: &Model, sites: &[LawSite], law: &Proposed) -> ProposedLaw {
     let site = &sites[law.site];
+    // Parameters are numbered in the order of the terms.
     let mut named = LawFormula::new(law);
     let expression = named.text(law, &|variable, other| {
         variable_name(model, &sites[other.unwrap_or(law.site)], variable)
@@ -219,6 +224,7 @@ fn law(model: &Model, sites: &[LawSite], law: &Proposed) -> ProposedLaw {
 
 /// The name of a place's variable, as errors and recordings have it.
 fn variable_name(model: &Model, site: &LawSite, variable: LawVariable) -> String {
+    // A drive on a joint uses the name of the coordinate, a linear drive its own.
     let drive = site
         .channel
         .map(|d| &model.derivation.mechanism.drives[d].kind);
@@ -248,7 +254,8 @@ fn variable_word(variable: LawVariable) -> &'static str {
     }
 }
 
-/// The table of a library for a law, and the effect that adds it to a model; `None` for a law that depends on the earlier motion.
+/// The table of a library for a law, and the effect that adds it to a model; `None` for a law that depends on
+/// the earlier motion.
 fn library_entry(
     sites: &[LawSite],
     law: &Proposed,
@@ -259,7 +266,9 @@ fn library_entry(
     if products.any(LawProduct::has_memory) {
         return None;
     }
+    // The kind is written as TOML, with the words of the library instead of names of the model.
     let site = &sites[law.site];
+    // A second place gives the words `other_coordinate` and `other_rate`.
     let other = law.terms.iter().find_map(|term| term.product.other);
     let other = other.map(|other| &sites[other]);
     let mut formula = LawFormula::new(law);
@@ -281,6 +290,7 @@ fn library_entry(
         text,
         "expression = \"{expression}\"\nsays = \"A hypothesis that recordings suggest. It is no law of the machine until its cause is understood.\""
     );
+    // Units are those of the place: of a force or of a torque.
     text.push_str("[effect_kind.parameters]\n");
     for parameter in parameters {
         let _ = writeln!(
@@ -305,6 +315,7 @@ fn library_entry(
         nominal: Some(round_significant(p.value)),
         ..NewParameter::default()
     };
+    // The effect acts at the first place; the second one is an argument.
     let at = std::iter::once(site).chain(other);
     Some(LawEntry {
         text,
@@ -328,7 +339,8 @@ struct LawFormula {
 }
 
 impl LawFormula {
-    /// Symbols of the parameters: `k` for a term, `ks` and `kc` for sine and cosine, numbered if there are several terms.
+    /// Symbols of the parameters: `k` for a term, `ks` and `kc` for sine and cosine, numbered if there are
+    /// several terms.
     fn new(law: &Proposed) -> Self {
         let several = law.terms.len() > 1;
         let of_term = |(k, term): (usize, &LawTerm)| {
@@ -351,7 +363,8 @@ impl LawFormula {
         }
     }
 
-    /// The formula of a law; `name` gives the name of each variable. Constants are collected on the way if they have symbols.
+    /// The formula of a law; `name` gives the name of each variable. Constants are collected on the way if they
+    /// have symbols.
     fn text(
         &mut self,
         law: &Proposed,
@@ -370,6 +383,7 @@ impl LawFormula {
                     self.factor(*factor, &name(factor.variable, other))
                 })
                 .collect();
+            // Sine and cosine have two parameters, all other factors one.
             let wave = factors.iter().find(|texts| texts.len() > 1);
             let mut product = Vec::new();
             if let Some(wave) = wave {
@@ -410,6 +424,7 @@ impl LawFormula {
     /// A shape of a variable: one text, or those of sine and cosine.
     fn factor(&mut self, factor: LawFactor, z: &str) -> Vec<String> {
         let text = match factor.shape {
+            // Powers of half integers need a scale, so that the unit is independent of the power.
             LawShape::Power {
                 halves,
                 is_odd,
@@ -436,6 +451,7 @@ impl LawFormula {
                 let centre = self.constant("centre", centre, factor);
                 format!("({})^{power}", difference_text(z, &centre))
             }
+            // A hinge is zero on one side of its start.
             LawShape::Hinge { from, side, power } => {
                 let over = if from == 0.0 {
                     z.to_owned()
@@ -449,6 +465,7 @@ impl LawFormula {
                     n => format!("({ramp})^{n}"),
                 }
             }
+            // Both phases, since the phase is estimated linearly.
             LawShape::Wave { pitch } => {
                 let pitch = self.constant("pitch", pitch, factor);
                 return ["sin", "cos"]

@@ -1,5 +1,5 @@
-//! States the search for missing effects in numbers and solves it. Input are a model and recordings, output is an [`Answer`] with
-//! the problem, the diagnosis and the candidates.
+//! States the search for missing effects in numbers and solves it. Input are a model and recordings, output is a
+//! [`DiagnosisSolution`] with the problem, the diagnosis and the candidates.
 
 use modelmill_codegen::ModelEvaluator;
 use modelmill_identify::diagnose::{
@@ -66,8 +66,8 @@ impl DiagnosisSolution {
 pub(crate) struct DiagnosisQuery<'a> {
     /// Which parameters keep their nominal values.
     pub fixed: FixedParameters,
-    /// Whether to search for payloads, laws and alternatives too. Not in the second diagnosis with nominal values: there every wrong
-    /// value of a body would look like a payload.
+    /// Whether to search for payloads, laws and alternatives too. Not in the second diagnosis with nominal
+    /// values: there every wrong value of a body would look like a payload.
     pub in_full: bool,
     /// Differences between the recordings.
     pub run_differences: &'a [RecordingDifference],
@@ -81,6 +81,7 @@ pub(crate) fn find_missing_effects(
     asked: DiagnosisQuery<'_>,
 ) -> Outcome<DiagnosisSolution> {
     let held = asked.fixed;
+    // Stage 1: derive all candidates and evaluate their columns.
     let candidates = model
         .host()
         .run_job("deriving all candidates", 0, |_| candidates(model))??;
@@ -94,6 +95,7 @@ pub(crate) fn find_missing_effects(
                 problem(&candidates, model, &all)
             })??;
     let mut origins = made.origins;
+    // Stage 2: fixed parameters and known faults are subtracted from the forces.
     let other_friction = match held {
         FixedParameters::All => held_friction::changes(model, &problem.base),
         FixedParameters::Known => Vec::new(),
@@ -108,6 +110,7 @@ pub(crate) fn find_missing_effects(
     let mut further = reading_fault_candidates(&problem);
     further.extend(drift_candidates(&problem, &units));
     further.extend(dahl_candidates(model, &all)?);
+    // Stage 3: candidates that need the derivatives of the forces by the motion.
     let values = encoders::values(model, &problem, held);
     let slopes = encoders::sensitivities(model, &all, &values);
     further.extend(encoders::zeros(model, &slopes));
@@ -121,6 +124,7 @@ pub(crate) fn find_missing_effects(
     problem.candidates.extend(further);
     // None of these can be an entry of a model file.
     origins.resize(problem.candidates.len(), None);
+    // Stage 4: the search, which requests further columns while it runs.
     let supply = ColumnSupply {
         candidates: &candidates,
         origins: &origins,
@@ -133,6 +137,7 @@ pub(crate) fn find_missing_effects(
         .run_job("searching for missing effects", 0, |_| {
             diagnose(&mut problem, &supply)
         })?;
+    // Stage 5: texts, and candidates that could not be evaluated.
     for one in &mut diagnosis.disturbances {
         describe_disturbance(one, model);
     }
@@ -182,6 +187,7 @@ struct ColumnSupply<'a> {
 
 impl ColumnProvider for ColumnSupply<'_> {
     fn columns_for_constant(&self, candidate: usize, constant: f64) -> Option<Vec<ForceColumn>> {
+        // Candidates without an entry have no searched constant.
         let (k, felt) = self.origins[candidate].as_ref()?;
         let entry = &self.candidates.entries[*k];
         let columns = refined_columns(self.candidates, self.model, self.all, entry, constant)?;
@@ -258,7 +264,9 @@ fn problem(
             )));
         }
     }
+    // The noise and the layout come from the recordings, the columns from the model.
     let mut made = columns::candidate_columns(candidates, model, all)?;
+    // A row without drive whose force is zero has no noise and no friction.
     let undriven = model
         .derivation
         .mechanism
@@ -289,8 +297,8 @@ fn is_fixed(model: &Model, held: FixedParameters, k: usize) -> bool {
     held == FixedParameters::All || model.is_known(k)
 }
 
-/// Subtracts the forces of fixed parameters from the measured ones. Parameters of an earlier fit stay in the base, with their standard
-/// deviations as prior.
+/// Subtracts the forces of fixed parameters from the measured ones. Parameters of an earlier fit stay in the
+/// base, with their standard deviations as prior.
 fn fix_parameters(problem: &mut DiagnosisProblem, model: &Model, held: FixedParameters) {
     let is_held = |k: usize| is_fixed(model, held, k);
     let fitted: Vec<usize> = (0..model.base.len())
@@ -311,6 +319,7 @@ fn fix_parameters(problem: &mut DiagnosisProblem, model: &Model, held: FixedPara
             is_part_of_load.push(problem.base_is_part_of_load[k]);
         }
     }
+    // The columns of a tilt change with the base, and are split in the same way.
     for candidate in &mut problem.candidates {
         if let ColumnSource::Tilt(tilt) = &mut candidate.source {
             for change in &mut tilt.components {
@@ -351,7 +360,8 @@ fn friction(model: &Model, all: &SegmentList<'_>) -> Outcome<Vec<ForceColumn>> {
     Ok(friction)
 }
 
-/// White noise of each force, N or N m. After decimation motion may look like noise, so the noise of all recorded samples bounds it.
+/// White noise of each force, N or N m. After decimation motion may look like noise, so the noise of all
+/// recorded samples bounds it.
 fn noise_levels(measured: &[Vec<f64>], all: &SegmentList<'_>) -> Outcome<Vec<f64>> {
     let mut noises = Vec::with_capacity(measured.len());
     for (d, kept) in measured.iter().enumerate() {

@@ -13,8 +13,9 @@ use crate::regressors::{SegmentList, regressor};
 /// Constants of a tilt, about x, y and z.
 pub(crate) const TILTS: [&str; 3] = ["tx", "ty", "tz"];
 
-/// Derivative of each base column by gravity along each axis of the base (per m/s^2), and the axes about which a tilt has an
-/// effect. Forces are linear in gravity, so two evaluations for each axis, with gravity in both directions, are exact.
+/// Derivative of each base column by gravity along each axis of the base (per m/s^2), and the axes about which
+/// a tilt has an effect. Forces are linear in gravity, so two evaluations for each axis, with gravity in both
+/// directions, are exact.
 pub(crate) fn tilt(
     derivation: &Derivation,
     model: &Model,
@@ -35,6 +36,7 @@ pub(crate) fn tilt(
     }
     let own = &model.derivation.reduction;
     for (axis, component) in tilt.components.iter_mut().enumerate() {
+        // The base is turned so that gravity points along the axis, in either direction.
         let along = |sign: f64| {
             let mut constants = usual.clone();
             let angles = angles_to(gravity.map(|g| sign * g / size), axis);
@@ -69,6 +71,7 @@ pub(crate) fn tilt(
             component.base.push(change);
         }
     }
+    // Only axes about which a tilt changes the forces are tried.
     let every = TiltCandidate {
         axes: vec![0, 1, 2],
         ..tilt.clone()

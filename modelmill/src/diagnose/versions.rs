@@ -43,14 +43,15 @@ impl ForceComparison {
 }
 
 impl ModelVersion {
-    /// Identifies a model from the fitted recordings, with each drive weighted by its residual as in the diagnosis. If all parameters are
-    /// fixed, the nominal values are used.
+    /// Identifies a model from the fitted recordings, with each drive weighted by its residual as in the
+    /// diagnosis. If all parameters are fixed, the nominal values are used.
     pub fn new(
         model: Model,
         fit: Vec<RecordingSegment>,
         check: Vec<RecordingSegment>,
         held: FixedParameters,
     ) -> Outcome<Self> {
+        // Fixed parameters leave nothing to identify.
         let identified = match held {
             FixedParameters::All => None,
             FixedParameters::Known => {

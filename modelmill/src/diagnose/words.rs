@@ -1,5 +1,5 @@
-//! Sentences for people: verdict, effects with their places, disturbances, and reasons of rejection. Input are values of a
-//! diagnosis, output is English text without line breaks.
+//! Sentences for people: verdict, effects with their places, disturbances, and reasons of rejection. Input are
+//! values of a diagnosis, output is English text without line breaks.
 
 use modelmill_identify::diagnose::{
     DiagnosisVerdict, Disturbance, LocatedEffect, ModelDiagnosis, ROUNDING, SelectionStep,
@@ -83,8 +83,8 @@ pub fn noise_floor_text(diagnosis: &ModelDiagnosis) -> String {
     }
 }
 
-/// The noise floor as a label: `noise in the forces`, or `rounding` if the forces are noise-free. `noise_floor` is relative to
-/// the force.
+/// The noise floor as a label: `noise in the forces`, or `rounding` if the forces are noise-free. `noise_floor`
+/// is relative to the force.
 pub fn floor_label(noise_floor: f64) -> &'static str {
     if is_rounding(noise_floor) {
         "rounding"
@@ -93,8 +93,9 @@ pub fn floor_label(noise_floor: f64) -> &'static str {
     }
 }
 
-/// Why a candidate was rejected, as a sentence for people; `reason` is the word of the search, and `has_effects` says whether
-/// the diagnosis found any effect. A reason without a sentence of its own is returned unchanged.
+/// Why a candidate was rejected, as a sentence for people; `reason` is the word of the search, and
+/// `has_effects` says whether the diagnosis found any effect. A reason without a sentence of its own is
+/// returned unchanged.
 pub fn refusal(reason: &str, has_effects: bool) -> &str {
     match reason {
         "sign" => "its value would have the wrong sign",
@@ -115,8 +116,9 @@ pub fn refusal(reason: &str, has_effects: bool) -> &str {
     }
 }
 
-/// The verdict with figures. The order of the sentences: what may be wrong with the recording or the model, which effects were
-/// found and how the error falls, which part of the residual stays unexplained, disturbances in the recordings.
+/// The verdict with figures. The order of the sentences: what may be wrong with the recording or the model,
+/// which effects were found and how the error falls, which part of the residual stays unexplained, disturbances
+/// in the recordings.
 ///
 /// `channels` are the names of the drives.
 pub fn verdict(
@@ -132,6 +134,7 @@ pub fn verdict(
     let found: Vec<LocatedEffect> = diagnosis.effects.iter().map(|f| f.effect.clone()).collect();
     let falls = error_reduction_text(first, last, channels, judged);
     let them = if found.len() == 1 { "it" } else { "them" };
+    // Each verdict states the error and compares it with the noise.
     let says = match diagnosis.verdict {
         DiagnosisVerdict::Adequate => format!(
             "The model is adequate: its error {} is {} of the force. {noise} No effect of the library lowers this error.",
@@ -144,6 +147,7 @@ pub fn verdict(
         ),
         DiagnosisVerdict::Unexplained => {
             let of = |d: &usize| 100.0 * diagnosis.repeatable_share[*d];
+            // Drives with a residual that a model could explain.
             let sits: Vec<String> = (diagnosis.unexplained.iter())
                 .map(|d| {
                     format!(
@@ -174,8 +178,8 @@ pub fn verdict(
     all.into_iter().flatten().collect::<Vec<_>>().join(" ")
 }
 
-/// How the error falls: of all drives, or, if that hardly changes, of the drive whose error falls most. A small drive would
-/// otherwise be hidden by the others.
+/// How the error falls: of all drives, or, if that hardly changes, of the drive whose error falls most. A small
+/// drive would otherwise be hidden by the others.
 fn error_reduction_text(
     first: &SelectionStep,
     last: &SelectionStep,
@@ -204,7 +208,8 @@ fn error_reduction_text(
     )
 }
 
-/// Suspicions about the recording or the model, which must be checked before any effect is believed; `None` without any.
+/// Suspicions about the recording or the model, which must be checked before any effect is believed; `None`
+/// without any.
 fn first_checks(diagnosis: &ModelDiagnosis) -> Option<String> {
     let suspicions = (diagnosis.disturbances.iter()).filter(|one| is_suspicion(one));
     let says: Vec<&str> = suspicions
@@ -262,6 +267,7 @@ fn disturbances(diagnosis: &ModelDiagnosis) -> Option<String> {
 /// A disturbance as a sentence without the last full stop; sizes have units.
 pub fn disturbance(one: &Disturbance) -> String {
     let at = one.at.join(", ");
+    // The value of an estimate with its unit, rounded for a sentence.
     let value = |name: &str| {
         let found = one.estimates.iter().find(|value| value.name == name);
         found.map_or_else(String::new, |q| {
@@ -270,6 +276,7 @@ pub fn disturbance(one: &Disturbance) -> String {
                 .to_owned()
         })
     };
+    // All estimates with standard deviations, for kinds without a sentence of their own.
     let all: Vec<String> = (one.estimates.iter())
         .map(|q| {
             let deviation = q.standard_deviation;

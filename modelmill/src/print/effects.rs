@@ -53,6 +53,7 @@ fn places(kind: &EffectKind) -> String {
     let all: Vec<&str> = kind.on.iter().map(|on| on.description()).collect();
     let joined = all.join(" or ");
     match (kind.places, kind.other) {
+        // Effects such as those of gears depend on a second place.
         (_, Some(other)) => format!(
             "{joined}, as a function of another place that {}",
             other.description()
@@ -78,6 +79,7 @@ pub fn kind_text(kind: &EffectKind, style: TerminalStyle) -> String {
     lines.push(format!("acts on  {}", places(kind)));
     lines.push(format!("adds     {}", addition_text(kind)));
     let mut symbols: Vec<Vec<String>> = Vec::new();
+    // Parameters come first, with the sign that they must have.
     for one in &kind.parameters {
         let sign = sign(one);
         symbols.push(vec![
@@ -90,6 +92,7 @@ pub fn kind_text(kind: &EffectKind, style: TerminalStyle) -> String {
             one.note.clone(),
         ]);
     }
+    // Constants follow, with their default or the range of their search.
     for one in &kind.constants {
         let value = one.value.as_ref();
         let default = value.map_or_else(String::new, |v| format!(" ({v} if not given)"));
@@ -114,6 +117,7 @@ pub fn kind_text(kind: &EffectKind, style: TerminalStyle) -> String {
         ];
         lines.extend(table(0, &columns, &symbols));
     }
+    // The explanations of the library.
     for (head, text) in [
         ("what it is", &kind.explains),
         ("what it can be confused with", &kind.doubles),
@@ -130,6 +134,7 @@ pub fn kind_text(kind: &EffectKind, style: TerminalStyle) -> String {
 /// Text in lines of at most `WIDTH` letters.
 fn wrap_text(text: &str, indent: usize) -> Vec<String> {
     let mut lines = vec![" ".repeat(indent)];
+    // A word longer than a line gets a line of its own.
     for word in text.split_whitespace() {
         let line = lines.last_mut().expect("there is a line");
         if line.chars().count() + 1 + word.chars().count() > WIDTH && line.trim() != "" {
@@ -179,6 +184,7 @@ fn search_text(constant: &KindConstant) -> String {
 
 /// A kind as JSON.
 fn kind_json(kind: &EffectKind) -> Value {
+    // Units depend on whether the place is one of forces, torques or points.
     let by_place = |units: &[(PlaceLoad, String)]| -> Value {
         let name = |carries: &PlaceLoad| match carries {
             PlaceLoad::Force => "force",
@@ -191,6 +197,7 @@ fn kind_json(kind: &EffectKind) -> Value {
             .map(|(carries, unit)| (name(carries).to_owned(), json!(unit)));
         Value::Object(entries.collect())
     };
+    // The kinds of places on which the effect can act.
     let on = kind.on.iter().map(|on| match on {
         ActsOn::Drive => "drive",
         ActsOn::Coordinate => "coordinate",
@@ -211,6 +218,7 @@ fn kind_json(kind: &EffectKind) -> Value {
             "note": one.note,
         })
     });
+    // How a constant is found: linearly, by a search in a range, or not at all.
     let constants = kind.constants.iter().map(|one| {
         json!({
             "symbol": one.symbol,

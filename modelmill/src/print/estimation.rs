@@ -1,5 +1,5 @@
-//! Properties of an estimate besides its values, as JSON and as text for people: independent samples, weights, parameters that
-//! are not essential, physical parameters, and the bias that instruments remove.
+//! Properties of an estimate besides its values, as JSON and as text for people: independent samples, weights,
+//! parameters that are not essential, physical parameters, and the bias that instruments remove.
 
 use modelmill_identify::ParameterInfo;
 use modelmill_identify::estimate::PhysicalParameters;
@@ -26,11 +26,13 @@ fn effective_samples(found: &RegressionEstimate) -> Option<f64> {
 
 /// The object `estimator` of `identify --json`.
 ///
-/// `effective_samples` is the number of independent samples, `residual_correlation` the correlation of the residuals at lag 1 for
-/// each drive, `bandwidth` the lag (samples) up to which correlations are counted. With weights: `residual_scale` is the noise of
-/// each drive (N or N m). `prior`, `essential`, `physical` and `instruments` are there if the option was used.
+/// `effective_samples` is the number of independent samples, `residual_correlation` the correlation of the
+/// residuals at lag 1 for each drive, `bandwidth` the lag (samples) up to which correlations are counted. With
+/// weights: `residual_scale` is the noise of each drive (N or N m). `prior`, `essential`, `physical` and
+/// `instruments` are there if the option was used.
 pub(crate) fn json(model: &Model, found: &RegressionEstimate, args: &EstimatorOptions) -> Value {
     let drives = model.drives();
+    // Lists of values per drive become objects with the names of the drives.
     let by_drive = |values: &[f64]| -> Value {
         drives
             .iter()
@@ -39,6 +41,7 @@ pub(crate) fn json(model: &Model, found: &RegressionEstimate, args: &EstimatorOp
             .collect::<serde_json::Map<_, _>>()
             .into()
     };
+    // The correlation of residuals is always given, since the standard deviations depend on it.
     let mut value = json!({
         "weights": args.weights.name(),
         "effective_samples": effective_samples(found),
@@ -63,6 +66,8 @@ pub(crate) fn json(model: &Model, found: &RegressionEstimate, args: &EstimatorOp
         RefinementResult::Prior(sigma, beliefs) => {
             put("prior", json!({ "sigma": sigma, "constraints": beliefs }));
         }
+        // Each removed parameter with the reason: its relative standard deviation and the probability that it
+        // is zero.
         RefinementResult::Essential(dropped, rise) => {
             let dropped: Vec<Value> = dropped
                 .iter()
@@ -79,6 +84,7 @@ pub(crate) fn json(model: &Model, found: &RegressionEstimate, args: &EstimatorOp
                 json!({ "dropped": dropped, "residual_rise": rise }),
             );
         }
+        // Parameters and bodies; the rise of the residual is relative to the solution without bounds.
         RefinementResult::Physical(physical, bodies, before) => {
             let parameters = &model.derivation.mechanism.parameters;
             let list: Vec<Value> = parameters
@@ -107,6 +113,7 @@ pub(crate) fn json(model: &Model, found: &RegressionEstimate, args: &EstimatorOp
         least_squares,
     }) = &found.instruments
     {
+        // Comparison of both estimators, parameter by parameter.
         let bias: Vec<Value> = (0..found.unknown.len())
             .map(|i| json!({ "name": model.base[found.unknown[i]].name, "least_squares": least_squares[i] }))
             .collect();
@@ -118,7 +125,7 @@ pub(crate) fn json(model: &Model, found: &RegressionEstimate, args: &EstimatorOp
     value
 }
 
-/// The same for people, line by line.
+/// The same as lines of text.
 pub(crate) fn text(
     model: &Model,
     found: &RegressionEstimate,
@@ -126,6 +133,7 @@ pub(crate) fn text(
 ) -> Vec<String> {
     let mut lines = Vec::new();
     let deviations = &found.deviations;
+    // Independent samples, since they explain the size of the standard deviations.
     if let Some(effective) = effective_samples(found) {
         let correlations: Vec<String> = deviations
             .residual_lag1
@@ -141,6 +149,7 @@ pub(crate) fn text(
         ));
         lines.push("The standard deviations above allow for that.".to_owned());
     }
+    // Noise of each drive, if it was used as weight.
     if let Some(weighting) = &found.weighting {
         let scales: Vec<String> = weighting
             .scales
@@ -169,6 +178,7 @@ pub(crate) fn text(
             ));
         }
     }
+    // The refinement, if one was requested.
     let name = |i: usize| infos[found.unknown[i]].name.clone();
     match &found.refined {
         RefinementResult::Nothing => {}
@@ -191,6 +201,7 @@ pub(crate) fn text(
             lines.extend(physical_text(model, physical, bodies, *before));
         }
     }
+    // Instruments, with the bias of least squares that they remove.
     if let Some(InstrumentStatistics {
         strength,
         least_squares,
@@ -229,8 +240,8 @@ pub(crate) fn text(
     lines
 }
 
-/// A body is named as nearly impossible if the smallest eigenvalue of its pseudo-inertia matrix is below this part of that of the
-/// nominal body. By judgement.
+/// A body is named as nearly impossible if the smallest eigenvalue of its pseudo-inertia matrix is below this
+/// part of that of the nominal body. By judgement.
 const NEARLY_IMPOSSIBLE: f64 = 0.01;
 
 /// How many base parameters have a soft constraint at their nominal value.
@@ -253,8 +264,8 @@ const NEXT_TO_NOTHING: f64 = 0.01;
 /// Below this share only rounding is left of it. By judgement.
 const PRINTED_AS_ZERO: f64 = 1e-6;
 
-/// Share of a physical parameter that the recordings determine, between 0 and 1, as text. The rest comes from nominal values and
-/// from the bounds of physical bodies.
+/// Share of a physical parameter that the recordings determine, between 0 and 1, as text. The rest comes from
+/// nominal values and from the bounds of physical bodies.
 fn recording_share_text(physical: &PhysicalParameters, i: usize) -> String {
     let share = physical.from_recording[i];
     if share < PRINTED_AS_ZERO {
@@ -266,8 +277,8 @@ fn recording_share_text(physical: &PhysicalParameters, i: usize) -> String {
     }
 }
 
-/// Physical parameters as a table, with the growth of the residual and bodies at the limit of what is possible. `before` is the
-/// residual norm without the bounds.
+/// Physical parameters as a table, with the growth of the residual and bodies at the limit of what is possible.
+/// `before` is the residual norm without the bounds.
 fn physical_text(
     model: &Model,
     physical: &PhysicalParameters,
@@ -275,6 +286,7 @@ fn physical_text(
     before: f64,
 ) -> Vec<String> {
     let parameters = &model.derivation.mechanism.parameters;
+    // One row for each parameter, with the share that the recordings determine.
     let rows: Vec<Vec<String>> = parameters
         .iter()
         .enumerate()
@@ -324,6 +336,7 @@ fn physical_text(
         ],
         &rows,
     ));
+    // The table uses this phrase, so that its meaning is stated once below.
     if (0..rows.len()).any(|i| recording_share_text(physical, i) == NOT_ALONE) {
         lines.push(format!(
             "{NOT_ALONE}: the recordings determine sums of this parameter and others, not the parameter itself; its value and \

@@ -19,6 +19,7 @@ impl InterpretationResult {
     pub fn json(&self) -> Value {
         let parameters = &self.model.derivation.mechanism.parameters;
         let names = self.names();
+        // A value is plausible if its sign is possible.
         let solution = |one: &PhysicalSolution| -> Value {
             let entries = names.iter().enumerate().map(|(i, name)| {
                 let parameter = &parameters[self.unknown[i]];
@@ -33,6 +34,7 @@ impl InterpretationResult {
             });
             Value::Object(entries.collect::<Map<_, _>>())
         };
+        // Residuals show which base parameters contradict the solution.
         let residuals = |one: &PhysicalSolution| -> Value {
             let entries = self.used.iter().zip(&one.residuals);
             let entries = entries.map(|(k, r)| (self.model.base[*k].name.clone(), json!(r)));
@@ -67,7 +69,7 @@ impl InterpretationResult {
         })
     }
 
-    /// The same for people.
+    /// The solutions as text, each as a table, after a headline with the method.
     pub fn text(&self, style: TerminalStyle, spelling: &dyn RemedySpelling) -> String {
         let solutions = self.solutions();
         let unknowns = count(
@@ -76,6 +78,7 @@ impl InterpretationResult {
             "unknown parameters",
         );
         let equations = count(self.used.len(), "base parameter", "base parameters");
+        // The headline states the method, and for exact solutions that there are no others.
         let head = match &self.found {
             PhysicalInterpretation::Undetermined { .. } => format!(
                 "{}: {equations} do not determine {unknowns}",
@@ -100,6 +103,7 @@ impl InterpretationResult {
             ),
         };
         let mut lines = vec![style.bold(&head)];
+        // Undetermined directions are listed before any solution.
         for says in self.undetermined_directions() {
             lines.push(format!("  {says}."));
         }
@@ -110,12 +114,14 @@ impl InterpretationResult {
             );
             lines.push(how.spell(spelling));
         }
+        // Exact equations may have complex solutions only.
         if let (PhysicalInterpretation::Exact { .. }, []) = (&self.found, solutions) {
             lines.push(
                 "  No real values of these parameters give the base parameters. Fix other parameters at their nominal values."
                     .to_owned(),
             );
         }
+        // Solutions are numbered if there are several.
         for (k, one) in solutions.iter().enumerate() {
             lines.push(String::new());
             if solutions.len() > 1 {
@@ -129,7 +135,8 @@ impl InterpretationResult {
         lines.join("\n")
     }
 
-    /// A solution as a table: nominal and solved values, standard deviations, and objections to values that are not plausible.
+    /// A solution as a table: nominal and solved values, standard deviations, and objections to values that are
+    /// not plausible.
     fn table(&self, one: &PhysicalSolution) -> Vec<String> {
         let parameters = &self.model.derivation.mechanism.parameters;
         let rows: Vec<Vec<String>> = (0..self.unknown.len())

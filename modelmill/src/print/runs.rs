@@ -22,17 +22,20 @@ impl RunsComparison {
     /// - `per_run`: the joint fit in which runs have some values for themselves, if it was requested
     pub fn json(&self, spelling: &dyn RemedySpelling) -> Value {
         let later = || self.runs.iter().enumerate().skip(1);
+        // All figures are relative to the first run.
         let moved = later().flat_map(|(k, run)| {
             run.moved
                 .iter()
                 .map(move |p| self.moved_parameter_json(k, *p))
         });
         let all = self.runs.iter().enumerate();
+        // Events within the first run are listed as well, with the pair of indices 0 and 0.
         let changes =
             all.flat_map(|(k, run)| run.changes.iter().map(move |one| change_json([0, k], one)));
         let unread = self.unread.iter();
         let unread =
             unread.map(|one| json!({ "file": one.file, "says": one.error.spell(spelling) }));
+        // Each run with its own fit.
         let runs = self.runs.iter().map(|run| {
             json!({
                 "file": run.file,
@@ -54,6 +57,7 @@ impl RunsComparison {
 
     /// A lasting change as JSON: the run from which on it is there, means before and since, and physical causes.
     fn point_json(&self, point: &ChangePoint) -> Value {
+        // Means of each parameter before and since the change.
         let steps = point.steps.iter().map(|step| {
             json!({
                 "parameter": self.parameters[step.parameter].name,
@@ -75,6 +79,7 @@ impl RunsComparison {
     /// The joint fit, in which some values are shared and each run has others for itself.
     fn shared_json(&self, fit: &SharedFit) -> Value {
         let shared = self.parameters.iter().zip(&fit.shared);
+        // Base parameters that are separate for each run are not in the shared list.
         let shared = shared.filter_map(|(info, value)| {
             let value = (*value)?;
             Some(json!({ "name": info.name, "expression": info.expression, "value": value.value, "std": value.deviation, "unit": info.unit }))
@@ -82,6 +87,7 @@ impl RunsComparison {
         let gains = fit.gains.iter().map(
             |(drive, gain)| json!({ "drive": drive, "gain": gain.value, "std": gain.deviation }),
         );
+        // Values of each run, absolute or relative to the first run.
         let runs = fit.runs.iter().map(|(file, values)| {
             let values = values.iter().map(|one| {
                 json!({
@@ -132,7 +138,7 @@ impl RunsComparison {
         })
     }
 
-    /// The same for people.
+    /// The comparison as text: lasting changes, joint fit, and each run.
     pub fn text(&self, style: TerminalStyle, spelling: &dyn RemedySpelling) -> String {
         let [first, later @ ..] = &self.runs[..] else {
             return String::new();
@@ -150,6 +156,7 @@ impl RunsComparison {
         if let Some(shared) = &self.shared {
             write_shared_fit(shared, &mut lines, style);
         }
+        // Changes of the first run are its contacts and pushes.
         if !first.changes.is_empty() {
             lines.push(String::new());
             lines.push(style.bold(&first.file));
@@ -163,6 +170,7 @@ impl RunsComparison {
             }
             self.write_change_points(&mut lines, style);
         }
+        // Files that could not be evaluated come last, with the reason.
         for one in &self.unread {
             lines.push(String::new());
             let why = one.error.spell(spelling);
@@ -193,6 +201,7 @@ impl RunsComparison {
         }
         if !run.moved.is_empty() {
             lines.push("  Base parameters that changed (each run fitted separately):".to_owned());
+            // Parameters before and now, with the standard deviation of the difference.
             let rows: Vec<Vec<String>> = run
                 .moved
                 .iter()
@@ -358,6 +367,7 @@ fn write_shared_fit(fit: &SharedFit, lines: &mut Vec<String>, style: TerminalSty
             .map(str::to_owned)
             .to_vec()
         };
+        // Values that a run does not determine are listed below the table.
         let known = values.iter().filter(|one| one.value.deviation.is_some());
         let rows: Vec<Vec<String>> = known.map(row).collect();
         let columns = [

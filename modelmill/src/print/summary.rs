@@ -1,4 +1,5 @@
-//! Output of `check`: contents of a model file as JSON and as text for people, and the errors of an invalid file as JSON.
+//! Output of `check`: contents of a model file as JSON and as text for people, and the errors of an invalid
+//! file as JSON.
 
 use modelmill_boundary::text::plain;
 use modelmill_codegen::review::NumericMethod;
@@ -103,6 +104,7 @@ fn diagnostics(
 }
 
 impl ModelSummary {
+    /// Contents as one JSON object; `warnings` are those of file and derivation.
     fn json(&self, name: &str, derivation: &Derivation, warnings: &[Value]) -> Value {
         json!({
             "model": name,
@@ -125,6 +127,7 @@ impl ModelSummary {
         })
     }
 
+    /// Contents as lines of text, each with a name in front; lists are omitted if they are empty.
     fn text(
         &self,
         name: &str,
@@ -137,6 +140,7 @@ impl ModelSummary {
         if let Some(title) = &m.title {
             lines.push(format!("  {}", plain(title)));
         }
+        // Names of the lines are padded to one width.
         let mut line = |what: &str, text: String| lines.push(format!("  {what:<20}{text}"));
         let list = |names: &[String]| match names {
             [] => String::new(),
@@ -154,6 +158,7 @@ impl ModelSummary {
         if self.lumped_masses > 0 {
             line("lumped masses", self.lumped_masses.to_string());
         }
+        // Joints are named with their motion, since most are revolute.
         let joints: Vec<String> = m
             .coordinates
             .iter()
@@ -185,6 +190,7 @@ impl ModelSummary {
             "parameters",
             format!("{}{}", self.parameters.len(), list(&self.parameters)),
         );
+        // Numbers of products and of their combinations that can be identified.
         let reduction = &derivation.reduction;
         line(
             "p_g and p_min",
@@ -198,6 +204,7 @@ impl ModelSummary {
                 ),
             ),
         );
+        // A reduction for one geometry only is stated, since its base is not general.
         match reduction.method {
             ReductionMethod::Numeric { .. } => line(
                 "reduced",

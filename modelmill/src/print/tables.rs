@@ -62,8 +62,9 @@ pub fn expressions(indent: usize, model: &Model) -> Vec<String> {
         .collect()
 }
 
-/// Error figures of several comparisons: a line for all drives together, where they have one unit, and a line for each drive.
-/// Errors are in the unit of the force, `nrms` and its like relative to it. The rows that a fit used follow as a second table.
+/// Error figures of several comparisons: a line for all drives together, where they have one unit, and a line
+/// for each drive. Errors are in the unit of the force, `nrms` and its like relative to it. The rows that a fit
+/// used follow as a second table.
 pub fn figures(named: &[(&str, &ErrorFigures)]) -> Vec<String> {
     let mut rows = Vec::new();
     for (name, figures) in named {
@@ -85,6 +86,7 @@ pub fn figures(named: &[(&str, &ErrorFigures)]) -> Vec<String> {
                 common_unit(figures),
             ]);
         }
+        // One row for each drive, with its error in the band if there is one.
         for (channel, one) in &figures.channels {
             let band = figures.band.as_ref();
             let band = band.and_then(|band| band.channels.get(channel));
@@ -131,6 +133,7 @@ pub fn figures(named: &[(&str, &ErrorFigures)]) -> Vec<String> {
 
 /// Errors on the rows that the fits used, after low-pass and decimation: a column for each comparison that has them.
 fn rows_of_fits(named: &[(&str, &ErrorFigures)]) -> Vec<String> {
+    // Only fits after decimation have rows of their own.
     let fits = named.iter();
     let fits = fits.filter_map(|(name, figures)| Some((*name, figures.rows.as_ref()?)));
     let fits: Vec<_> = fits.collect();
@@ -146,6 +149,7 @@ fn rows_of_fits(named: &[(&str, &ErrorFigures)]) -> Vec<String> {
         row("low-pass, Hz", &|k| significant(fits[k].1.cutoff_hz, 3)),
         row("nrms of all", &|k| percent(fits[k].1.nrms)),
     ];
+    // One line for each drive, one column for each comparison.
     for drive in first.channels.keys() {
         let cell = |k: usize| {
             let one = fits[k].1.channels.get(drive);

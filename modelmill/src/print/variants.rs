@@ -21,11 +21,13 @@ const LEAST_SHARE: f64 = 0.01;
 impl VariantComparison {
     /// All figures as one JSON object, `before` and `after` for the two variants.
     ///
-    /// - `drives`: peak and rms force (N or N m), peak and rms power (W), positive and net work (J), and the terms that cause the
-    ///   difference; their shares sum to 1, and `by_value` is the part of a share that comes from the new value
+    /// - `drives`: peak and rms force (N or N m), peak and rms power (W), positive and net work (J), and the
+    ///   terms that cause the difference; their shares sum to 1, and `by_value` is the part of a share that
+    ///   comes from the new value
     /// - `limits`: range of each limit and the part of it that is used (1)
     /// - `errors`: relative to measured forces, if the recordings have them
     pub fn json(&self, spelling: &dyn RemedySpelling) -> Value {
+        // Limits with the range in both files and the use by both models.
         let limits = self.limits.iter().map(|one| {
             let side = |m: usize| json!({ "range": one.ranges[m], "used": one.used[m] });
             json!({
@@ -46,7 +48,7 @@ impl VariantComparison {
         })
     }
 
-    /// The same for people, but for the notes.
+    /// The comparison as text, without its notes.
     pub fn text(&self, style: TerminalStyle) -> String {
         let mut lines = vec![style.bold(&format!(
             "along {}: {} in {} s",
@@ -55,16 +57,20 @@ impl VariantComparison {
             significant(self.seconds, 3)
         ))];
         lines.push(String::new());
+        // Figures of both variants and their change.
         lines.push(style.bold("Forces and power of the drives"));
         lines.extend(efforts(&self.drives));
         lines.push(String::new());
+        // The terms that cause the difference, drive by drive.
         lines.push(style.bold("Causes of the difference"));
         for drive in &self.drives {
             lines.extend(shares(drive));
         }
         lines.push(String::new());
+        // Exceeded limits, and the most used of the others.
         lines.push(style.bold("Limits"));
         lines.extend(self.limits_text(style));
+        // Errors exist only if the recordings have forces.
         if self.errors.iter().any(Option::is_some) {
             lines.push(String::new());
             lines.push(style.bold("Error relative to the measured forces"));
@@ -115,7 +121,7 @@ impl VariantComparison {
     }
 }
 
-/// What the JSON calls it.
+/// The name of a limit's state in the JSON.
 fn crossing(crossing: LimitCrossing) -> &'static str {
     match crossing {
         LimitCrossing::NowExceeded => "now_exceeded",
@@ -127,6 +133,7 @@ fn crossing(crossing: LimitCrossing) -> &'static str {
 
 /// A drive as JSON.
 fn drive(one: &DriveVariants) -> Value {
+    // Units are N or N m, W and J.
     let effort = |effort: &DriveEffort| {
         let [peak, rms, peak_power, rms_power, work, net_work] = numbers(effort);
         json!({
@@ -138,6 +145,7 @@ fn drive(one: &DriveVariants) -> Value {
             "net_work": net_work,
         })
     };
+    // A term with its values in both models and its share.
     let term = |term: &TermShare| {
         json!({
             "term": term.term,
@@ -173,6 +181,7 @@ fn limit_line(one: &LimitUse) -> String {
         .map(|used| used.map_or_else(|| "no limit".to_owned(), part));
     let range =
         |m: usize| one.ranges[m].map(|[low, high]| format!("{} to {}", number(low), number(high)));
+    // Equal ranges are printed once.
     let range = match (range(0), range(1)) {
         (Some(a), Some(b)) if a == b => format!(" ({a})"),
         (None, None) => String::new(),
@@ -340,7 +349,8 @@ fn signed_percent(share: f64) -> String {
     }
 }
 
-/// Which part of a share comes from the changed geometry (the column) instead of the changed value; empty without such a part.
+/// Which part of a share comes from the changed geometry (the column) instead of the changed value; empty
+/// without such a part.
 fn column_share_text(term: &TermShare) -> String {
     let by_column = term.share - term.by_value;
     // A small rest is rounding of the split, not a change of geometry.

@@ -1,5 +1,6 @@
-//! The page of a diagnosis: verdict, errors, effects, curves, maps, candidates, parameters, recordings and equations, in the order
-//! in which a user needs them. Input are findings, output is one HTML file that needs no other file.
+//! The page of a diagnosis: verdict, errors, effects, curves, maps, candidates, parameters, recordings and
+//! equations, in the order in which a user needs them. Input are findings, output is one HTML file that needs
+//! no other file.
 
 use std::fmt::Write as _;
 
@@ -24,6 +25,7 @@ pub fn page(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) -> Outcom
     let name = &findings.before.model.name;
     let title = format!("{name}: effects that the model lacks");
     let mut page = pages::begin(&title);
+    // The sections in the order in which a user needs them, each with its id and title.
     let sections = [
         (
             "ladder",
@@ -103,6 +105,7 @@ pub(super) fn text_between<'a>(text: &'a str, from: &str, to: &str) -> &'a str {
 /// Verdict and tiles with the main figures.
 fn summary(findings: &DiagnosisFindings) -> String {
     let diagnosis = &findings.diagnosis;
+    // The class of the verdict gives its colour.
     let (class, word) = match diagnosis.verdict {
         DiagnosisVerdict::Adequate => ("adequate", "model is adequate"),
         DiagnosisVerdict::MissingEffect => ("missing", "an effect is missing"),
@@ -113,6 +116,7 @@ fn summary(findings: &DiagnosisFindings) -> String {
         &findings.before.model.drives(),
         findings.validation,
     );
+    // Tiles: verdict, error before and after, noise.
     let mut tiles = vec![("verdict", word.to_owned())];
     if let (Some(first), Some(last)) = (diagnosis.steps.first(), diagnosis.steps.last()) {
         tiles.push(("error as it is", percent(Some(first.check))));
@@ -166,6 +170,7 @@ fn laws(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) -> String {
         escape(told::HYPOTHESIS)
     );
     for hypothesis in &findings.laws {
+        // Each law with its values, the share that it explains, and its alternatives.
         let law = &hypothesis.law;
         let _ = writeln!(
             html,
@@ -228,6 +233,7 @@ fn effects(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) -> String 
         );
     }
     let model = &findings.before.model;
+    // The steps: one for each effect, and a new identification.
     let mut commands: Vec<String> = findings
         .entries_to_add()
         .iter()
@@ -276,6 +282,7 @@ fn location(findings: &DiagnosisFindings) -> String {
             &findings.variables,
         ));
     }
+    // Regions of the residual are listed without pictures.
     if let Some(left) = &findings.residual_locations {
         html.push_str("<h3>Residual with the effects</h3>\n");
         html.push_str(&sentences(left, "The residual"));

@@ -1,4 +1,5 @@
-//! Differences between runs as one self-contained HTML page: changes, when they happened, and every base parameter over the runs.
+//! Differences between runs as one self-contained HTML page: changes, when they happened, and every base
+//! parameter over the runs.
 
 use std::fmt::Write as _;
 
@@ -16,14 +17,15 @@ use crate::text::table::{count, significant};
 
 /// Height of a picture of one parameter.
 const HEIGHT: f64 = 170.0;
-/// How many standard deviations a bar reaches up and down.
+/// Length of a bar to either side, in standard deviations.
 const BARS: f64 = 2.0;
 
-/// The HTML quantity the page; `spelling` writes commands or calls for its reader.
+/// The HTML of the page; `spelling` writes commands or calls for its reader.
 pub fn runs_page(compared: &RunsComparison, spelling: &dyn RemedySpelling) -> String {
     let title = format!("{}: changes between runs", compared.model);
     let mut page = pages::begin(&title);
     page.push_str(&summary(compared));
+    // The sections in the order in which a user needs them, each with its id and title.
     let mut sections = vec![
         ("when", "Lasting changes", points(compared)),
         (
@@ -106,6 +108,7 @@ fn points(compared: &RunsComparison) -> String {
         } else {
             html.push_str(&changes_list(&point.changes));
         }
+        // Means of the parameters before and since the change.
         let rows: Vec<Vec<TableCell>> = (point.steps.iter())
             .map(|step| {
                 let info = &compared.parameters[step.parameter];
@@ -167,6 +170,7 @@ fn shared_fit_section(shared: &SharedFit) -> String {
     let mut html = String::from(
         "<p>All runs share their base parameters. The values below belong to one run each.</p>\n",
     );
+    // Factors of force signals exist only with a known load.
     if !shared.gains.is_empty() {
         html.push_str(
             "<p>True force = factor times measured force, determined by the known load.</p>\n",
@@ -247,8 +251,8 @@ fn picture(compared: &RunsComparison, k: usize) -> String {
     parameter_history(&compared.parameters[k], "run", runs.len(), &known, &steps)
 }
 
-/// Picture of a base parameter over `n` runs or days (`what`). `known` has the index of a run with value and standard deviation;
-/// `steps` has the index of the first run of each change with the mean before and since.
+/// Picture of a base parameter over `n` runs or days (`what`). `known` has the index of a run with value and
+/// standard deviation; `steps` has the index of the first run of each change with the mean before and since.
 pub fn parameter_history(
     info: &ParameterInfo,
     what: &str,
@@ -264,12 +268,14 @@ pub fn parameter_history(
     let y = PlotAxis::new(with_room(range(&ends), 0.05), [HEIGHT - 40.0, 8.0]);
     let mut picture = SvgPicture::new(WIDTH, HEIGHT);
     picture.frame(&x, &y, what, [n.min(12), 4]);
+    // One bar and one dot for each run that determines the parameter.
     for (at, [value, deviation]) in known {
         let across = x.position(*at as f64 + 1.0);
         let [low, high] = [-BARS, BARS].map(|b| y.position(value + b * deviation));
         picture.path("curve c-fit", &format!("M{across:.1} {low:.1}V{high:.1}"));
         picture.dot("dot c-before", [across, y.position(*value)], 2.4);
     }
+    // Levels between the changes, and a vertical line at each of them.
     for (i, (run, [before, now])) in steps.iter().enumerate() {
         let start = if i == 0 { 0 } else { steps[i - 1].0 };
         let end = steps.get(i + 1).map_or(n, |next| next.0);

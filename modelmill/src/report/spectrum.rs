@@ -8,13 +8,15 @@ use super::units::force_unit;
 use crate::diagnose::ModelVersion;
 use crate::text::svg::escape;
 
+/// Height of a picture.
 const HEIGHT: f64 = 170.0;
-/// Samples of a segment.
+/// Largest number of samples of a segment.
 const SEGMENT: usize = 2048;
-/// Frequencies, evenly spaced in decades.
+/// Number of frequencies, evenly spaced on a logarithmic axis.
 const FREQUENCIES: usize = 140;
 
-/// Density of a signal at some frequencies, unit^2/Hz: `(frequency in Hz, density)`.
+/// Power spectral density of a signal at some frequencies, one-sided: `(frequency in Hz, unit^2/Hz)`. `rate` is the
+/// sampling rate, Hz. Empty for fewer than 32 samples.
 pub(crate) fn density(signal: &[f64], rate: f64) -> Vec<(f64, f64)> {
     let n = SEGMENT.min(signal.len());
     if n < 32 || !(rate > 0.0 && rate.is_finite()) {
@@ -38,6 +40,7 @@ pub(crate) fn density(signal: &[f64], rate: f64) -> Vec<(f64, f64)> {
                 .collect()
         })
         .collect();
+    // Frequencies are bins of the discrete Fourier transform; low ones may coincide.
     let mut bins: Vec<usize> = (0..FREQUENCIES)
         .map(|k| {
             let share = k as f64 / (FREQUENCIES - 1) as f64;
@@ -94,6 +97,7 @@ pub(crate) fn figures(before: &ModelVersion, after: Option<&ModelVersion>) -> St
             after.map(|v| ("c-after", of(v))),
         ];
         let curves: Vec<(&str, Vec<(f64, f64)>)> = curves.into_iter().flatten().collect();
+        // The picture shows amplitude densities, whose unit is that of the force per root of Hz.
         let roots: Vec<f64> = curves
             .iter()
             .flat_map(|(_, c)| c.iter().map(|(_, v)| v.sqrt()))

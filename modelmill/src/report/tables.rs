@@ -12,24 +12,24 @@ use crate::print::StepSpelling;
 use crate::text::svg::escape;
 use crate::text::table::{percent, significant};
 
-/// Candidates that are shown unfolded.
+/// Number of candidates that are shown before the others are folded.
 const FIRST: usize = 20;
 
 /// A cell: its HTML, and the number by which a column is sorted.
 pub struct TableCell(String, Option<f64>);
 
 impl TableCell {
-    /// A text.
+    /// A cell with text.
     pub fn text(text: &str) -> Self {
         Self(escape(text), None)
     }
 
-    /// A number as it is shown, and its value.
+    /// A cell with a number as it is shown, and its value for sorting.
     pub fn number(text: &str, value: f64) -> Self {
         Self(escape(text), Some(value))
     }
 
-    /// Finished HTML.
+    /// A cell with finished HTML.
     pub fn html(html: String) -> Self {
         Self(html, None)
     }
@@ -38,6 +38,7 @@ impl TableCell {
 /// A table as HTML. Heads that begin with `#` mark columns of numbers, which are aligned right and sorted by value.
 pub fn table(class: &str, head: &[&str], rows: &[Vec<TableCell>]) -> String {
     let mut html = format!("<div class=\"wide\"><table class=\"{class}\">\n<thead><tr>");
+    // The mark of number columns is not shown.
     for name in head {
         let (class, name) = match name.strip_prefix('#') {
             Some(name) => (" class=\"number\"", name),
@@ -69,6 +70,7 @@ pub(crate) fn ladder(findings: &DiagnosisFindings) -> String {
         .map(|rung| {
             let percents = |v: f64| TableCell::number(&percent(Some(v)), v);
             let evidence = rung.evidence;
+            // A step without evidence, such as the first, has empty cells.
             let of = |f: &dyn Fn() -> Option<(String, f64)>| match f() {
                 Some((text, value)) => TableCell::number(&text, value),
                 None => TableCell::text(""),
@@ -125,6 +127,7 @@ pub(crate) fn drives(findings: &DiagnosisFindings) -> String {
         .map(|(d, drive)| {
             let unit = force_unit(&before.model, d);
             let noise = findings.answer.problem.noise[d];
+            // Error before, error after if there is a model with effects, and noise.
             let mut row = vec![TableCell::text(drive)];
             let first = nrms(before, d);
             row.push(TableCell::number(&percent(Some(first)), first));
@@ -147,8 +150,8 @@ pub(crate) fn drives(findings: &DiagnosisFindings) -> String {
     table("", &head, &rows)
 }
 
-/// Missing effects: for each kind its meaning once, and for each place values and effects that explain the recordings equally
-/// well.
+/// Missing effects: for each kind its meaning once, and for each place values and effects that explain the
+/// recordings equally well.
 pub(crate) fn effects(findings: &DiagnosisFindings) -> String {
     let answer = &findings.answer;
     // Kinds in the order of their first effect, so that a text about a kind is not repeated for each of its places.
@@ -161,6 +164,7 @@ pub(crate) fn effects(findings: &DiagnosisFindings) -> String {
         }
     }
     let mut html = String::new();
+    // One section for each kind: meaning, places with values, explanation.
     for (name, all) in kinds {
         let title = match all.as_slice() {
             [one] => words::effect(&one.effect),
@@ -235,7 +239,7 @@ fn effect(findings: &DiagnosisFindings, found: &IdentifiedEffect, label: &str) -
     html
 }
 
-/// Text with a capitalise first letter.
+/// Text with a capital first letter.
 fn capitalise(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().map_or_else(String::new, |first| {

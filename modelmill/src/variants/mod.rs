@@ -85,7 +85,8 @@ impl VariantComparison {
     /// depend on the load use the force of their own model without these effects, so that a recording needs no
     /// forces.
     ///
-    /// Fails when the models do not have the same active coordinates, have no drive in common, or cannot follow a motion.
+    /// Fails when the models do not have the same active coordinates, have no drive in common, or cannot follow
+    /// a motion.
     pub fn along_recordings(
         models: [&Model; 2],
         runs: [&[&PreparedRecording]; 2],
