@@ -43,6 +43,19 @@ impl Model {
 /// model may use; an unknown kind is reported when the effect is added.
 ///
 /// Fails when the kind has no such symbol, or a name is given for a constant.
+///
+/// ```
+/// use modelmill::Model;
+/// use modelmill::add::{EffectSetting, SettingValue, new_effect};
+///
+/// let arm = Model::open("../model-spec/models/two_link.toml")?;
+/// let fc = EffectSetting { symbol: "Fc".to_owned(), value: SettingValue::Value(2.0) };
+/// let places = ["joint1".to_owned()];
+/// let friction = new_effect(&arm.loaded.kinds, "coulomb_friction", &places, &[fc])?;
+/// let with_friction = arm.with_added_effects(&[friction])?;
+/// assert_eq!(with_friction.base.len(), arm.base.len() + 1);
+/// # Ok::<(), modelmill::Error>(())
+/// ```
 pub fn new_effect(
     kinds: &[EffectKind],
     kind: &str,

@@ -28,6 +28,17 @@ impl Model {
     /// else stays as it is, byte for byte. `file` is the name of the fit in messages.
     ///
     /// Fails when the fit is one of another model.
+    ///
+    /// ```no_run
+    /// use std::path::Path;
+    /// use modelmill::{Host, Model};
+    ///
+    /// let model = Model::open("arm.toml")?;
+    /// let fit = Host::new().fit(Path::new("fit.json"))?;
+    /// let adopted = model.adopt(&fit, "fit.json")?;
+    /// std::fs::write("arm.toml", adopted.text).unwrap();
+    /// # Ok::<(), modelmill::Error>(())
+    /// ```
     pub fn adopt(&self, fit: &FitFile, file: &str) -> Outcome<FitAdoption> {
         let values = self.values_of(fit, file)?;
         let mut notes = values.notes;

@@ -20,6 +20,13 @@ impl CodeLanguage {
     }
 
     /// The language with a name, such as `rust`, `c99`, `c` and `python`; `None` if there is none.
+    ///
+    /// ```
+    /// use modelmill::generate::CodeLanguage;
+    ///
+    /// assert_eq!(CodeLanguage::from_name("c99").map(CodeLanguage::name), Some("c99"));
+    /// assert!(CodeLanguage::from_name("cobol").is_none());
+    /// ```
     pub fn from_name(name: &str) -> Option<Self> {
         Self::all().find(|language| language.name() == name)
     }
@@ -85,6 +92,17 @@ impl Model {
     /// runtime, so that its folder can be moved freely. Paths are relative to that folder.
     ///
     /// Fails when the language lacks a requested part, or the equations cannot be derived for the mechanism.
+    ///
+    /// ```
+    /// use modelmill::Model;
+    /// use modelmill::generate::{CodeLanguage, CodeOptions};
+    ///
+    /// let arm = Model::open("../model-spec/models/two_link.toml")?;
+    /// let language = CodeLanguage::from_name("c99").unwrap();
+    /// let files = arm.generate(&CodeOptions { language, ..CodeOptions::default() })?;
+    /// assert!(files.iter().any(|file| file.path.ends_with(".h")));
+    /// # Ok::<(), modelmill::Error>(())
+    /// ```
     pub fn generate(&self, code: &CodeOptions) -> Outcome<Vec<EmittedFile>> {
         // Not all languages can express reactions and the self-test; the error names those that can.
         let more = [

@@ -29,6 +29,16 @@ impl Host {
     /// if it is a path, files that an MJCF includes are read from the same folder.
     ///
     /// Fails when the text is none of these formats, or describes something that a model file cannot express.
+    ///
+    /// ```no_run
+    /// use modelmill::Host;
+    /// use modelmill::import::Options;
+    ///
+    /// let text = std::fs::read_to_string("arm.urdf").unwrap();
+    /// let imported = Host::new().import("arm.urdf", &text, &Options::default())?;
+    /// std::fs::write("arm.toml", imported.model).unwrap();
+    /// # Ok::<(), modelmill::Error>(())
+    /// ```
     pub fn import(&self, name: &str, text: &str, options: &Options) -> Outcome<ImportedRobot> {
         // Included files are read relative to the description, through the host's file source.
         let read = |file: &str| {

@@ -79,6 +79,16 @@ impl Model {
     /// at the same scale and pose.
     ///
     /// Fails when a name is not an active coordinate, and when the loops cannot close.
+    ///
+    /// ```
+    /// use modelmill::Model;
+    /// use modelmill::picture::PictureOptions;
+    ///
+    /// let arm = Model::open("../model-spec/models/two_link.toml")?;
+    /// let options = PictureOptions { at: vec![("q1".to_owned(), 0.8)], ..PictureOptions::default() };
+    /// assert!(arm.picture(&options, None)?.contains("<svg"));
+    /// # Ok::<(), modelmill::Error>(())
+    /// ```
     pub fn picture(&self, drawing: &PictureOptions, before: Option<&Self>) -> Outcome<String> {
         let scene = self.scene(&drawing.at)?;
         let view = match drawing.from {

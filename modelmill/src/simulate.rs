@@ -46,6 +46,15 @@ impl Host {
     /// Reads a rig file.
     ///
     /// Fails with every finding about the file, each with its place.
+    ///
+    /// ```
+    /// use std::path::Path;
+    /// use modelmill::Host;
+    ///
+    /// let rig = Host::new().rig(Path::new("../model-spec/rigs/spidermill-full.toml"))?.rig;
+    /// assert!(!rig.drives.is_empty());
+    /// # Ok::<(), modelmill::Error>(())
+    /// ```
     pub fn rig(&self, path: &Path) -> Outcome<modelmill_rig::LoadedRig> {
         if self.files().kind(path) == PathKind::Folder {
             return Err(Error::input(format!(

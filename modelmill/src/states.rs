@@ -156,6 +156,20 @@ impl ModelFunctions {
     /// (loops without closed form).
     ///
     /// Fails when a required input is missing or has another length, and at the first state without a solution.
+    ///
+    /// ```
+    /// use modelmill::Model;
+    /// use modelmill::states::{ModelFunction, StateMatrix, StateSamples};
+    ///
+    /// let arm = Model::open("../model-spec/models/two_link.toml")?;
+    /// // One state: the stretched arm at standstill, whose drives balance gravity (N m).
+    /// let zero = StateMatrix { numbers: &[0.0, 0.0], width: 2, by_state: true };
+    /// let states = StateSamples { q: zero, qd: Some(zero), qdd: Some(zero), forces: None };
+    /// let functions = arm.functions();
+    /// let forces = functions.evaluate_at(ModelFunction::InverseDynamics, &states, &arm.nominal)?;
+    /// assert!(forces.len() == 2 && forces[0] > forces[1]);
+    /// # Ok::<(), modelmill::Error>(())
+    /// ```
     pub fn evaluate_at(
         &self,
         function: ModelFunction,

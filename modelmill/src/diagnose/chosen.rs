@@ -34,6 +34,14 @@ impl NamedEffect {
     /// Reads `KIND@PLACE,PLACE:NAME=VALUE:NAME=VALUE`, values in SI units.
     ///
     /// Fails with a message that gives the expected form.
+    ///
+    /// ```
+    /// use modelmill::diagnose::NamedEffect;
+    ///
+    /// let effect = NamedEffect::parse("coulomb_friction@motor:Fc=25.9").unwrap();
+    /// assert_eq!(effect.effect.kind, "coulomb_friction");
+    /// assert_eq!(effect.values, [("Fc".to_owned(), 25.9)]);
+    /// ```
     pub fn parse(text: &str) -> Result<Self, String> {
         let expected = || {
             "expected KIND@PLACE, such as coulomb_friction@motor. Write several places with commas, and values after colons: \

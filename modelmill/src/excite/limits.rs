@@ -29,6 +29,13 @@ impl TrajectoryLimit {
     /// Reads `NAME=SIZE`, which is the range from -SIZE to SIZE, or `NAME=LOW:HIGH`.
     ///
     /// Fails with the expected form, as text.
+    ///
+    /// ```
+    /// use modelmill::excite::TrajectoryLimit;
+    ///
+    /// assert!(TrajectoryLimit::parse("theta1=1.5:2.1").is_ok());
+    /// assert!(TrajectoryLimit::parse("theta1=2.1:1.5").is_err());
+    /// ```
     pub fn parse(text: &str) -> Result<Self, String> {
         let expected = || {
             "expected NAME=SIZE or NAME=LOW:HIGH, such as theta1_d=1.2 or theta1=1.5:2.1".to_owned()

@@ -47,6 +47,18 @@ impl Host {
     }
 
     /// The host with another source of files, such as memory.
+    ///
+    /// ```
+    /// use std::sync::Arc;
+    /// use modelmill::Host;
+    /// use modelmill::files::MemoryFiles;
+    ///
+    /// let bytes = std::fs::read("../model-spec/models/two_link.toml").unwrap();
+    /// let files = MemoryFiles::default().with_file("arm.toml", bytes);
+    /// let arm = Host::new().with_files(Arc::new(files)).model("arm.toml")?;
+    /// assert_eq!(arm.name, "arm");
+    /// # Ok::<(), modelmill::Error>(())
+    /// ```
     #[must_use]
     pub fn with_files(mut self, files: Arc<dyn FileSource>) -> Self {
         self.files = files;
@@ -66,6 +78,24 @@ impl Host {
     }
 
     /// The host with a listener, which receives progress and notes and can stop jobs.
+    ///
+    /// ```
+    /// use std::sync::Arc;
+    /// use modelmill::Host;
+    /// use modelmill::progress::{JobHandle, ProgressListener};
+    ///
+    /// struct PrintJobs;
+    ///
+    /// impl ProgressListener for PrintJobs {
+    ///     fn on_job_start(&self, what: &str, _total: usize, _job: &Arc<JobHandle>) {
+    ///         println!("{what}");
+    ///     }
+    /// }
+    ///
+    /// let host = Host::new().with_progress(Arc::new(PrintJobs));
+    /// let arm = host.model("../model-spec/models/two_link.toml")?;
+    /// # Ok::<(), modelmill::Error>(())
+    /// ```
     #[must_use]
     pub fn with_progress(mut self, progress: Arc<dyn ProgressListener>) -> Self {
         self.progress = progress;
@@ -94,6 +124,12 @@ impl Host {
     /// The kinds of effects of the built-in library and of the host's libraries.
     ///
     /// Fails with every finding about the host's libraries, each with its place.
+    ///
+    /// ```
+    /// let kinds = modelmill::Host::new().kinds()?;
+    /// assert!(kinds.iter().any(|kind| kind.name == "coulomb_friction"));
+    /// # Ok::<(), modelmill::Error>(())
+    /// ```
     pub fn kinds(&self) -> Outcome<Vec<EffectKind>> {
         Ok(modelmill_spec::kinds_with(&self.libraries, self.files())?)
     }

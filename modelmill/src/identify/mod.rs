@@ -69,6 +69,20 @@ impl Model {
 
     /// As [`Model::identify`], by instrumental variables, against noise that is correlated with the states through the
     /// controller.
+    ///
+    /// ```no_run
+    /// use modelmill::Model;
+    /// use modelmill::identify::{EstimatorOptions, Instruments};
+    /// use modelmill::recording::RecordingOptions;
+    ///
+    /// let model = Model::open("arm.toml")?;
+    /// let run = model.recording("run.csv", &RecordingOptions::default())?;
+    /// // The motion has a period of 8 s, so that the next period provides the instruments.
+    /// let instruments = Instruments::Period(8.0);
+    /// let fit = model.identify_with(&[&run], &instruments, &[], &EstimatorOptions::default())?;
+    /// println!("{:?}", fit.values());
+    /// # Ok::<(), modelmill::Error>(())
+    /// ```
     pub fn identify_with(
         &self,
         fit: &[&PreparedRecording],

@@ -92,6 +92,16 @@ pub struct ModelChanges {
 
 impl ModelChanges {
     /// The differences of `after` relative to `before`.
+    ///
+    /// ```
+    /// use modelmill::Model;
+    /// use modelmill::model::ModelChanges;
+    ///
+    /// let arm = Model::open("../model-spec/models/two_link.toml")?;
+    /// let same = ModelChanges::from_models(&arm, &arm);
+    /// assert!(same.entries.is_empty() && same.base.is_empty());
+    /// # Ok::<(), modelmill::Error>(())
+    /// ```
     pub fn from_models(before: &Model, after: &Model) -> Self {
         // Each list becomes pairs of a name and a text, which are compared by name.
         let products = |model: &Model| -> Vec<(String, String)> {

@@ -21,6 +21,15 @@ impl Model {
     /// a long chain takes seconds.
     ///
     /// Fails only when the listener stops the job.
+    ///
+    /// ```
+    /// use modelmill::Model;
+    /// use modelmill::model::PageFormat;
+    ///
+    /// let arm = Model::open("../model-spec/models/two_link.toml")?;
+    /// assert!(arm.equations(PageFormat::Markdown)?.text.contains("p1_min"));
+    /// # Ok::<(), modelmill::Error>(())
+    /// ```
     pub fn equations(&self, format: PageFormat) -> Outcome<EquationsText> {
         let (rank, notes) = self.numeric_rank()?;
         let what = format!("writing the equations of {}", self.name);

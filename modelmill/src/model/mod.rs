@@ -65,6 +65,14 @@ impl Model {
     ///
     /// Fails with every finding about the file, each with its place, or with the reason why the mechanism cannot be
     /// derived.
+    ///
+    /// ```
+    /// use modelmill::Model;
+    ///
+    /// let arm = Model::open("../model-spec/models/two_link.toml")?;
+    /// assert_eq!(arm.drives(), ["joint1", "joint2"]);
+    /// # Ok::<(), modelmill::Error>(())
+    /// ```
     pub fn open(path: impl AsRef<Path>) -> Outcome<Self> {
         Host::new().model(path)
     }
@@ -72,6 +80,13 @@ impl Model {
     /// Derives a model from the text of its file, which must not extend another file. `name` is its name in messages.
     ///
     /// Fails as [`Model::open`] does.
+    ///
+    /// ```
+    /// let text = std::fs::read_to_string("../model-spec/models/two_link.toml").unwrap();
+    /// let arm = modelmill::Model::from_text("arm.toml", &text)?;
+    /// assert_eq!(arm.name, "arm");
+    /// # Ok::<(), modelmill::Error>(())
+    /// ```
     pub fn from_text(name: &str, text: &str) -> Outcome<Self> {
         let host = Host::new();
         let loaded = host.load_text(Path::new(name), text)?;
@@ -438,6 +453,15 @@ impl Model {
     ///
     /// # Panics
     /// If the number of values is not that of the base parameters.
+    ///
+    /// ```
+    /// use modelmill::Model;
+    ///
+    /// let arm = Model::open("../model-spec/models/two_link.toml")?;
+    /// let values: Vec<f64> = arm.nominal.iter().map(|value| 1.1 * value).collect();
+    /// assert_eq!(arm.with_values(&values).nominal, values);
+    /// # Ok::<(), modelmill::Error>(())
+    /// ```
     #[must_use]
     pub fn with_values(&self, values: &[f64]) -> Self {
         assert_eq!(

@@ -28,6 +28,13 @@ impl Model {
     /// Checks the model: its contents, and its numeric rank compared with the exact one.
     ///
     /// Fails only when the listener stops the job.
+    ///
+    /// ```
+    /// let checked = modelmill::Model::open("../model-spec/models/two_link.toml")?.check()?;
+    /// assert_eq!(checked.summary.bodies, 2);
+    /// assert!(checked.rank.is_some());
+    /// # Ok::<(), modelmill::Error>(())
+    /// ```
     pub fn check(&self) -> Outcome<ModelCheck> {
         // Without products of parameters there is no regressor and no rank.
         let (rank, warnings) = if self.derivation.reduction.products.is_empty() {

@@ -326,6 +326,23 @@ impl Model {
     /// of its segments state what was done and what looks suspicious.
     ///
     /// Fails with place and remedy when a column is missing or contains no numbers, or when time does not increase.
+    ///
+    /// ```no_run
+    /// use modelmill::Model;
+    /// use modelmill::recording::RecordingOptions;
+    ///
+    /// let model = Model::open("arm.toml")?;
+    /// // The recording calls the first joint `pos1`, in degrees.
+    /// let options = RecordingOptions {
+    ///     columns: vec![("q1".to_owned(), "pos1 [deg]".to_owned())],
+    ///     ..RecordingOptions::default()
+    /// };
+    /// let run = model.recording("run.csv", &options)?;
+    /// for note in run.notes() {
+    ///     println!("{}", note.says.in_library_words());
+    /// }
+    /// # Ok::<(), modelmill::Error>(())
+    /// ```
     pub fn recording(
         &self,
         path: impl AsRef<Path>,

@@ -131,6 +131,23 @@ impl Model {
     ///
     /// Fails with fewer than two runs, if the first or all later runs cannot be read, if no force was measured, or
     /// if `asked` names something that the model does not have.
+    ///
+    /// ```no_run
+    /// use modelmill::Model;
+    /// use modelmill::recording::RecordingOptions;
+    /// use modelmill::runs::{RunsOptions, UnreadRun};
+    ///
+    /// let model = Model::open("arm.toml")?;
+    /// let runs = ["monday.csv", "tuesday.csv"].map(|file| {
+    ///     let read = model.recording(file, &RecordingOptions::default());
+    ///     read.map_err(|error| UnreadRun { file: file.to_owned(), error })
+    /// });
+    /// let compared = model.runs(runs, &RunsOptions::default())?;
+    /// for change in &compared.runs[1].changes {
+    ///     println!("{}", change.says);
+    /// }
+    /// # Ok::<(), modelmill::Error>(())
+    /// ```
     pub fn runs<R: Borrow<PreparedRecording>>(
         &self,
         recordings: impl IntoIterator<Item = Result<R, UnreadRun>>,

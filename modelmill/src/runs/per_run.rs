@@ -31,6 +31,13 @@ const BODY_PARAMETERS: [(&str, &str); TEN] = [
 ];
 
 /// Values that are separate for each run: a kind, and optionally a place.
+///
+/// ```
+/// use modelmill::runs::PerRunSelection;
+///
+/// assert!(PerRunSelection::parse("payload@flange").is_ok());
+/// assert!(PerRunSelection::parse("payload").is_err());
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PerRunSelection {
     /// One of [`KINDS`], or the name of a base parameter.
@@ -70,6 +77,13 @@ impl PerRunSelection {
 }
 
 /// A load of known mass on a body in one of the runs.
+///
+/// ```
+/// use modelmill::runs::KnownLoad;
+///
+/// let load = KnownLoad::parse("with-tool.csv=2.8@flange").unwrap();
+/// assert_eq!((load.mass, load.frame.as_str()), (2.8, "flange"));
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct KnownLoad {
     /// The run: the end of its file name.

@@ -192,6 +192,10 @@ pub fn sheet(title: &str, left: f64, height: f64, body: &str) -> String {
 
 /// A curve in about `wanted` points, each with its index: the smallest and the largest value of each of many
 /// segments, so that every peak is kept. All values if they are few enough.
+///
+/// ```
+/// assert_eq!(modelmill::text::svg::thin_out(&[0.0, 5.0], 10), [(0, 0.0), (1, 5.0)]);
+/// ```
 pub fn thin_out(values: &[f64], wanted: usize) -> Vec<(usize, f64)> {
     if values.len() <= wanted {
         return values.iter().copied().enumerate().collect();

@@ -11,6 +11,14 @@ pub enum ColumnAlignment {
 
 /// Lays out rows below a header, with two blanks between columns and `indent` blanks in front; without trailing
 /// blanks.
+///
+/// ```
+/// use modelmill::text::table::{ColumnAlignment, table};
+///
+/// let columns = [("a", ColumnAlignment::Left), ("n", ColumnAlignment::Right)];
+/// let rows = [vec!["x".to_owned(), "10".to_owned()]];
+/// assert_eq!(table(2, &columns, &rows), ["  a   n", "  x  10"]);
+/// ```
 pub fn table(
     indent: usize,
     columns: &[(&str, ColumnAlignment)],
@@ -47,12 +55,16 @@ pub fn table(
         .collect()
 }
 
-/// A number with six significant digits, without needless zeros.
+/// A number with six significant digits.
 pub fn number(value: f64) -> String {
     significant(value, 6)
 }
 
 /// A value and its standard deviation, both rounded to the second digit of the standard deviation.
+///
+/// ```
+/// assert_eq!(modelmill::text::table::with_deviation(1.23456, 0.012), ["1.235", "0.012"]);
+/// ```
 pub fn with_deviation(value: f64, deviation: f64) -> [String; 2] {
     // Position of the first digit of the standard deviation.
     let exponent = deviation.abs().log10().floor();
@@ -71,6 +83,10 @@ pub fn with_deviation(value: f64, deviation: f64) -> [String; 2] {
 }
 
 /// A number with some significant digits; very large and very small ones with an exponent.
+///
+/// ```
+/// assert_eq!(modelmill::text::table::significant(0.123456, 3), "0.123");
+/// ```
 pub fn significant(value: f64, digits: usize) -> String {
     if value == 0.0 {
         return "0".to_owned();
@@ -93,6 +109,10 @@ pub fn significant(value: f64, digits: usize) -> String {
 }
 
 /// A relative figure in per cent: `11.3 %`, `6.28e-5 %`; `-` without a value.
+///
+/// ```
+/// assert_eq!(modelmill::text::table::percent(Some(0.113)), "11.3 %");
+/// ```
 pub fn percent(value: Option<f64>) -> String {
     match value {
         None => "-".to_owned(),
@@ -111,6 +131,10 @@ fn three_digits(value: f64) -> String {
 }
 
 /// A count with its noun, such as `1 loop`, `2 loops`.
+///
+/// ```
+/// assert_eq!(modelmill::text::table::count(2, "loop", "loops"), "2 loops");
+/// ```
 pub fn count(n: usize, one: &str, many: &str) -> String {
     if n == 1 {
         format!("1 {one}")

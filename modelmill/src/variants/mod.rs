@@ -76,6 +76,15 @@ pub struct ForceDifference {
 impl VariantComparison {
     /// Fails when two models cannot be compared, as [`VariantComparison::along_recordings`] would, before any
     /// recording is read.
+    ///
+    /// ```
+    /// use modelmill::Model;
+    /// use modelmill::variants::VariantComparison;
+    ///
+    /// let arm = Model::open("../model-spec/models/two_link.toml")?;
+    /// VariantComparison::check([&arm, &arm])?;
+    /// # Ok::<(), modelmill::Error>(())
+    /// ```
     pub fn check(models: [&Model; 2]) -> Outcome {
         ModelCounterparts::match_models(models).map(|_| ())
     }
