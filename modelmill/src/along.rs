@@ -9,6 +9,8 @@ use crate::model::Model;
 use crate::stretch::RecordingSegment;
 
 /// The model's forces along a segment for given base parameters, `[drive][sample]`, N or N m, not decimated.
+///
+/// Fails when a pose has no solution.
 pub fn forces(model: &Model, data: &RecordingSegment, values: &[f64]) -> Outcome<Vec<Vec<f64>>> {
     let evaluator = ModelEvaluator::new(&model.derivation);
     columns(model, data, |states| {
@@ -18,6 +20,8 @@ pub fn forces(model: &Model, data: &RecordingSegment, values: &[f64]) -> Outcome
 
 /// Determined components of the reactions along a segment for nominal parameters, `[component][sample]`, N or N m,
 /// decimated.
+///
+/// Fails when a pose has no solution, or the segment is too short to be filtered.
 pub fn reactions(
     model: &Model,
     data: &RecordingSegment,
@@ -29,12 +33,16 @@ pub fn reactions(
 }
 
 /// The measured forces, `[drive][sample]`, N or N m, decimated.
+///
+/// Fails when the recording has no forces, or the segment is too short to be filtered.
 pub fn measured_forces(data: &RecordingSegment) -> Outcome<Vec<Vec<f64>>> {
     filter_and_decimate(data.run.measured_forces()?.to_vec(), data)
 }
 
 /// The measured forces with excluded samples set to zero, `[drive][sample]`, decimated. Rows of the regressor are set
 /// to zero at the same samples, so that both sides of each equation stay consistent after any filter.
+///
+/// Fails as [`measured_forces`] does.
 pub fn included_forces(data: &RecordingSegment) -> Outcome<Vec<Vec<f64>>> {
     let mut forces = data.run.measured_forces()?.to_vec();
     for (force, out) in forces.iter_mut().zip(&data.run.left_out) {
@@ -55,6 +63,8 @@ pub fn interleave(channels: &[Vec<f64>]) -> Vec<f64> {
 
 /// Variables on which an error may depend, with their names, decimated like the forces: coordinates and their
 /// derivatives, passive coordinates, lengths and rates of linear drives, and measured loads; SI units.
+///
+/// Fails when a pose has no solution.
 pub fn variables(model: &Model, data: &RecordingSegment) -> Outcome<Vec<(String, Vec<f64>)>> {
     let run = &data.run;
     let mut variables = Vec::new();
@@ -150,6 +160,8 @@ fn check_finite(block: Vec<Vec<f64>>) -> Result<Vec<Vec<f64>>, PoseFault> {
 }
 
 /// Low-pass filters and decimates every column by the factor of the recording; a column of zeros stays zero.
+///
+/// Fails when a column is too short for the filter.
 pub fn filter_and_decimate(
     columns: Vec<Vec<f64>>,
     data: &RecordingSegment,
@@ -193,6 +205,8 @@ pub fn decimation_passband(data: &RecordingSegment) -> f64 {
 
 /// Rates of the drives, `[drive][sample]`, rad/s or m/s, not decimated. They are computed from the drives' Jacobian,
 /// since a drive may act along a rod or on a passive coordinate.
+///
+/// Fails when a pose has no solution.
 pub fn drive_rates(model: &Model, data: &RecordingSegment) -> Outcome<Vec<Vec<f64>>> {
     let evaluator = ModelEvaluator::new(&model.derivation);
     let mut positions = columns(model, data, |states| evaluator.drive_motion(states))?;

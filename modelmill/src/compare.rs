@@ -34,6 +34,7 @@ impl Model {
         recordings: &[&PreparedRecording],
         values: &[f64],
     ) -> Outcome<ModelComparison> {
+        // Forces are computed once, for the figures and for the regions.
         let [data, _] = recording::segments(self, recordings, &[]);
         let forces = data
             .iter()
@@ -66,6 +67,8 @@ pub fn band(data: &[RecordingSegment]) -> Option<f64> {
 
 /// Error figures over several recordings: over every sample whose force was measured, and below `band_hz`, Hz.
 /// `forces` are the model's, `[drive][sample]` for each recording.
+///
+/// Fails when a recording has no forces, or when forces differ in number.
 pub fn figures(
     model: &Model,
     data: &[RecordingSegment],
@@ -100,6 +103,8 @@ pub fn figures(
 }
 
 /// Error figures of the rows that a fit used, if decimation made fewer rows than samples; else `None`.
+///
+/// Fails as [`figures`] does.
 pub fn figures_of_rows(
     model: &Model,
     data: &[RecordingSegment],
@@ -141,6 +146,8 @@ pub struct ErrorLocations {
 /// Regions of coordinates, rates, loads and time that contain more than their share of the error.
 ///
 /// With several recordings, time is analysed in each of them separately.
+///
+/// Fails when a pose has no solution.
 pub fn error_locations(
     model: &Model,
     data: &[RecordingSegment],
@@ -190,6 +197,7 @@ pub fn error_locations(
                 in_time.extend(found);
             }
         }
+        // Errors and variables of a recording are appended together, so that their samples stay aligned.
         for (slot, (d, _)) in errors.iter_mut().zip(&drives) {
             slot.extend(errors_of(k, *d));
         }

@@ -40,6 +40,7 @@ impl Model {
         file: &str,
         unknown: &[String],
     ) -> Outcome<InterpretationResult> {
+        // The equations contain only base parameters in which an unknown occurs.
         let unknown = self::unknown_indices(self, unknown)?;
         let values = self.values_of(fit, file)?;
         let (system, used) = system(self, &unknown, &values.values, fit);
@@ -61,6 +62,7 @@ impl Model {
             .into_iter()
             .map(RecordingNote::warning);
         interpreted.notes.extend(remarks);
+        // The listener receives the notes as soon as they are known.
         for note in &interpreted.notes {
             self.host().note(note);
         }
@@ -75,6 +77,7 @@ pub fn unknown_indices(model: &Model, names: &[String]) -> Outcome<Vec<usize>> {
     let parameters = &model.derivation.mechanism.parameters;
     let mut found = Vec::new();
     for name in names.iter().map(|name| name.trim()) {
+        // The error lists all names of the model.
         let Some(i) = parameters.iter().position(|p| p.name == name) else {
             let all: Vec<&str> = parameters.iter().map(|p| p.name.as_str()).collect();
             return Err(Error::input(message!(
@@ -222,6 +225,7 @@ impl InterpretationResult {
                 fit.parameters.iter().find(|p| p.name == *name)
             })
             .collect();
+        // A base parameter that the fit did not determine has its nominal value.
         let undetermined: Vec<&str> = used
             .iter()
             .filter(|p| p.status == ParameterStatus::Undetermined)

@@ -12,6 +12,8 @@ use crate::stretch::RecordingSegment;
 pub(crate) type SegmentList<'a> = [(&'a RecordingSegment, bool)];
 
 /// Columns of a regressor along all segments: `[column][drive][sample]`, zero columns empty.
+///
+/// Fails when a pose has no solution, or a segment is too short to be filtered.
 pub(crate) fn regressor(
     all: &SegmentList<'_>,
     evaluator: &ModelEvaluator<'_>,
@@ -21,6 +23,8 @@ pub(crate) fn regressor(
 }
 
 /// As [`regressor`], for the columns that `wanted` selects; the others are zero.
+///
+/// Fails as [`regressor`] does.
 pub(crate) fn regressor_of(
     all: &SegmentList<'_>,
     evaluator: &ModelEvaluator<'_>,
@@ -52,6 +56,7 @@ pub(crate) fn regressor_of(
             }
             slot.get_or_insert_with(|| vec![0.0; before]).extend(column);
         }
+        // Columns that are zero along this segment are extended by zeros.
         before += one.samples().div_ceil(one.decimation());
         for column in stacked.iter_mut().flatten() {
             column.resize(before, 0.0);

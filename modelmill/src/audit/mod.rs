@@ -54,6 +54,7 @@ const AFFORDABLE: u64 = 20_000_000_000;
 /// contacts and pushes are excluded.
 pub fn examine(model: &Model, data: &mut [RecordingSegment], leave_out_events: bool) {
     for one in data {
+        // Notes go to the listener at once; suspicions are kept for the diagnosis.
         for AuditFinding { note, fault } in findings(model, one) {
             one.note(model, note);
             one.faults.extend(fault);
@@ -98,6 +99,7 @@ fn findings(model: &Model, data: &RecordingSegment) -> Vec<AuditFinding> {
         return Vec::new();
     };
     let n_drives = forces.len();
+    // Samples are spread evenly over the recording.
     let wanted = (ROWS_LOOKED_AT / n_drives.max(1)).clamp(FEWEST_LOOKED_AT, LOOKED_AT);
     let samples: Vec<usize> = (0..n).step_by((n / wanted).max(1)).collect();
     // Poses without a solution are reported with their place when the complete recording is evaluated.
@@ -121,6 +123,7 @@ fn findings(model: &Model, data: &RecordingSegment) -> Vec<AuditFinding> {
             // The check with nominal values identifies the drive.
             && (beside.is_empty() || !matches!(suspect, WiringFault::Reversed(_)))
         {
+            // Of two drives it cannot be known which of them has the wrong sign.
             let (kind, at, says) = match suspect {
                 WiringFault::Swapped(a, b) => (
                     EXCHANGED,
@@ -155,6 +158,7 @@ fn findings(model: &Model, data: &RecordingSegment) -> Vec<AuditFinding> {
             let at = at.into_iter().map(|d| drives[d].clone()).collect();
             notes.push(AuditFinding::suspicion(kind, at, says, &run.file, note));
         }
+        // Exchanged or reversed coordinates would explain the forces as well.
         if notes.is_empty() {
             notes = motion_findings(model, data, &samples);
         }
@@ -188,6 +192,7 @@ fn nominal_force_findings(
     let forces = data.run.force.as_deref().unwrap_or(&[]);
     let nominal = DVector::from_column_slice(&model.nominal);
     let n = forces.len();
+    // Rows are interleaved by drive.
     let by_drive = |forces: DVector<f64>| -> Vec<Vec<f64>> {
         let of = |d: usize| forces.iter().skip(d).step_by(n).copied().collect();
         (0..n).map(of).collect()
@@ -241,6 +246,7 @@ fn motion_findings(model: &Model, data: &RecordingSegment, samples: &[usize]) ->
         let all = (model.base.len() as u64).pow(2) * rows;
         usize::try_from(all.div_ceil(AFFORDABLE).max(1)).unwrap_or(usize::MAX)
     };
+    // A change is judged with several rows for each base parameter.
     let fewest = (ROWS_PER_COLUMN * model.base.len()).max(1);
     let most = (samples.len() * forces.len() / fewest).max(1);
     if thinned(hypotheses.len()) > most {
@@ -254,6 +260,7 @@ fn motion_findings(model: &Model, data: &RecordingSegment, samples: &[usize]) ->
     // The error without a change is the reference; it does not exist if poses cannot be reached.
     let now = force_audit(model, data, &samples, &|_| {}).and_then(|audit| audit.error(&measured));
     let limit = now.map_or(CONVINCING, |error| BETTER * error);
+    // Only changes that reduce the error clearly are kept, the best first.
     let mut tried: Vec<(&ColumnHypothesis, f64)> = hypotheses
         .iter()
         .filter_map(|one| {
@@ -273,6 +280,7 @@ fn motion_findings(model: &Model, data: &RecordingSegment, samples: &[usize]) ->
     let turned: Vec<&str> = alike
         .flat_map(|(one, _)| one.at.iter().map(String::as_str))
         .collect();
+    // If several signs explain the same, all coordinates are named.
     let (at, says) = if first.kind == WRONG_SIGN && turned.len() > 1 {
         let says = format!(
             "one of the coordinates `{}` seems to have the wrong sign",
@@ -314,6 +322,7 @@ fn hypotheses(model: &Model, maps_from_degrees: &[OptionSetting]) -> Vec<ColumnH
     let columns = Remedy::option(OptionName::Columns);
     let motions = model.motions();
     let mut hypotheses = Vec::new();
+    // A factor changes positions and derivatives alike.
     let scaled = |coordinates: Vec<usize>, factor: f64| -> Box<MotionChange<'static>> {
         Box::new(move |states| {
             for order in states.iter_mut() {
@@ -325,6 +334,7 @@ fn hypotheses(model: &Model, maps_from_degrees: &[OptionSetting]) -> Vec<ColumnH
             }
         })
     };
+    // All angles together, since a recorder uses one unit.
     let angles: Vec<usize> = (0..motions.len()).filter(|i| motions[*i].1).collect();
     if !angles.is_empty() {
         hypotheses.push(ColumnHypothesis {
@@ -383,6 +393,7 @@ fn regressor(
         columns.iter().map(pick).collect()
     };
     let run = &data.run;
+    // The change is applied to the selected samples only.
     let mut states = [&run.q, &run.qd, &run.qdd].map(|columns| pick(columns));
     change(&mut states);
     let load = pick(run.force.as_deref().unwrap_or(&[]));

@@ -41,6 +41,7 @@ impl TrajectoryLimit {
             "expected NAME=SIZE or NAME=LOW:HIGH, such as theta1_d=1.2 or theta1=1.5:2.1".to_owned()
         };
         let (name, range) = text.split_once('=').ok_or_else(expected)?;
+        // Numbers must be finite, so that a range has an end.
         let number = |text: &str| {
             let value: Option<f64> = text.trim().parse().ok();
             value.filter(|v| v.is_finite()).ok_or_else(expected)
@@ -87,6 +88,7 @@ pub fn merged_limits(model: &Model, given: &[TrajectoryLimit]) -> Outcome<Motion
             && let Some(axis) = AXES.iter().position(|a| *a == axis)
             && let Some(i) = mechanism.points.iter().position(|p| p.name == point)
         {
+            // An axis of a point that has limits on other axes keeps these.
             let known = limits.points.iter_mut().find(|(p, _)| p.0 == i);
             match known {
                 Some((_, ranges)) => ranges[axis] = Some(limit.ends),
@@ -114,7 +116,9 @@ fn set_coordinate_limit(
 ) -> Outcome {
     let coordinates = &model.derivation.mechanism.coordinates;
     let name = limit.name.as_str();
+    // The option is repeated in every message of this limit.
     let this = Remedy::option(OptionName::Limits).with_value(name);
+    // The suffix selects position, rate or acceleration.
     let (stem, derivative) = match (name.strip_suffix("_dd"), name.strip_suffix("_d")) {
         (Some(stem), _) => (stem, 2),
         (None, Some(stem)) => (stem, 1),
@@ -147,6 +151,7 @@ fn set_coordinate_limit(
             this
         )));
     }
+    // A coordinate without limits gets an entry.
     let position = limits.coordinates.iter().position(|(c, _)| c.0 == i);
     let k = position.unwrap_or_else(|| {
         limits.coordinates.push((
@@ -167,11 +172,13 @@ pub(crate) fn with_recorded_ranges(
     mut limits: MotionLimits,
     recordings: &[&PreparedRecording],
 ) -> (MotionLimits, Option<RecordingNote>) {
+    // Ranges are taken over all segments.
     let [recordings, _] = recording::segments(model, recordings, &[]);
     let (active, _) = model.derivation.coordinates();
     let coordinates = &model.derivation.mechanism.coordinates;
     let mut says = Vec::new();
     for (k, i) in active.iter().enumerate() {
+        // Limits of the file or of the options have priority.
         let known = limits.coordinates.iter().position(|(c, _)| c.0 == *i);
         let mut one = known.map(|k| limits.coordinates[k].1).unwrap_or_default();
         if one.position.is_some() {
@@ -212,6 +219,7 @@ pub(crate) fn with_recorded_ranges(
             coordinates[*i].name, ends[0], ends[1]
         ));
     }
+    // The note shows how to allow more.
     let note = (!says.is_empty()).then(|| {
         RecordingNote::info(message!(
             "{} has no limits for positions. The motion stays within the recorded ranges: {}, and within the largest recorded \
@@ -234,6 +242,7 @@ pub(crate) fn with_recorded_ranges(
 pub fn active_limits(model: &Model, limits: &MotionLimits) -> Outcome<Vec<ExcitationLimits>> {
     let (active, _) = model.derivation.coordinates();
     let coordinates = &model.derivation.mechanism.coordinates;
+    // Rates and accelerations may be unlimited, positions may not.
     let of_one = |i: &usize| {
         let found = limits.coordinates.iter().find(|(c, _)| c.0 == *i);
         let limits = found.map(|(_, limits)| *limits).unwrap_or_default();

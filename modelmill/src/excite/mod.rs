@@ -115,6 +115,7 @@ impl Model {
             recordings,
         );
         let coordinates = limits::active_limits(self, &all_limits)?;
+        // The criterion of the options is replaced if effects are the goal.
         let mut options = request.options.clone();
         let plant = ModelPlant::new(self, &all_limits);
         // Effects that no motion can distinguish are refused before the search.
@@ -145,6 +146,7 @@ impl Model {
             Some(separating) => separating,
             None => &plant,
         };
+        // The search reports progress for each trajectory.
         let found = self
             .host()
             .run_job(
@@ -168,6 +170,7 @@ impl Model {
             None => None,
         };
         drop(separating);
+        // The result keeps the task, for its texts.
         let separated = match (asked, apart) {
             (Some(asked), Some(apart)) => Some(SeparationResult {
                 distance: apart,
@@ -189,6 +192,7 @@ impl Model {
                 significant(found.condition_number, 4)
             ),
         };
+        // The scaled condition number is computed along the samples of the file.
         let scaled = plant
             .regressor(&motion)
             .filter(|w| w.ncols() > 0)
@@ -274,6 +278,7 @@ fn picture(
         .zip(&found.series)
         .map(|(name, series)| format!("{name} {}", significant(series.offset, 4)))
         .collect();
+    // One panel for each kind of quantity, with one curve for each coordinate.
     let mut panel = |title: &str, columns: &[Vec<f64>], names: &[String]| {
         let curves: Vec<(&str, &[f64])> = names
             .iter()
@@ -290,6 +295,7 @@ fn picture(
     };
     let title = format!("position around the mean ({}), {unit}", means.join(", "));
     panel(&title, &around, &names);
+    // Units of derivatives, also if coordinates have different units.
     let per = |seconds: &str| {
         unit.replace("rad", &format!("rad/{seconds}"))
             .replace('m', &format!("m/{seconds}"))
@@ -300,6 +306,7 @@ fn picture(
         &motion.qdd,
         &names,
     );
+    // Forces of the nominal model show whether the drives can follow.
     if let Some(forces) = plant.forces(motion) {
         panel(
             "force of the nominal model, N or N m",

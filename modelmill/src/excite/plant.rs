@@ -55,6 +55,7 @@ impl<'a> ModelPlant<'a> {
     pub fn new(model: &'a Model, limits: &'a MotionLimits) -> Self {
         let mechanism = &model.derivation.mechanism;
         let (active, passive) = model.derivation.coordinates();
+        // Limits of active coordinates are handled by the search itself.
         let passive_ranges = limits
             .coordinates
             .iter()
@@ -71,6 +72,7 @@ impl<'a> ModelPlant<'a> {
                 axes.filter_map(|(axis, range)| Some((*point, axis, (*range)?)))
             })
             .collect();
+        // The nominal singular values need the plant without this limit.
         let mut plant = Self {
             model,
             evaluator: ModelEvaluator::new(&model.derivation),
@@ -124,6 +126,7 @@ impl<'a> ModelPlant<'a> {
     /// All coordinates along a motion, `[coordinate][sample]`; `None` if the loops cannot close.
     fn coordinates(&self, motion: &ExcitationMotion) -> Option<Vec<Vec<f64>>> {
         let mut all = vec![Vec::new(); self.active.len() + self.passive.len()];
+        // Active coordinates are given, passive ones are computed.
         for (i, column) in self.active.iter().zip(&motion.q) {
             all[*i].clone_from(column);
         }
@@ -149,6 +152,7 @@ impl<'a> ModelPlant<'a> {
         if !self.passive.is_empty() {
             // Columns of the passive coordinates of the loops' gap Jacobian.
             for (sample, least) in of_loops.iter_mut().enumerate() {
+                // Poses are evaluated one by one; Jacobians have no block evaluation.
                 let at: Vec<f64> = all.iter().map(|column| column[sample]).collect();
                 let rows = self.kinematics.gap_jacobian(&self.kinematics.poses(&at));
                 let rows = rows
@@ -183,6 +187,7 @@ impl ExcitationPlant for ModelPlant<'_> {
         } else {
             self.forces(motion)?
         };
+        // Columns of known parameters are no part of the condition number.
         let matrix = self.evaluator.regressor(&states(motion, &load)).ok()?;
         if self.unknown.len() == matrix.ncols() {
             return Some(matrix);
@@ -221,6 +226,7 @@ impl ExcitationPlant for ModelPlant<'_> {
         };
         let needs_poses = !self.point_ranges.is_empty();
         if !self.passive_ranges.is_empty() || needs_poses {
+            // Passive coordinates, in the order of their names.
             let coordinates = self.coordinates(motion)?;
             for (k, range) in &self.passive_ranges {
                 let column = &coordinates[self.passive[*k]];
@@ -228,6 +234,7 @@ impl ExcitationPlant for ModelPlant<'_> {
             }
         }
         if !self.limits.forces.is_empty() {
+            // Forces of the nominal model.
             let forces = self.forces(motion)?;
             for (drive, range) in &self.limits.forces {
                 let column = &forces[drive.0];

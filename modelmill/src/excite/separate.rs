@@ -80,6 +80,7 @@ impl SeparationSetup {
         from: &[NamedEffect],
         beside: &[NamedEffect],
     ) -> Outcome<Self> {
+        // Each effect may be named once only.
         let all: Vec<&NamedEffect> = std::iter::once(separate)
             .chain(from)
             .chain(beside)
@@ -95,6 +96,7 @@ impl SeparationSetup {
                 )));
             }
         }
+        // Constants of alternatives are searched, those of other effects are fixed.
         let choose =
             |named: &NamedEffect, constants: ConstantPolicy| derive_effect(model, named, constants);
         let truth = choose(separate, ConstantPolicy::Usual)?;
@@ -127,10 +129,12 @@ impl SeparationSetup {
             effect: separate.effect.clone(),
             values: Vec::new(),
         };
+        // A tilt has no searched constants.
         let is_tilt = truth.kind.mechanics == Some(modelmill_spec::Mechanics::Tilt);
         let fitted = (!is_tilt && truth.kind.constants.iter().any(is_searched))
             .then(|| choose(&free, ConstantPolicy::Searched))
             .transpose()?;
+        // Whether an alternative is a special case is found later, along random motions.
         let rivals = from
             .iter()
             .map(|named| {
@@ -188,6 +192,7 @@ impl SeparationSetup {
         model: &Model,
         data: &[RecordingSegment],
     ) -> Outcome {
+        // Forces of all recordings are joined drive by drive.
         let mut measured: Vec<Vec<f64>> = Vec::new();
         for one in data {
             let forces = crate::along::measured_forces(one)?;
@@ -209,6 +214,7 @@ impl SeparationSetup {
         if !self.sizes.is_empty() {
             return Ok(());
         }
+        // The size is fitted together with the base parameters, weighted by the noise.
         let runs: Vec<(&RecordingSegment, bool)> = data.iter().map(|one| (one, false)).collect();
         let samples = measured.first().map_or(0, Vec::len);
         let Some(terms) = self.separation_columns(model, &runs)? else {
@@ -252,6 +258,7 @@ impl SeparationSetup {
         let Some((candidate, choices)) = self.truth.candidate(model, runs, &load)? else {
             return Ok(None);
         };
+        // Effects of both cases are fitted like base parameters.
         for one in &self.common_effects {
             if let Some((_, choices)) = one.candidate(model, runs, &load)? {
                 columns.extend(choices.into_iter().flat_map(|choice| choice.columns));
@@ -282,6 +289,7 @@ impl SeparationSetup {
             return Ok(None);
         };
         let weights = self.weights(model.drives().len());
+        // All columns become matrices with weighted rows.
         let of = |columns: &[ForceColumn]| matrix(columns, &weights, samples);
         let (candidate, columns) = &terms.truth;
         let fitted = match &self.fitted {
@@ -341,6 +349,7 @@ impl SeparationSetup {
         if self.sizes.is_empty() {
             return columns.clone();
         }
+        // Products of parameters have their own size.
         let value = |symbol: &str| {
             let known = self.sizes.iter().find(|(known, _)| known == symbol);
             known.map_or(0.0, |(_, value)| *value)
@@ -407,6 +416,7 @@ struct SeparationColumns {
 
 /// Columns as a matrix, drive by drive, each drive multiplied by its weight.
 fn matrix(columns: &[ForceColumn], weights: &[f64], samples: usize) -> DMatrix<f64> {
+    // Drives are stacked below each other; a drive without force stays zero.
     let mut matrix = DMatrix::zeros(weights.len() * samples, columns.len());
     for (k, column) in columns.iter().enumerate() {
         for (d, (values, weight)) in column.0.iter().zip(weights).enumerate() {

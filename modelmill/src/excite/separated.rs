@@ -76,6 +76,7 @@ pub(crate) fn prepare_separation(
         model.host().note(&note);
         notes.push(note);
     };
+    // Values, noise and recordings of the request.
     let mut pair = SeparationSetup::new(model, &asked.effect, &asked.from, &asked.common_effects)?;
     if let Some(size) = asked.noise {
         pair.set_noise(size, model.drives().len());
@@ -90,6 +91,7 @@ pub(crate) fn prepare_separation(
             pair.effect().kind
         )));
     }
+    // A difference that no random motion shows is taken as impossible.
     let motions = random_motions(plant, limits, options, LOOKED_AT)
         .map_err(|error| Error::input(format!("{}: {error}", model.path)))?;
     // Each alternative is tested alone along all random motions.
@@ -140,9 +142,11 @@ pub(crate) fn prepare_separation(
             )));
             continue;
         }
+        // If the effect explains the alternative along every motion, only one direction counts.
         pair.rivals[k].is_special_case = all.iter().all(|one| one.figures.can_explain_rival());
         which.push(k);
     }
+    // Without any alternative left there is no goal for the search.
     if which.is_empty() {
         return Err(Error::input(format!(
             "{}: no experiment distinguishes {} from {}; assume the simpler one unless other evidence contradicts it. If only \
@@ -218,6 +222,7 @@ pub(crate) fn common_force_unit(model: &Model) -> &'static str {
     let mechanism = &model.derivation.mechanism;
     let carries =
         |drive: &modelmill_spec::ModelDrive| drive.kind.place_load(&mechanism.coordinates);
+    // The unit is common only if all drives have it.
     let forces = mechanism
         .drives
         .iter()
@@ -248,6 +253,7 @@ impl SeparationResult {
     pub fn json(&self) -> Value {
         // Directions that a special case cannot show are null.
         let pair = &self.task.pair;
+        // Figures along a motion or a recording.
         let one = |apart: &EffectDistance, samples: usize| {
             let constants = apart.constants.iter().map(|(s, v)| (s.clone(), json!(v)));
             let is_held = pair.rivals[apart.rival].is_special_case;
@@ -266,6 +272,7 @@ impl SeparationResult {
                 "deviations": self.deviations(apart, samples),
             })
         };
+        // Alternatives that no motion distinguishes are listed separately.
         let left_out: Vec<&LocatedEffect> = (0..pair.rivals.len())
             .filter(|k| !self.task.which.contains(k))
             .map(|k| pair.rivals[k].effect())
@@ -303,6 +310,7 @@ impl SeparationResult {
                 words::effects(&beside)
             ));
         }
+        // The values of the effect scale all figures.
         let sizes: Vec<String> = (pair.sizes().iter())
             .map(|(symbol, value)| format!("{symbol} = {}", significant(*value, 5)))
             .collect();
@@ -316,6 +324,7 @@ impl SeparationResult {
         lines.push(String::new());
         let force = |value: f64| self.force(value);
         let row = |name: &str, apart: &EffectDistance, samples: usize| {
+            // The nearest alternative with the constants at which it is nearest.
             let nearest = pair.rivals[apart.rival].effect();
             let constants = apart.constants.iter();
             let constants: Vec<String> = constants
@@ -413,6 +422,7 @@ impl SeparationResult {
             )
             .spell(spelling),
         });
+        // A special case is named, since forces cannot exclude the more general effect.
         for k in &self.task.which {
             let rival = &pair.rivals[*k];
             if rival.is_special_case {

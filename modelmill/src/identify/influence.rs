@@ -38,8 +38,10 @@ pub(super) fn fault_influence(
     if let Some(part) = options.standstill {
         standstill::exclude_standstill(model, &mut data, part).ok()?;
     }
+    // The second fit uses the same options, on the unrepaired recordings.
     let faulty = regression::identify(model, &data, &[], options).ok()?;
     let infos = model.parameter_infos();
+    // The change of each parameter is measured in its standard deviations.
     let pairs = found.solution.values.iter().zip(&faulty.solution.values);
     let moved = pairs
         .zip(&found.deviations.std)
@@ -53,6 +55,7 @@ pub(super) fn fault_influence(
     let (((sound, faulty), std), k) = most?;
     let deviations = (faulty - sound).abs() / std;
     let files = files.join(", ");
+    // A change below one standard deviation needs no name.
     let says = if deviations < 1.0 {
         format!(
             "Without their repair, the sensor faults in {files} would have changed no base parameter by more than {} standard \

@@ -32,6 +32,7 @@ pub(crate) fn instrument_segments(
     if matches!(instruments, Instruments::None) {
         return Ok(Vec::new());
     }
+    // Weights from residuals would make the estimate depend on itself.
     if options.weights == EquationWeights::Channels {
         return Err(Error::options(message!(
             "{} needs {} or `variance`: weights from residuals would depend on the estimate that \
@@ -71,6 +72,7 @@ fn check_same_times(data: &[RecordingSegment], instruments: &[RecordingSegment])
         )));
     }
     for (own, theirs) in data.iter().zip(instruments) {
+        // Times are compared sample by sample, within a part of the smallest step.
         let (a, b) = (&own.run.time, &theirs.run.time);
         let step = a
             .windows(2)
@@ -112,6 +114,7 @@ fn check_same_times(data: &[RecordingSegment], instruments: &[RecordingSegment])
 fn shift_by_period(data: &RecordingSegment, period: f64) -> Outcome<RecordingSegment> {
     let time = &data.run.time;
     let n = time.len();
+    // A period must fit into the recording one and a half times.
     let span = time
         .last()
         .zip(time.first())
@@ -133,6 +136,7 @@ fn shift_by_period(data: &RecordingSegment, period: f64) -> Outcome<RecordingSeg
             at
         }
     };
+    // Near the end the period before is used.
     let mut places = Vec::with_capacity(n);
     for t in time {
         let wanted = if t + period <= time[n - 1] + 0.5 * step {

@@ -91,11 +91,13 @@ impl Model {
         options: &EstimatorOptions,
     ) -> Outcome<Identification> {
         let recordings = fit;
+        // Segments are copied, since some of their equations may be excluded.
         let [mut fit, check] = recording::segments(self, fit, check);
         // Equations at standstill are excluded before instruments are assigned.
         if let Some(part) = options.standstill {
             standstill::exclude_standstill(self, &mut fit, part)?;
         }
+        // Instruments must match the segments of the fit.
         let instruments = instruments::instrument_segments(&fit, instruments, options)?;
         let options = EstimatorOptions {
             weights: resolve_weights(self, &fit, &instruments, options.weights),
@@ -128,6 +130,7 @@ fn resolve_weights(
         return weights;
     }
     let drives = model.drives().len();
+    // Squares of N and N m must not be added without weights.
     let differ = (1..drives).any(|d| model.force_unit(d) != model.force_unit(0));
     let chosen = data.iter().any(|one| one.run.prepared.decimate_chosen);
     if instruments.is_empty() && drives > 1 && (differ || chosen) {
@@ -151,6 +154,7 @@ pub fn identify(
     let solution = &found.solution;
     let infos = model.parameter_infos();
     let unknown: Vec<ParameterInfo> = found.unknown.iter().map(|k| infos[*k].clone()).collect();
+    // Values, standard deviations and status of the estimated parameters.
     let mut parameters = fit_parameters(&unknown, solution, &found.deviations);
     for one in found.refined.removed_parameters() {
         parameters[one].status = ParameterStatus::NotEssential;
@@ -160,11 +164,13 @@ pub fn identify(
             parameters.insert(k, known_parameter(info, model.nominal[k]));
         }
     }
+    // Notes need all parameters, in the order of the model.
     let notes = remarks(model, &found, &parameters);
     let values: Vec<f64> = parameters.iter().map(|p| p.value).collect();
     let names: Vec<String> = unknown.into_iter().map(|info| info.expression).collect();
     // Fit and validation use one band, so that their figures can be compared.
     let band = compare::band(data);
+    // Error figures of identified and nominal values, on fit and validation runs.
     let (fit, nominal_fit) = both_figures(model, data, &values, band)?;
     let recordings = data.iter().chain(check);
     let repeats = recordings
@@ -213,6 +219,7 @@ pub fn identify(
 
 /// The covariance of all base parameters, with zeros for known ones; `None` unless all values are finite.
 fn covariance(found: &RegressionEstimate, n: usize) -> Option<Vec<Vec<f64>>> {
+    // Known parameters have no uncertainty.
     let mut rows = vec![vec![0.0; n]; n];
     for (a, i) in found.unknown.iter().enumerate() {
         for (b, j) in found.unknown.iter().enumerate() {
@@ -283,6 +290,7 @@ fn remarks(
     }
     // Each undetermined direction gets one note, with the values that were chosen in it.
     for direction in &solution.undetermined {
+        // The values along the direction are chosen nearest to the nominal ones.
         let kept: Vec<String> = direction
             .changes
             .iter()
@@ -324,6 +332,7 @@ fn remarks(
     }
     // A sign counts as wrong only if it is two standard deviations beyond zero.
     for (k, p) in parameters.iter().enumerate() {
+        // Undetermined parameters keep their nominal sign and are not tested.
         let slack = 2.0 * p.std.unwrap_or(0.0);
         let (wrong, expected) = match model.sign(k) {
             Sign::Positive => (p.value < -slack, "positive"),

@@ -83,6 +83,7 @@ pub fn identify(
     let known: Vec<(usize, f64)> = known.into_iter().map(|k| (k, model.nominal[k])).collect();
     let nominal: Vec<f64> = unknown.iter().map(|k| model.nominal[*k]).collect();
     let samples: usize = data.iter().map(RecordingSegment::samples).sum();
+    // Each segment becomes a source of rows.
     let mut runs = data
         .iter()
         .enumerate()
@@ -107,10 +108,12 @@ pub fn identify(
     model
         .host()
         .run_job("identifying", passes * samples, |job| {
+            // Rows are kept in memory if they are few, so that later passes are fast.
             for run in &mut runs {
                 run.keep_if_small(job)?;
             }
             let channels = model.drives().len();
+            // The estimator requests the rows in several passes.
             let show = |visit: &mut RowVisitor<'_>| -> Outcome {
                 runs.iter()
                     .try_for_each(|run| run.visit_rows::<Error>(job, visit))
@@ -130,6 +133,7 @@ pub fn identify(
                     }),
                 });
             }
+            // Weights by drive and robust weights are iterated by the estimator.
             let options = EstimateOptions {
                 by_channel,
                 huber: args.robust,
@@ -229,6 +233,7 @@ impl<'a> RegressionRows<'a> {
         weights: EquationWeights,
     ) -> Outcome<Self> {
         let drives = model.drives();
+        // Weights from variances need a variance for every drive.
         let spread = if weights == EquationWeights::Variance {
             let Some(variance) = &data.variance else {
                 let columns: Vec<String> = drives
@@ -275,6 +280,7 @@ impl<'a> RegressionRows<'a> {
 
     /// Computes all rows once and keeps them, if they are few enough or decimated: decimation needs neighbouring rows.
     fn keep_if_small(&mut self, job: &JobHandle) -> Outcome {
+        // Without decimation, rows that are too many are computed again in each pass.
         let width = self.width() * self.model.drives().len();
         let decimation = self.data.decimation();
         let samples = self.data.samples();
@@ -329,6 +335,7 @@ impl<'a> RegressionRows<'a> {
             job.add(self.data.samples());
             return Ok(());
         }
+        // Blocks are weighted and split as the kept table would be.
         let mut row = 0;
         self.blocks::<E>(&mut |w| {
             let rows = w.len() / self.width();
@@ -347,6 +354,7 @@ impl<'a> RegressionRows<'a> {
         first: usize,
         visit: &mut RowVisitor<'_>,
     ) -> Result<(), LeastSquaresError> {
+        // The measured forces and weights of these rows.
         let at = first..first + w.len() / self.width();
         let measured = &self.measured[at.clone()];
         let factors = self.factors.as_ref().map(|factors| &factors[at]);
@@ -359,6 +367,7 @@ impl<'a> RegressionRows<'a> {
         let mut rows = Vec::with_capacity(w.len());
         let mut rest = Vec::with_capacity(measured.len());
         for (i, (row, y)) in w.chunks_exact(self.width()).zip(measured).enumerate() {
+            // Known columns are dropped from the row, and their force from the measured value.
             let factor = factors.map_or(1.0, |factors| factors[i]);
             for part in row.chunks_exact(n) {
                 rows.extend(self.unknown.iter().map(|k| factor * part[*k]));
@@ -383,6 +392,7 @@ impl<'a> RegressionRows<'a> {
         self.data.for_each_block(self.model, |states| {
             rows.clear();
             rows.resize(states.len() * drives * width, 0.0);
+            // The states of the instruments have the same indices as those of the recording.
             if let Some(instruments) = self.instruments {
                 let theirs = instruments.states(start, start + states.len());
                 fill(&evaluator, &theirs, drives, width, 0, &mut rows)
@@ -425,6 +435,7 @@ impl DecimationWindow {
         end: usize,
         kept: &mut Vec<f64>,
     ) -> Result<(), FilterError> {
+        // The complete table is decimated, and the part that is final is appended.
         let short = decimate_table(&self.table, width, decimation)?;
         while self.next < self.first + end {
             let at = (self.next - self.first) / decimation * width;
@@ -463,6 +474,7 @@ fn fill(
 ) -> Result<(), PoseFault> {
     let mut first = 0;
     evaluator.regressor_blocks(states, |len, columns| {
+        // Columns are ordered by drive; rows are ordered by sample and drive.
         let n = columns.len() / drives.max(1);
         for (k, column) in columns.iter().enumerate() {
             let at = first * width + (k / n) * width + place + k % n;

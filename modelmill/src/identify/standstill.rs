@@ -21,6 +21,7 @@ pub(crate) fn exclude_standstill(
     part: f64,
 ) -> Outcome {
     let drives = model.drives();
+    // Rates at the decimated samples, since these are the equations of the fit.
     let rates: Vec<Vec<Vec<f64>>> = data
         .iter()
         .map(|one| {
@@ -41,6 +42,7 @@ pub(crate) fn exclude_standstill(
     for (one, run) in data.iter_mut().zip(&rates) {
         let samples = run.first().map_or(0, Vec::len);
         of += samples;
+        // Weights of other exclusions are kept.
         let weights = one
             .weights
             .get_or_insert_with(|| vec![1.0; samples * drives.len()]);
@@ -53,6 +55,7 @@ pub(crate) fn exclude_standstill(
             }
         }
     }
+    // One note for each drive; a drive without any equation is an error.
     let standstill = Remedy::option(OptionName::Standstill);
     for (drive, out) in drives.iter().zip(out) {
         if out == of {

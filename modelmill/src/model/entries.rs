@@ -36,6 +36,7 @@ pub(crate) fn entries(m: &Mechanism) -> Vec<(String, String)> {
 
 /// Gravity, constants, parameters and coordinates.
 fn quantities(m: &Mechanism, entries: &mut ModelEntries) {
+    // Values carry their units, so that a changed unit is a change.
     entries.add("gravity", "", triple(m, &m.gravity));
     for c in &m.constants {
         entries.add("constant", &c.name, format!("{} {}", c.value, c.unit));
@@ -54,6 +55,7 @@ fn quantities(m: &Mechanism, entries: &mut ModelEntries) {
 /// Frames and points.
 fn geometry(m: &Mechanism, entries: &mut ModelEntries) {
     for f in &m.frames {
+        // The base frame is part of every model.
         if f.convention == FrameConvention::Base {
             continue;
         }
@@ -75,6 +77,7 @@ fn geometry(m: &Mechanism, entries: &mut ModelEntries) {
 
 /// Parts and lumped masses.
 fn bodies(m: &Mechanism, entries: &mut ModelEntries) {
+    // Both ways of giving an inertia are described as they are written.
     for p in &m.parts {
         let inertial = match &p.inertial {
             PartInertia::AboutCentre {
@@ -120,6 +123,7 @@ fn bodies(m: &Mechanism, entries: &mut ModelEntries) {
 
 /// Loops, couplings, drives, effects, retained products and columns of recordings.
 fn actuation(m: &Mechanism, entries: &mut ModelEntries) {
+    // Loops and couplings determine passive coordinates.
     for l in &m.loops {
         let [a, b] = l.joins.map(|p| m.points[p.0].name.clone());
         entries.add("loop", &l.name, format!("joins {a} and {b}"));
@@ -133,6 +137,7 @@ fn actuation(m: &Mechanism, entries: &mut ModelEntries) {
         let name = &m.coordinates[c.coordinate.0].name;
         entries.add("coupling of", name, format!("follows {}", all.join(" + ")));
     }
+    // A drive acts on a joint or between two points.
     for d in &m.drives {
         let how = match d.kind {
             DriveKind::Joint(i) => format!("on the joint {}", m.coordinates[i.0].name),
@@ -148,10 +153,12 @@ fn actuation(m: &Mechanism, entries: &mut ModelEntries) {
         let name = format!("{} at {}", e.kind, places(m, e));
         entries.add("effect", &name, terms(m, e));
     }
+    // The order of `retain` matters, so that the list is one entry.
     let retained: Vec<String> = m.retain.iter().map(|powers| product(m, powers)).collect();
     if !retained.is_empty() {
         entries.add("retain", "", retained.join(", "));
     }
+    // Columns of recordings are compared as they are written.
     for (ours, theirs) in &m.recording.columns {
         entries.add("column", ours, theirs.clone());
     }
@@ -173,6 +180,7 @@ fn product(m: &Mechanism, powers: &[(modelmill_spec::ParameterIdx, u32)]) -> Str
     let factors: Vec<String> = powers
         .iter()
         .map(|(p, n)| match n {
+            // A power of one is not written.
             1 => m.parameters[p.0].name.clone(),
             n => format!("{}^{n}", m.parameters[p.0].name),
         })
@@ -182,6 +190,7 @@ fn product(m: &Mechanism, powers: &[(modelmill_spec::ParameterIdx, u32)]) -> Str
 
 /// The entries of an inertia that are not zero, such as `xx I1, zz I3`.
 fn tensor(m: &Mechanism, inertia: &[ExactExpression; 6]) -> String {
+    // Zero entries are omitted, as in the model file.
     let entries: Vec<String> = ["xx", "xy", "xz", "yy", "yz", "zz"]
         .iter()
         .zip(inertia)
@@ -197,6 +206,7 @@ fn tensor(m: &Mechanism, inertia: &[ExactExpression; 6]) -> String {
 
 /// One step of a frame: a rotation, a translation, or a free body.
 fn step(m: &Mechanism, step: &FrameStep) -> String {
+    // Rotations and translations are written as `Rz(q1)` and `Tx(L)`.
     let letter = |axis: &FrameAxis| match axis {
         FrameAxis::X => "x",
         FrameAxis::Y => "y",
@@ -207,6 +217,7 @@ fn step(m: &Mechanism, step: &FrameStep) -> String {
         FrameStep::Translate(axis, length) => {
             format!("T{}({})", letter(axis), length_text(m, length))
         }
+        // A free body is described by its coordinates and the axes of its twist.
         FrameStep::Free(body) => {
             let names = |all: &[CoordinateIdx]| {
                 let names = all.iter().map(|i| m.coordinates[i.0].name.as_str());
@@ -234,6 +245,7 @@ fn angle_text(m: &Mechanism, angle: &ExactAngle) -> String {
         .iter()
         .map(|(symbol, factor)| times(&factor.to_string(), m.symbol_name(*symbol)))
         .collect();
+    // Multiples of pi are exact.
     let pi = angle.pi.to_string();
     if pi != "0" {
         terms.push(times(&pi, "pi"));
@@ -285,9 +297,11 @@ fn places(m: &Mechanism, effect: &ModelEffect) -> String {
 /// The name of a symbol of an effect. If the effect has one place, its quantities have the names of the columns of a
 /// recording.
 fn symbol_name_at_place(m: &Mechanism, effect: &ModelEffect, symbol: ModelSymbol) -> String {
+    // Symbols that are not those of a place have their own names.
     let (ModelSymbol::Place(quantity), [place]) = (symbol, effect.places.as_slice()) else {
         return m.symbol_name(symbol).to_owned();
     };
+    // A drive on a joint is named by its coordinate, a linear drive by itself.
     let (name, position) = match place {
         EffectPlace::Coordinate(i) => (&m.coordinates[i.0].name, ""),
         EffectPlace::Drive(d) => match m.drives[d.0].kind {
@@ -309,6 +323,7 @@ fn symbol_name_at_place(m: &Mechanism, effect: &ModelEffect, symbol: ModelSymbol
 /// The force of an effect in its parameters; for effects with mechanics of their own, the names of their
 /// parameters and the values of their constants.
 fn terms(m: &Mechanism, effect: &ModelEffect) -> String {
+    // Effects that change the mechanics have no expression.
     if effect.mechanics.is_some() {
         let names = effect.terms.iter().map(|term| {
             let parameter = &m.parameters[term.parameter.0];

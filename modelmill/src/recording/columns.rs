@@ -20,6 +20,7 @@ pub(crate) fn read_options(
 ) -> Outcome<ReadOptions> {
     let mechanism = &model.derivation.mechanism;
     let known = mechanism.columns();
+    // Options of the user come first, since they override the model file.
     let mut mapping = ColumnMapping::default();
     // All faults are collected and reported together.
     let mut faults = Vec::new();
@@ -28,6 +29,7 @@ pub(crate) fn read_options(
             faults.push(unknown_column_error(model, &known, ours));
             continue;
         };
+        // A name with two columns is ambiguous.
         if args.columns[..k].iter().any(|(other, _)| other == ours) {
             faults.push(Error::options(message!(
                 "{}: `{ours}` is mapped twice; give each name one mapping",
@@ -58,6 +60,7 @@ pub(crate) fn read_options(
         if args.columns.iter().any(|(mine, _)| mine == ours) {
             continue;
         }
+        // Names that the model does not read are ignored in its own list.
         let Some(quantity) = quantity_of(&known, ours) else {
             continue;
         };
@@ -85,6 +88,7 @@ pub(crate) fn read_options(
     if let Some(fault) = combined_error(faults) {
         return Err(fault);
     }
+    // Only columns that the model needs are read.
     Ok(ReadOptions {
         renames: mapping.renames,
         computed: mapping.computed,
@@ -118,6 +122,7 @@ fn combined_error(mut faults: Vec<Error>) -> Option<Error> {
     let is_wrong_option = faults
         .iter()
         .any(|fault| matches!(fault, Error::Options(_)));
+    // A single fault is returned as it is.
     let lines = faults.iter().map(|fault| message!("- {}", fault.message()));
     let says = message!(
         "{} mappings of columns are at fault:\n{}",
@@ -143,6 +148,7 @@ struct ColumnMapping {
 impl ColumnMapping {
     /// Adds an assignment: a rename if the sum is a single column without factor and offset.
     fn add(&mut self, ours: &str, sum: ColumnSum) {
+        // A rename keeps the numbers of the file unchanged.
         match sum.terms.as_slice() {
             [(theirs, factor)] if factor.total_cmp(&1.0).is_eq() && sum.offset == 0.0 => {
                 self.renames.push((ours.to_owned(), theirs.clone()));
@@ -157,11 +163,13 @@ impl ColumnMapping {
 
     /// Multiplies the values of a column of the model by a factor.
     fn scale(&mut self, ours: &str, factor: f64, header: &[String]) {
+        // A sum is scaled in all its terms.
         if let Some(known) = self.computed.iter_mut().find(|one| one.name == ours) {
             known.offset *= factor;
             known.terms.iter_mut().for_each(|(_, term)| *term *= factor);
             return;
         }
+        // A rename becomes a sum with one term.
         let renamed = self.renames.iter().position(|(name, _)| name == ours);
         let theirs = match renamed {
             Some(place) => self.renames.remove(place).1,
@@ -217,6 +225,7 @@ fn is_optional(ours: &str, quantity: ColumnQuantity) -> bool {
 
 /// The error of a name that is no column of the model.
 fn unknown_column_error(model: &Model, known: &[(String, ColumnQuantity)], ours: &str) -> Error {
+    // Passive coordinates are a frequent mistake.
     let why = if model.passive_coordinates().iter().any(|name| name == ours) {
         "is passive: it is computed from the loops and not read"
     } else {
@@ -237,6 +246,7 @@ fn map(ours: &str, theirs: &str) -> Remedy {
 
 /// The columns of the recording as text, at most 40 of them.
 fn column_list_text(header: &[String]) -> String {
+    // Long lists are cut off, with their number.
     let shown: Vec<String> = header
         .iter()
         .take(40)

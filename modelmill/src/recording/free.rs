@@ -25,6 +25,7 @@ pub(crate) fn free_bodies(mechanism: &Mechanism) -> impl Iterator<Item = &FreeBo
 /// and no force was measured. The notes state what was added.
 pub(super) fn complete(model: &Model, raw: &mut Raw) -> Outcome<Vec<RecordingNote>> {
     let mechanism = &model.derivation.mechanism;
+    // Free bodies first: their poses are needed for the forces.
     for body in free_bodies(mechanism) {
         let names = body
             .quaternion
@@ -36,6 +37,7 @@ pub(super) fn complete(model: &Model, raw: &mut Raw) -> Outcome<Vec<RecordingNot
         check_twist(mechanism, body, raw)?;
     }
     add_shared_drive_forces(mechanism, raw)?;
+    // A row without drive needs a force, which is zero.
     let mut zero = Vec::new();
     for drive in mechanism.drives.iter().filter(|drive| !drive.is_driven) {
         if !raw.has_column(&drive.name) && mechanism.shared_drives.is_empty() {
@@ -64,6 +66,7 @@ fn add_shared_drive_forces(mechanism: &Mechanism, raw: &mut Raw) -> Outcome {
         // No forces were measured, or poses are missing, which is reported when states are prepared.
         return Ok(());
     }
+    // The pose of every sample determines the Jacobian of the drives.
     let column = |name: &str| raw.column(name).map(<[f64]>::to_vec);
     let forces: Vec<Vec<f64>> = shared
         .iter()
@@ -108,9 +111,11 @@ fn normalise_quaternions(raw: &mut Raw, names: [&str; 4]) -> Outcome {
     for name in names {
         columns.push(raw.column(name)?.to_vec());
     }
+    // The sign of the first sample is kept.
     let mut last = [0.0; 4];
     for sample in 0..raw.samples() {
         let here: [f64; 4] = std::array::from_fn(|k| columns[k][sample]);
+        // A length far from one is a wrong column, no rounding.
         let length = here.iter().map(|x| x * x).sum::<f64>().sqrt();
         if (length - 1.0).abs() > UNIT {
             let line = raw.line(sample).unwrap_or(0);
@@ -152,10 +157,12 @@ fn check_twist(mechanism: &Mechanism, body: &FreeBody, raw: &Raw) -> Outcome {
                 .filter(|i| raw.has_column(&format!("{}{suffix}", name(**i))));
             recorded.count()
         });
+        // Components are recorded together or not at all.
         let is_whole = |n: usize| n == 0 || n == 3;
         if is_whole(rates) && is_whole(accelerations) && (accelerations == 0 || rates == 3) {
             continue;
         }
+        // The message names all components.
         let of = |suffix: &str| half.map(|i| format!("`{}{suffix}`", name(i))).join(", ");
         return Err(Error::input(message!(
             "{}: a free body's velocity and acceleration are recorded by all their components: expected {}, with {} or without \
@@ -182,6 +189,7 @@ pub(super) fn runs(
     preparation: &StatePreparation,
 ) -> Outcome<Vec<PreparedRun>> {
     let mechanism = &model.derivation.mechanism;
+    // The preparation treats the pose like any other coordinates.
     let mut runs = raw.runs_with(&model.active_coordinates(), &model.drives(), preparation)?;
     for body in free_bodies(mechanism) {
         let [velocity, angular] = twist_halves(body).map(|half| {
@@ -208,11 +216,13 @@ fn set_twist(mechanism: &Mechanism, body: &FreeBody, run: &mut PreparedRun, reco
     for sample in 0..run.time.len() {
         let of = |columns: &[Vec<f64>], i: usize| columns[i][sample];
         let q = quaternion.map(|i| of(&run.q, i));
+        // The orientation converts between the axes of body and base.
         let turn = BodyRotation::new(q);
         let (mut omega, mut alpha) = (
             vector.map(|i| of(&run.qd, i)),
             vector.map(|i| of(&run.qdd, i)),
         );
+        // Angular velocity and acceleration from the quaternion.
         if !recorded[1] {
             // q' = q w / 2 in body axes, w' likewise; a change of the length of q is removed.
             let square: f64 = q.iter().map(|x| x * x).sum();

@@ -36,6 +36,7 @@ pub use options::RecordingOptions;
 /// Reads a recording with the columns that a model needs, completes free bodies and repairs faults of sensors.
 fn read_raw(model: &Model, file: &RecordingFiles, reading: &RecordingOptions) -> Outcome<Raw> {
     let name = file.name();
+    // Names of the file are needed to resolve the mapping.
     let options = read_options(model, reading, &file.names()?, name)?;
     let mut raw = model
         .host()
@@ -61,6 +62,7 @@ fn prepare_segments(
     raw: &Raw,
     reading: &RecordingOptions,
 ) -> Outcome<Vec<RecordingSegment>> {
+    // The delay is a property of the model, not of the file.
     let delay = model.derivation.mechanism.force_delay;
     let mut data = prepare(model, raw, reading, delay)?;
     note_idle_options(&mut data, reading);
@@ -152,6 +154,7 @@ fn prepare(
     delay: f64,
 ) -> Outcome<Vec<RecordingSegment>> {
     let preparation = &args.preparation;
+    // States are prepared for each segment between gaps.
     let mut runs =
         model
             .host()
@@ -212,6 +215,7 @@ fn prepare(
 
 /// A fault of the positions as a disturbance for the diagnosis.
 fn position_fault(model: &Model, file: &str, fault: &PositionFault) -> Disturbance {
+    // Both faults have one number with a unit.
     let (kind, at, name, value, unit, says) = match fault {
         PositionFault::Jitter { time } => (
             "time_jitter",
@@ -258,6 +262,7 @@ fn position_fault(model: &Model, file: &str, fault: &PositionFault) -> Disturban
 /// Warns about filter options that have no effect because all derivatives are recorded.
 fn note_idle_options(data: &mut [RecordingSegment], args: &RecordingOptions) {
     let usual = StatePreparation::default();
+    // Only options that the user changed are named.
     let given: Vec<Message> = [
         args.preparation.cutoff_hz.map(|_| OptionName::CutoffHz),
         (args.preparation.order != usual.order).then_some(OptionName::Order),
@@ -288,6 +293,7 @@ pub fn note_duplicates(
     data: &mut [RecordingSegment],
     check: &mut [RecordingSegment],
 ) {
+    // A recording is compared with all earlier ones.
     for k in 1..data.len() {
         let (before, rest) = data.split_at_mut(k);
         if let Some(twin) = before.iter().find(|other| other.has_same_samples(&rest[0])) {

@@ -26,6 +26,8 @@ pub(crate) struct SegmentRows {
 
 impl SegmentRows {
     /// The columns of the unknown base parameters alone; the force of known ones is subtracted.
+    ///
+    /// Fails when a pose has no solution, or a force was not measured.
     pub(crate) fn base_columns(model: &Model, stretch: &RecordingSegment) -> Outcome<Self> {
         let base = regressor(
             &[(stretch, false)],
@@ -62,6 +64,8 @@ impl SegmentRows {
 
     /// All columns. `values` are the base parameters with which the columns of scales, clocks and encoders' zeros
     /// are computed.
+    ///
+    /// Fails as [`Self::base_columns`] does.
     pub(crate) fn all_columns(
         model: &Model,
         stretch: &RecordingSegment,
@@ -122,6 +126,7 @@ impl SegmentRows {
 /// Whether each force counts, `[drive][sample]`. A decimated sample depends on all samples that its filter used.
 fn counts(stretch: &RecordingSegment, forces: &[Vec<f64>]) -> Vec<Vec<bool>> {
     let n = forces.len();
+    // Weights of zero exclude a sample, as at standstill.
     let weighs = |drive: usize, i: usize| {
         let weights = stretch.weights.as_ref();
         weights.is_none_or(|weights| weights[i * n + drive] > 0.0)
@@ -162,6 +167,7 @@ fn drive_columns(
     };
     let mut columns = Vec::new();
     for (drive, rate) in along::drive_rates(model, stretch)?.into_iter().enumerate() {
+        // At exact standstill dry friction has no direction.
         let sign = |x: &f64| if *x == 0.0 { 0.0 } else { x.signum() };
         let signs = rate.iter().map(sign).collect();
         let both = filter_and_decimate(vec![signs, rate], stretch)?;
@@ -203,6 +209,7 @@ fn prediction_columns(
     let mut columns = Vec::new();
     // The column of a scale is the predicted force itself.
     for drive in 0..n {
+        // Measured force minus residual is the prediction.
         let rest = laid.residual(drive, values);
         let mut column = ForceColumn(vec![None; n]);
         let pairs = laid.forces[drive].iter().zip(&rest);
@@ -225,6 +232,7 @@ fn prediction_columns(
     };
     // The derivative of the predicted forces, by central differences.
     let slope = |turn: &dyn Fn(&mut RecordingSegment, f64)| -> Outcome<ForceColumn> {
+        // The model is evaluated with the motion changed in either direction.
         let [ahead, back] = [TURNED, -TURNED].map(|by| {
             let mut turned = stretch.clone();
             turn(&mut turned, by);

@@ -65,6 +65,8 @@ impl WhitenedRun {
 impl<'a> RunRows<'a> {
     /// The rows of segments. `values` are the base parameters of the first run; `None` for the first run, which
     /// uses its own.
+    ///
+    /// Fails when a pose has no solution, a force was not measured, or values are too large for a fit.
     pub(crate) fn new(
         model: &'a Model,
         stretches: &[RecordingSegment],
@@ -146,6 +148,8 @@ impl<'a> RunRows<'a> {
     }
 
     /// Sums over the rows after a filter that whitens each drive's noise.
+    ///
+    /// Fails when values are too large for a fit.
     pub(crate) fn whitened_run(&self) -> Outcome<WhitenedRun> {
         let layout = RunColumnLayout::new(self.model, self.payloads);
         let columns = layout.total();
@@ -186,6 +190,7 @@ impl<'a> RunRows<'a> {
                 .enumerate()
                 .filter(|(_, n)| n.standard_deviation > 0.0)
             {
+                // The filter restarts after each gap.
                 for some in laid.pieces(drive) {
                     let start = before + some.start;
                     whiten(laid, drive, some, noise, columns, |i, z, y| {
@@ -269,6 +274,7 @@ fn whiten(
     columns: usize,
     mut show: impl FnMut(usize, &[Option<&[f64]>], &[f64]) -> Outcome,
 ) -> Outcome {
+    // The same filter is applied to force and columns.
     let white = |values: &[f64]| noise.whiten(&values[some.clone()]);
     let y = white(&laid.forces[drive]);
     let z: Vec<Option<Vec<f64>>> = (0..columns)

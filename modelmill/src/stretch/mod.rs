@@ -70,6 +70,7 @@ impl RecordingSegment {
             // sample.
             let [from, to] = [k, k + 1].map(|k| k * kept / n);
             let (start, end) = (every * from, (every * to).min(self.samples()));
+            // Weights belong to decimated samples, all other columns to recorded ones.
             let cut = |all: &[Vec<f64>]| all.iter().map(|one| one[start..end].to_vec()).collect();
             let run = &self.run;
             Self {
@@ -139,6 +140,9 @@ impl RecordingSegment {
 
     /// Calls `visit` with one block of states after the other. The inner result of `visit` is a pose without a
     /// solution, which becomes an error with its place in the recording.
+    ///
+    /// Fails with the first pose without a solution, with any error of `visit`, and when an effect needs a load
+    /// that is missing.
     pub fn for_each_block<E: From<Error>>(
         &self,
         model: &Model,
@@ -194,6 +198,7 @@ impl RecordingSegment {
         let sample = start + fault.sample;
         let time = self.run.time.get(sample).copied().unwrap_or(f64::NAN);
         let line = self.run.lines.get(sample).copied().unwrap_or(0);
+        // The pose is part of the message, since it often shows a wrong column or unit.
         let place = sample_place_word(&self.run.file);
         let pose: Vec<String> = model
             .active_coordinates()

@@ -40,6 +40,7 @@ impl ModelCounterparts {
             let Some(e) = after.iter().position(|other| other.name == drive.name) else {
                 continue;
             };
+            // Drives in different units, such as a joint and a cylinder, are not comparable.
             let units = [models[0].force_unit(d), models[1].force_unit(e)];
             if !(drive.is_driven && after[e].is_driven || is_shared) {
                 notes.push(RecordingNote::info(format!(
@@ -68,6 +69,7 @@ impl ModelCounterparts {
                 )));
             }
         }
+        // Without a common drive there is nothing to compare.
         if drives.is_empty() {
             return Err(Error::input(format!(
                 "{} and {} have no drive in common ({}; {}); give a drive the same name in both files",
@@ -90,6 +92,7 @@ impl ModelCounterparts {
         models: [&Model; 2],
         motion: &RecordingSegment,
     ) -> Outcome<[RecordingSegment; 2]> {
+        // The second model may list its coordinates in another order.
         let in_order = |columns: &[Vec<f64>]| -> Vec<Vec<f64>> {
             let places = self.coordinates.iter();
             places.map(|i| columns[*i].clone()).collect()
@@ -135,6 +138,7 @@ fn with_own_load(model: &Model, mut states: RecordingSegment) -> Outcome<Recordi
 fn coordinates(models: [&Model; 2]) -> Outcome<Vec<usize>> {
     let motions = models.map(Model::motions);
     let place = |of: &[(String, bool)], name: &str| of.iter().position(|(other, _)| other == name);
+    // Both directions are tested, so that the message names the model that lacks a coordinate.
     for (here, there) in [(0, 1), (1, 0)] {
         let names = motions[here].iter().map(|(name, _)| name.as_str());
         let alone: Vec<&str> = names
@@ -173,6 +177,7 @@ fn coordinates(models: [&Model; 2]) -> Outcome<Vec<usize>> {
         }
         places.push(i);
     }
+    // The order of a pose cannot be changed column by column.
     let has_free_bodies = models
         .iter()
         .any(|model| free_bodies(&model.derivation.mechanism).next().is_some());

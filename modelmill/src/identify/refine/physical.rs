@@ -14,6 +14,8 @@ use crate::error::{Error, Outcome};
 use crate::model::Model;
 
 /// Takes the physical parameters that bodies can have and that fit the recordings best.
+///
+/// Fails when no consistent parameters are found.
 pub(super) fn refine(
     model: &Model,
     found: &mut WeightedEstimate,
@@ -25,6 +27,7 @@ pub(super) fn refine(
         r_factor: triangle,
         ..
     } = found;
+    // The residual without constraints is kept for comparison.
     let before = solution.residual_norm;
     let (physical, bodies) = solve_physical(model, triangle, solution, deviations, unknown)?;
     solution.values.clone_from(&physical.base);
@@ -41,6 +44,8 @@ pub(super) fn refine(
 }
 
 /// Solves for physical parameters that bodies can have; also returns the names of the bodies.
+///
+/// Fails when no consistent parameters are found.
 fn solve_physical(
     model: &Model,
     triangle: &RFactor,
@@ -62,6 +67,7 @@ fn solve_physical(
             });
         }
     }
+    // Base parameters are polynomials of the physical ones.
     let base = |x: &[f64]| base_map(model, unknown, x);
     let base: &BaseMap<'_> = &base;
     let found = physical_parameters(triangle, solution, deviations, &start, base, &bodies)
@@ -76,6 +82,7 @@ fn start_values(
     deviations: &ParameterUncertainty,
     unknown: &[usize],
 ) -> Vec<f64> {
+    // All parameters of bodies have nominal values, those of effects often have none.
     let parameters = &model.derivation.mechanism.parameters;
     let mut start: Vec<f64> = parameters.iter().map(|p| p.nominal).collect();
     // The estimate exists only if the parameter is a base parameter of its own.
@@ -87,6 +94,7 @@ fn start_values(
             if let [(product, factor)] = model.products_of(*k).as_slice()
                 && product.0 == [(p, 1)]
             {
+                // The start is at least one standard deviation above zero.
                 let deviation = if deviations.std[i].is_finite() {
                     deviations.std[i]
                 } else {
@@ -101,6 +109,7 @@ fn start_values(
 
 /// The base parameters `unknown` at the physical parameters `x`, and their Jacobian.
 fn base_map(model: &Model, unknown: &[usize], x: &[f64]) -> (DVector<f64>, DMatrix<f64>) {
+    // A base parameter is a sum of products of powers.
     let mut values = DVector::zeros(unknown.len());
     let mut slopes = DMatrix::zeros(unknown.len(), x.len());
     for (row, k) in unknown.iter().enumerate() {
@@ -134,6 +143,7 @@ fn bodies(mechanism: &Mechanism) -> Vec<BodyMatrix<'_>> {
     for part in &mechanism.parts {
         add_part(mechanism, &part.name, &part.inertial, &mut bodies);
     }
+    // Lumped masses without a parameter are numbers of the file.
     for (k, lump) in mechanism.lumped_masses.iter().enumerate() {
         if has_parameter(&lump.mass) {
             bodies.push(BodyMatrix {
@@ -157,6 +167,7 @@ fn add_part<'a>(
     inertial: &'a PartInertia,
     bodies: &mut Vec<BodyMatrix<'a>>,
 ) {
+    // Both ways of giving the inertia have a mass, a vector and a tensor.
     let (PartInertia::AboutCentre {
         mass,
         centre: place,
@@ -172,6 +183,7 @@ fn add_part<'a>(
     if !all.clone().any(has_parameter) {
         return;
     }
+    // Bodies are named in the result, since their margin is reported.
     let name = if name.is_empty() {
         "a part".to_owned()
     } else {
@@ -180,16 +192,19 @@ fn add_part<'a>(
     let about = |which: &str| format!("{name}, {which}");
     let has_mass = !mass.is_zero();
     let diagonal = [0, 3, 5];
+    // Axes with a moment of inertia that is not zero.
     let moments: Vec<usize> = (0..3)
         .filter(|axis| !inertia[diagonal[*axis]].is_zero())
         .collect();
     // The number of moments of inertia decides which constraint applies.
     match moments.as_slice() {
+        // A point mass.
         [] if has_mass => bodies.push(BodyMatrix {
             name,
             matrix: Box::new(move |x: &[f64]| scalar_matrix(value(mechanism, mass, x))),
             copies: 1.0,
         }),
+        // A planar body: mass, two first moments and one moment of inertia, in a 3 x 3 matrix.
         [axis] if has_mass => {
             let axis = *axis;
             bodies.push(BodyMatrix {
@@ -205,6 +220,7 @@ fn add_part<'a>(
                 copies: 2.0,
             });
         }
+        // A spatial body: the pseudo-inertia is a 4 x 4 matrix.
         [_, _, _] if has_mass => bodies.push(BodyMatrix {
             name,
             matrix: Box::new(move |x: &[f64]| {
@@ -240,6 +256,7 @@ fn about_origin(
     inertial: &PartInertia,
     x: &[f64],
 ) -> (f64, [f64; 3], [f64; 6]) {
+    // Both cases give the quantities about the origin of the frame.
     let get = |exact: &ExactExpression| value(mechanism, exact, x);
     match inertial {
         PartInertia::Linear {
@@ -278,6 +295,7 @@ fn about_origin(
 
 /// The value of an expression at the parameters `x` and the constants of the file.
 fn value(mechanism: &Mechanism, exact: &ExactExpression, x: &[f64]) -> f64 {
+    // Other symbols, such as coordinates, do not occur in inertias.
     exact.evaluate(&|symbol| match symbol {
         ModelSymbol::Parameter(p) => x[p.0],
         ModelSymbol::Constant(c) => mechanism.constants[c.0].value,
