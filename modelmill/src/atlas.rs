@@ -129,6 +129,8 @@ impl Model {
     }
 
     /// The model with another mechanism in place of its own, derived anew.
+    ///
+    /// Fails when the derivation fails or is cancelled.
     fn derive_variant(&self, mechanism: Mechanism) -> Outcome<Self> {
         let mut loaded = LoadedModel::clone(&self.loaded);
         loaded.mechanism = mechanism;

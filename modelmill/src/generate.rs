@@ -124,6 +124,8 @@ impl Model {
     }
 
     /// Derives the requested programs and writes them in the target language.
+    ///
+    /// Fails when a derivation fails.
     fn emit_files(&self, code: CodeOptions) -> Outcome<Vec<EmittedFile>> {
         let derivation = &self.derivation;
         let fault = |error| Error::derivation(&self.path, error);

@@ -78,6 +78,8 @@ pub struct DriveForceError {
 
 /// Compares the model's forces at its nominal values with the rig's. Both programs share no mechanics, so that the
 /// comparison is independent.
+///
+/// Fails when the reduced model cannot be loaded or derived, or when the rig cannot be sampled.
 fn compare(rig: &Rig, reduction: &PlanarReduction) -> Outcome<Vec<DriveForceError>> {
     let loaded = modelmill_spec::load(
         "the reduced model",

@@ -115,6 +115,8 @@ impl Host {
 
 /// The trajectory of a recording: column `t` and, for each coordinate, its positions and those derivatives that are
 /// recorded.
+///
+/// Fails when a column is missing or times do not increase; the message has the line of the file.
 fn trajectory(
     rig: &Rig,
     recording: &SignalRecording,

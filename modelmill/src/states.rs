@@ -308,6 +308,8 @@ impl ModelFunctions {
     }
 
     /// The programs that a function needs, derived if this is their first use.
+    ///
+    /// Fails when a derivation fails or is cancelled.
     fn programs_for(&self, function: ModelFunction) -> Outcome<FunctionPrograms<'_>> {
         let needs_dynamics = matches!(
             function,
@@ -323,6 +325,8 @@ impl ModelFunctions {
     }
 
     /// The equation of motion, derived at its first use.
+    ///
+    /// Fails when the derivation fails or is cancelled.
     fn dynamics(&self) -> Outcome<&DynamicsPrograms> {
         if let Some(known) = self.dynamics.get() {
             return Ok(known);
@@ -334,6 +338,8 @@ impl ModelFunctions {
     }
 
     /// The reactions, derived at their first use.
+    ///
+    /// Fails when the derivation fails or is cancelled.
     fn derived_reactions(&self) -> Outcome<&ReactionPrograms> {
         if let Some(known) = self.reactions.get() {
             return Ok(known);

@@ -155,6 +155,8 @@ pub(crate) fn round_significant(value: f64) -> f64 {
 }
 
 /// Adds entries to the text of a model's file, one after the other.
+///
+/// Fails when an entry contradicts the file, or when there is none.
 pub(crate) fn add_entries(model: &Model, effects: &[NewEffect]) -> Outcome<CompletedModelFile> {
     let mut text = model.text().to_owned();
     let mut last = None;

@@ -95,6 +95,8 @@ pub(crate) enum EvaluationFrequency {
 }
 
 /// Derives all candidates of a model.
+///
+/// Fails when the derivation of a candidate fails.
 pub(crate) fn candidates(model: &Model) -> Outcome<DerivedCandidates> {
     let loaded = &model.loaded;
     let mechanism = &loaded.mechanism;
@@ -282,6 +284,8 @@ impl CandidateVariant {
     }
 
     /// Derives the columns of its effects alone; `own` effects of the model come before them.
+    ///
+    /// Fails when the file rejects an effect, or when the derivation fails.
     pub(crate) fn derive(
         self,
         model: &Model,
@@ -314,6 +318,8 @@ impl CandidateVariant {
 }
 
 /// The base columns of a model as functions of a tilt of its base.
+///
+/// Fails when the derivation fails.
 pub(crate) fn derive_tilt(model: &Model) -> Outcome<Derivation> {
     let names = ["tx", "ty", "tz"].map(|t| (t.to_owned(), format!("candidate_{t}")));
     let constants = names

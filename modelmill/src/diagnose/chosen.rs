@@ -229,6 +229,9 @@ fn check_effect(model: &Model, named: &NamedEffect) -> Outcome {
 }
 
 /// The place of a kind by its name.
+///
+/// Fails when the kind has no effect at the place; the message names the drive if the name is that of its
+/// joint.
 fn find_place(
     mechanism: &Mechanism,
     kind: &EffectKind,
@@ -260,6 +263,8 @@ fn find_place(
 
 /// Constants with a value: given ones and, if none are searched for, default ones. Constants that enter
 /// linearly, such as the neutral position of a spring, are always estimated with the parameters.
+///
+/// Fails when a constant has neither a value nor a default.
 fn fixed_constants(
     kind: &EffectKind,
     named: &NamedEffect,
@@ -302,12 +307,15 @@ fn fixed_constants(
 impl ChosenEffect {
     /// The effect along recordings, with its columns for each value of a constant that is searched for; `None`
     /// if all columns are zero. `load` is the force that the drives transmit, N or N m.
+    ///
+    /// Fails when the effect has no finite value at some samples, or a pose has no solution.
     pub(crate) fn candidate(
         &self,
         model: &Model,
         all: &SegmentList<'_>,
         load: &ForceColumn,
     ) -> Outcome<Option<(CandidateEffect, Vec<ColumnChoice>)>> {
+        // There is a single candidate, the chosen effect.
         let mut made = candidate_columns(&self.candidates, model, all)?;
         let grids = std::mem::take(&mut made.grids);
         if let Some(effect) = made.undefined.first() {
@@ -321,6 +329,7 @@ impl ChosenEffect {
         let Some(candidate) = made.candidates.into_iter().next() else {
             return Ok(None);
         };
+        // Effects without searched constants have one choice.
         let only = |columns: Vec<ForceColumn>| {
             vec![ColumnChoice {
                 constants: Vec::new(),
@@ -365,6 +374,8 @@ impl ChosenEffect {
 }
 
 /// Columns of the base parameters to estimate, the load of the nominal bodies, and the force of the known parameters.
+///
+/// Fails when a pose has no solution.
 pub(crate) fn base_columns(
     model: &Model,
     all: &SegmentList<'_>,

@@ -25,6 +25,7 @@ pub(crate) fn constants(
 ) -> Vec<CandidateEffect> {
     let derivation = &model.derivation;
     let mechanism = &derivation.mechanism;
+    // Fixed base parameters were computed with the nominal lengths.
     if (0..model.base.len()).all(is_held) {
         return Vec::new();
     }
@@ -70,6 +71,7 @@ pub(crate) fn constants(
                 }
                 without_rounding(sum)
             };
+            // The central first difference.
             let first = 0.5 / step;
             // The central second difference.
             let second = 1.0 / (step * step);
@@ -88,6 +90,7 @@ pub(crate) fn constants(
                 }
             }
         }
+        // A constant without effect on any force is no candidate.
         if slope.fixed.is_zero() && slope.base.iter().all(ForceColumn::is_zero) {
             continue;
         }

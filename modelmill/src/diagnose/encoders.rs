@@ -30,6 +30,7 @@ pub(crate) fn sensitivities(
     all: &SegmentList<'_>,
     values: &[f64],
 ) -> Vec<Option<[ForceColumn; 3]>> {
+    // One coordinate at a time; a failure of one does not affect the others.
     let coordinates = 0..model.motions().len();
     coordinates
         .map(|i| sensitivity(model, all, values, i))
@@ -61,6 +62,7 @@ pub(crate) fn zeros(model: &Model, slopes: &[Option<[ForceColumn; 3]>]) -> Vec<C
 
 /// A fault of a coordinate's encoder with parameters in its unit.
 fn disturbance(kind: &str, name: String, symbols: &[&str], is_angle: bool) -> CandidateEffect {
+    // Errors of an encoder have the unit of its coordinate.
     let parameter = |symbol: &&str| EffectParameter {
         symbol: (*symbol).to_owned(),
         unit: if is_angle { "rad" } else { "m" }.to_owned(),
@@ -92,6 +94,7 @@ pub(crate) fn encoders(
     let motions = model.motions();
     let mut candidates = Vec::new();
     for (i, (name, is_angle)) in motions.iter().enumerate() {
+        // Position, rate or acceleration.
         let of = |order: usize| -> Vec<f64> {
             let mut all_values = Vec::new();
             for (one, _) in all {
@@ -112,6 +115,7 @@ pub(crate) fn encoders(
         let Some(slopes) = &slopes[i] else {
             continue;
         };
+        // The largest step between samples decides which waves can be seen.
         let step = problem.layout.segments.iter().map(|s| s.step);
         let step = step.fold(f64::MIN_POSITIVE, f64::max);
         // A prismatic coordinate has no turn: its error repeats along the travel.
@@ -176,6 +180,7 @@ pub(crate) fn encoders(
 pub(crate) fn values(model: &Model, problem: &DiagnosisProblem, held: FixedParameters) -> Vec<f64> {
     let mut all = NormalEquations::new(problem.base.len());
     for (d, measured) in problem.measured.0.iter().enumerate() {
+        // A drive without force has no equations.
         let Some(measured) = measured else { continue };
         let mut one = NormalEquations::new(problem.base.len());
         let columns: Vec<Option<&[f64]>> = problem.base.iter().map(|c| c.0[d].as_deref()).collect();
@@ -213,6 +218,7 @@ fn sensitivity(
         // The forces with one derivative of the motion changed by a step of either sign.
         let along = |sign: f64| {
             stack(all, |one| {
+                // A copy of the recording with one column changed.
                 let mut turned: RecordingSegment = one.clone();
                 let run = &mut turned.run;
                 let column = &mut [&mut run.q, &mut run.qd, &mut run.qdd][order][coordinate];

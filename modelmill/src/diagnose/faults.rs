@@ -23,6 +23,7 @@ pub(crate) fn run_differences(
     model: &Model,
     recordings: &[&PreparedRecording],
 ) -> Vec<RecordingDifference> {
+    // A single recording has nothing to compare.
     if recordings.len() < 2 {
         return Vec::new();
     }
@@ -30,6 +31,8 @@ pub(crate) fn run_differences(
 }
 
 /// Subtracts known faults from the measured forces of a problem, and adds them to its disturbances.
+///
+/// Fails when a recording has no forces.
 pub(crate) fn subtract_known(
     problem: &mut DiagnosisProblem,
     model: &Model,
@@ -37,6 +40,7 @@ pub(crate) fn subtract_known(
     between: &[RecordingDifference],
 ) -> Outcome<()> {
     problem.removed.resize(model.drives().len(), 0.0);
+    // Powers are means over all samples.
     let samples = problem.layout.samples().max(1) as f64;
     // Differences between recordings are subtracted, and their power is counted as removed.
     for one in between {
@@ -44,6 +48,7 @@ pub(crate) fn subtract_known(
             let (Some(force), Some(measured)) = (force, &mut problem.measured.0[d]) else {
                 continue;
             };
+            // Another decimation would give other samples.
             if force.len() != measured.len() {
                 continue;
             }
@@ -62,11 +67,13 @@ pub(crate) fn subtract_known(
         if one.kind == "contact_event" {
             continue;
         }
+        // The same fault in several recordings becomes one entry.
         let is_same = |told: &&mut Disturbance| {
             told.description.is_some()
                 && (&told.kind, &told.description) == (&one.kind, &one.description)
         };
         match problem.disturbances.iter_mut().find(is_same) {
+            // Only files that are not listed yet.
             Some(told) => {
                 let files = one
                     .recordings
@@ -90,6 +97,7 @@ fn difference(one: &RecordingDifference) -> Disturbance {
         PhysicalChange::Clock { .. } => "time_base",
         _ => "different_runs",
     };
+    // Sizes of the change with standard deviations.
     let estimates = values
         .into_iter()
         .map(|(name, value, unit)| EstimatedQuantity {
@@ -123,12 +131,15 @@ fn difference(one: &RecordingDifference) -> Disturbance {
 }
 
 /// Forces with a quantisation step coarser than their noise. Uniform rounding then gives the noise, step / sqrt(12).
+///
+/// Fails when a recording has no forces.
 fn add_quantisation_noise(
     problem: &mut DiagnosisProblem,
     model: &Model,
     all: &SegmentList<'_>,
 ) -> Outcome<()> {
     for (d, drive) in model.drives().iter().enumerate() {
+        // Steps are found in the recorded values, before any filter.
         let mut recorded = Vec::new();
         for (one, _) in all {
             recorded.extend_from_slice(&one.run.measured_forces()?[d]);
@@ -163,6 +174,7 @@ fn remove_contact_events(problem: &mut DiagnosisProblem, all: &SegmentList<'_>) 
     // Stage 1: which samples belong to an event, with and without a margin, and the positions there.
     let (mut inside, mut about, mut positions) = (Vec::new(), Vec::new(), Vec::new());
     for (one, _) in all {
+        // An event belongs to its recordings only.
         let is_in = |event: &Disturbance, time: f64, margin: f64| {
             let [from, to] = event.interval.unwrap_or_default();
             event.recordings.contains(&one.run.file) && time >= from - margin && time <= to + margin
@@ -184,16 +196,18 @@ fn remove_contact_events(problem: &mut DiagnosisProblem, all: &SegmentList<'_>) 
         .filter(|(_, name)| events.iter().any(|event| event.at.contains(name)))
         .map(|(d, _)| d)
         .collect();
+    // Each coordinate is tested in both directions, since a stop may be at either end.
     let coordinates = positions.first().map_or(0, Vec::len);
     let explains = |i: usize, sign: f64| {
         let along: Vec<f64> = positions.iter().map(|q| sign * q[i]).collect();
         let mut of_event = along.iter().zip(&inside).filter(|(_, inside)| **inside);
         let mut of_event: Vec<f64> = of_event.by_ref().map(|(x, _)| *x).collect();
         of_event.sort_by(f64::total_cmp);
-        // The place where the event begins: its tenth percentile, which bears single wrong samples.
+        // The place where the event begins: its tenth percentile, which single wrong samples hardly change.
         let Some(place) = of_event.get(of_event.len() / 10) else {
             return false;
         };
+        // How far each sample is beyond the place.
         let depths: Vec<f64> = along.iter().map(|x| x - place).collect();
         concerned
             .iter()
@@ -217,9 +231,11 @@ fn is_force_beyond_place(
     inside: &[bool],
     about: &[bool],
 ) -> bool {
+    // A drive without force shows nothing.
     let Some(measured) = problem.measured.0[channel].as_ref() else {
         return false;
     };
+    // The friction of the drive is part of the model here, since bodies alone would leave it in the residual.
     let friction = problem.friction.get(3 * channel..3 * channel + 3);
     let columns: Vec<Option<&[f64]>> = (problem.base.iter())
         .chain(friction.unwrap_or_default())
@@ -231,6 +247,7 @@ fn is_force_beyond_place(
     let some = |values: &[f64]| -> Vec<f64> { elsewhere.iter().map(|i| values[*i]).collect() };
     let picked: Vec<Option<Vec<f64>>> = columns.iter().map(|column| column.map(some)).collect();
     let picked: Vec<Option<&[f64]>> = picked.iter().map(Option::as_deref).collect();
+    // Normal equations are enough, since only predictions are needed.
     let mut moments = NormalEquations::new(columns.len());
     moments.add_rows(&picked, &some(measured));
     let factors = moments.solve().values;
@@ -246,6 +263,7 @@ fn is_force_beyond_place(
             .map(|i| (depths[i], rest(i)))
             .collect()
     };
+    // Samples beyond the place, in the event and at other times.
     let (during, otherwise) = (beyond(true), beyond(false));
     if otherwise.len() < REPEATED_PLACE_FEWEST_SAMPLES {
         return true;
@@ -253,6 +271,7 @@ fn is_force_beyond_place(
     let Some(line) = fit_line(&during) else {
         return false;
     };
+    // The line must explain most of the force at other times.
     let left: f64 = otherwise.iter().map(|(x, y)| (y - line(*x)).powi(2)).sum();
     let whole: f64 = otherwise.iter().map(|(_, y)| y * y).sum();
     left < REPEATED_PLACE_MOST_RESIDUAL * whole
@@ -260,6 +279,7 @@ fn is_force_beyond_place(
 
 /// The straight line through some points by least squares.
 fn fit_line(points: &[(f64, f64)]) -> Option<impl Fn(f64) -> f64 + use<>> {
+    // Means, slope and intercept.
     let n = points.len() as f64;
     let mean = |of: &dyn Fn(&(f64, f64)) -> f64| points.iter().map(of).sum::<f64>() / n;
     let (x, y) = (mean(&|p| p.0), mean(&|p| p.1));
@@ -273,6 +293,7 @@ fn merge_events(all: &SegmentList<'_>) -> Vec<Disturbance> {
     let mut events: Vec<Disturbance> = Vec::new();
     let faults = all.iter().flat_map(|(one, _)| &one.faults);
     for event in faults.filter(|one| one.kind == "contact_event") {
+        // Events of one recording are in the order of time.
         let [from, to] = event.interval.unwrap_or_default();
         if let Some(last) = events.last_mut()
             && last.recordings == event.recordings
@@ -280,6 +301,7 @@ fn merge_events(all: &SegmentList<'_>) -> Vec<Disturbance> {
             && from - before[1] < CONTACT_GAP_S
         {
             before[1] = to;
+            // The joined event has the places of both.
             for place in &event.at {
                 if !last.at.contains(place) {
                     last.at.push(place.clone());
@@ -289,6 +311,7 @@ fn merge_events(all: &SegmentList<'_>) -> Vec<Disturbance> {
         }
         events.push(event.clone());
     }
+    // Very short events are outliers, which are handled elsewhere.
     events.retain(|event| {
         event
             .interval

@@ -351,6 +351,8 @@ impl DiagnosisFindings {
 
 /// The model with the effects, identified. If a delay changed, recordings are prepared again, since forces then
 /// belong to earlier states.
+///
+/// Fails when the derivation of the model with the effects fails, or when it is cancelled.
 fn version_with_effects(
     model: &Model,
     edited: &CompletedModelFile,
@@ -386,6 +388,8 @@ fn version_with_effects(
 }
 
 /// The diagnosis with all parameters fixed at their nominal values.
+///
+/// Fails when it is cancelled.
 fn nominal_diagnosis(
     findings: &DiagnosisFindings,
     between: &[RecordingDifference],
@@ -664,8 +668,11 @@ fn judged_error_locations(version: &ModelVersion) -> Outcome<ErrorLocations> {
 }
 
 /// Variables along the recordings that are judged, one after the other.
+///
+/// Fails when a pose has no solution.
 fn variables(version: &ModelVersion) -> Outcome<Vec<(String, Vec<f64>)>> {
     let mut joined: Vec<(String, Vec<f64>)> = Vec::new();
+    // All runs have the same variables.
     for k in version.validation_runs() {
         let variables = along::variables(&version.model, &version.data[k])?;
         if joined.is_empty() {

@@ -21,6 +21,8 @@ const KINDS: [(&str, &str); 2] = [("drive_compliance", "compliance"), ("backlash
 
 /// Compliance and backlash of every drive on a joint. `slopes` are the derivatives of the forces by position,
 /// rate and acceleration of each coordinate; `values` are the base parameters.
+///
+/// Fails when a pose has no solution.
 pub(crate) fn gears(
     model: &Model,
     all: &SegmentList<'_>,
@@ -34,6 +36,7 @@ pub(crate) fn gears(
     let n = model.drives().len();
     let loads = stack(all, |one| {
         let loads = along::forces(model, one, &carried)?;
+        // Central differences in time.
         let rate = |values: &[f64]| -> Vec<f64> {
             let last = values.len().saturating_sub(1);
             let time = &one.run.time;
@@ -58,12 +61,14 @@ pub(crate) fn gears(
             continue;
         };
         let name = &mechanism.coordinates[joint.0].name;
+        // Gears at passive joints have no recorded motion.
         let Some(i) = active.iter().position(|one| one == name) else {
             continue;
         };
         let Some(slopes) = slopes.get(i).and_then(Option::as_ref) else {
             continue;
         };
+        // Units depend on the kind of the joint.
         let is_angle = model.motions()[i].1;
         for (kind, symbol) in KINDS {
             let is_yielding = kind == "drive_compliance";

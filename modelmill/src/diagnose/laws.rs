@@ -24,11 +24,14 @@ use super::findings::EffectEstimate;
 use super::places::{CandidatePlace, candidate_places};
 
 /// Places on which laws may act, along all recordings: drives, and joints without a drive of their own.
+///
+/// Fails when a pose has no solution.
 pub(crate) fn sites(
     candidates: &DerivedCandidates,
     model: &Model,
     all: &SegmentList<'_>,
 ) -> Outcome<Vec<LawSite>> {
+    // The file's mechanism, since places have its names.
     let mechanism = &model.loaded.mechanism;
     let forces = unit_forces(candidates, model, all)?;
     let mut sites: Vec<LawSite> = Vec::new();
@@ -38,11 +41,13 @@ pub(crate) fn sites(
             continue;
         }
         // A place without a drive acts on the drives through the mechanism; its column comes from the derivation.
+        // A drive acts on itself alone.
         let (force, channel) = match (spot.place, forces.iter().find(|(at, _)| *at == spot)) {
             (EffectPlace::Drive(d), _) => (drive_column(model, all, d.0), Some(d.0)),
             (_, Some((_, force))) => (force.clone(), None),
             (_, None) => continue,
         };
+        // A place without effect on any drive cannot be seen.
         if force.is_zero() {
             continue;
         }
@@ -69,6 +74,7 @@ pub(crate) fn sites(
 
 /// A force of one along a drive.
 fn drive_column(model: &Model, all: &SegmentList<'_>, drive: usize) -> ForceColumn {
+    // Samples after decimation, over all recordings.
     let samples = all.iter().map(|(one, _)| one.time().len()).sum();
     let mut column = ForceColumn(vec![None; model.drives().len()]);
     column.0[drive] = Some(vec![1.0; samples]);
@@ -76,6 +82,8 @@ fn drive_column(model: &Model, all: &SegmentList<'_>, drive: usize) -> ForceColu
 }
 
 /// Position, rate and acceleration of places along a recording, of the samples that are kept.
+///
+/// Fails when a pose has no solution.
 fn motions(
     model: &Model,
     one: &RecordingSegment,
@@ -84,6 +92,7 @@ fn motions(
     let evaluator = ModelEvaluator::new(&model.derivation);
     let mechanism = &model.derivation.mechanism;
     let (active, passive) = model.derivation.coordinates();
+    // Positions and rates of the drives, for linear ones.
     let drives = along::columns(model, one, |states| evaluator.drive_motion(states))?;
     let of_passive = if passive.is_empty() {
         Vec::new()
@@ -97,6 +106,7 @@ fn motions(
             return Some([run.q[k].clone(), run.qd[k].clone(), run.qdd[k].clone()]);
         }
         let k = passive.iter().position(|p| *p == i)?;
+        // Positions come first, then rates and accelerations.
         let n = passive.len();
         Some([k, n + k, 2 * n + k].map(|at| of_passive[at].clone()))
     };
@@ -122,6 +132,7 @@ fn motions(
 
 /// Central differences.
 fn slopes(values: &[f64], time: &[f64]) -> Vec<f64> {
+    // One-sided at both ends.
     let last = values.len().saturating_sub(1);
     let at = |i: usize| {
         let (a, b) = (i.saturating_sub(1), (i + 1).min(last));
@@ -182,6 +193,7 @@ impl ProposedLaw {
 /// Laws that a diagnosis proposes, by the names of the model.
 pub(crate) fn hypotheses(model: &Model, diagnosis: &ModelDiagnosis) -> Vec<LawHypothesis> {
     let sites = &diagnosis.sites;
+    // Alternatives are named in the same way.
     let one = |proposal: &LawProposal| LawHypothesis {
         law: law(model, sites, &proposal.law),
         near_ties: (proposal.near_ties.iter())
@@ -201,6 +213,7 @@ fn law(model: &Model, sites: &[LawSite], law: &Proposed) -> ProposedLaw {
     });
     let mut parameters = Vec::new();
     let mut symbols = named.parameters.iter();
+    // One value for each parameter of the term.
     for term in &law.terms {
         let values = term.values.iter().zip(&term.standard_deviations);
         for ((value, deviation), symbol) in values.zip(symbols.by_ref()) {
@@ -212,6 +225,7 @@ fn law(model: &Model, sites: &[LawSite], law: &Proposed) -> ProposedLaw {
             });
         }
     }
+    // The entry uses rounded values, the hypothesis the exact ones.
     ProposedLaw {
         expression,
         at: site.name.clone(),
@@ -228,6 +242,7 @@ fn variable_name(model: &Model, site: &LawSite, variable: LawVariable) -> String
     let drive = site
         .channel
         .map(|d| &model.derivation.mechanism.drives[d].kind);
+    // Other places use their own name.
     let base = match drive {
         Some(DriveKind::Joint(i)) => &model.derivation.mechanism.coordinates[i.0].name,
         _ => &site.name,
@@ -274,12 +289,14 @@ fn library_entry(
     let mut formula = LawFormula::new(law);
     formula.with_symbols = true;
     let expression = formula.text(law, &|variable, _| variable_word(variable).to_owned());
+    // The kind is named after its place, so that several laws can be in one library.
     let kind = format!("law_of_{}", site.name);
     let on = if site.channel.is_some() {
         "drive"
     } else {
         "coordinate"
     };
+    // Places on angles have torques.
     let carries = if site.is_angle { "torque" } else { "force" };
     let mut text = format!("[[effect_kind]]\nname = \"{kind}\"\non = \"{on}\"\n");
     if let Some(other) = other {
@@ -310,6 +327,7 @@ fn library_entry(
             round_significant(*value)
         );
     }
+    // Estimates become nominal values.
     let nominal = |p: &EffectEstimate| NewParameter {
         symbol: p.name.clone(),
         nominal: Some(round_significant(p.value)),
@@ -342,6 +360,7 @@ impl LawFormula {
     /// Symbols of the parameters: `k` for a term, `ks` and `kc` for sine and cosine, numbered if there are
     /// several terms.
     fn new(law: &Proposed) -> Self {
+        // A single term needs no number.
         let several = law.terms.len() > 1;
         let of_term = |(k, term): (usize, &LawTerm)| {
             let number = if several {
@@ -375,6 +394,7 @@ impl LawFormula {
         for term in &law.terms {
             let factors: Vec<Vec<String>> = (term.product.factors.iter())
                 .map(|factor| {
+                    // Variables of the second place have its name.
                     let is_other = matches!(
                         factor.variable,
                         LawVariable::OtherPosition | LawVariable::OtherRate
@@ -398,6 +418,7 @@ impl LawFormula {
             } else {
                 product.extend(symbols.next());
             }
+            // The remaining factors follow the parameter.
             let others = factors.iter().filter(|texts| texts.len() == 1);
             product.extend(others.map(|texts| texts[0].clone()));
             terms.push(product.join("*"));
@@ -433,6 +454,7 @@ impl LawFormula {
                 if halves % 2 == 0 {
                     integer_power(z, halves / 2, is_odd)
                 } else {
+                    // An odd multiple of one half: whole powers times a root.
                     let share = format!("abs({z})/{}", self.constant("scale", scale, factor));
                     let whole = match halves / 2 {
                         0 => String::new(),
@@ -447,6 +469,7 @@ impl LawFormula {
                     format!("{sign}{whole}sqrt({share})")
                 }
             }
+            // A power about a centre other than zero.
             LawShape::Shifted { centre, power } => {
                 let centre = self.constant("centre", centre, factor);
                 format!("({})^{power}", difference_text(z, &centre))
@@ -472,6 +495,7 @@ impl LawFormula {
                     .map(|f| format!("{f}(2*pi*{z}/{pitch})"))
                     .to_vec();
             }
+            // A smooth bump at one position.
             LawShape::Bump { centre, width } => {
                 format!(
                     "exp(-({})^2)",
@@ -482,9 +506,11 @@ impl LawFormula {
                 let near = self.scaled_distance(z, centre, width, factor);
                 format!("{near}*exp(-({near})^2)")
             }
+            // A smooth step between two levels.
             LawShape::Step { centre, width } => {
                 format!("tanh({})", self.scaled_distance(z, centre, width, factor))
             }
+            // Dry friction whose size decays with the rate, as Stribeck friction does.
             LawShape::Fading { scale, halves } => {
                 let scale = self.constant("scale", scale, factor);
                 let power = match halves {
@@ -494,6 +520,7 @@ impl LawFormula {
                 };
                 format!("sign({z})*exp(-{power})")
             }
+            // Friction that builds up over a distance; its name is that of the friction model.
             LawShape::Memory { length, curve } => {
                 let state = if curve == 1 { "dahl" } else { "bouc_wen" };
                 format!("{state}({z}, {})", self.constant("length", length, factor))
@@ -507,6 +534,7 @@ impl LawFormula {
 
     /// `(z - centre)/width`
     fn scaled_distance(&mut self, z: &str, centre: f64, width: f64, factor: LawFactor) -> String {
+        // A centre at zero is left out.
         let from = if centre == 0.0 {
             z.to_owned()
         } else {

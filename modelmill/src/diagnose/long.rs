@@ -39,6 +39,8 @@ impl PreparedRecording {
 }
 
 /// A segment in fewer samples, if it is long and the parallel filter keeps few of them.
+///
+/// Fails when a column is too short for the filter.
 pub(crate) fn thin_out(model: &Model, stretch: &RecordingSegment) -> Outcome<RecordingSegment> {
     let (samples, every) = (stretch.samples(), stretch.decimation());
     let time = &stretch.run.time;

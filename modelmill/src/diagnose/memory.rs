@@ -22,6 +22,8 @@ const LENGTHS: [f64; 12] = [
 ];
 
 /// Dahl friction of every drive.
+///
+/// Fails when a pose has no solution.
 pub(crate) fn dahl_candidates(
     model: &Model,
     all: &SegmentList<'_>,

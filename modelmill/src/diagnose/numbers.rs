@@ -98,6 +98,8 @@ pub(crate) struct PlaceMotions {
 
 impl PlaceMotions {
     /// Evaluates all motions once.
+    ///
+    /// Fails when a pose has no solution.
     pub(crate) fn new(model: &Model, all: &SegmentList<'_>) -> Outcome<Self> {
         let evaluator = ModelEvaluator::new(&model.derivation);
         let (active, passive) = model.derivation.coordinates();
@@ -156,6 +158,8 @@ impl PlaceMotions {
 }
 
 /// Values of a function of the states along all recordings, one after the other, without decimation.
+///
+/// Fails when a pose has no solution.
 fn stack_states(
     all: &SegmentList<'_>,
     model: &Model,
@@ -164,6 +168,7 @@ fn stack_states(
     ) -> Result<Vec<Vec<f64>>, modelmill_codegen::PoseFault>,
 ) -> Outcome<Vec<Vec<f64>>> {
     let mut stacked: Vec<Vec<f64>> = Vec::new();
+    // The first block determines the number of columns.
     for (one, _) in all {
         one.for_each_block(model, |states| {
             Ok::<_, Error>(evaluate(states).map(|columns| {

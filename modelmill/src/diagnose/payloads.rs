@@ -30,6 +30,8 @@ const PARAMETERS: [(&str, &str, SignConstraint); 7] = [
 const POINT_MASS_PARAMETERS: usize = 4;
 
 /// For every body a point mass, and the same with second moments.
+///
+/// Fails when the derivation of the columns fails, or when a pose has no solution.
 pub(crate) fn payloads(model: &Model, all: &SegmentList<'_>) -> Outcome<Vec<CandidateEffect>> {
     let payloads = PayloadColumns::new(model)?;
     let columns = regressor(all, &ModelEvaluator::new(&payloads.derivation), model)?;
@@ -107,6 +109,7 @@ fn size(column: &ForceColumn) -> f64 {
 /// Largest distance between two frames in the nominal pose, m; it bounds the distance of a payload from its frame.
 pub(crate) fn reach(mechanism: &Mechanism) -> f64 {
     let nominal: Vec<f64> = mechanism.coordinates.iter().map(|c| c.nominal).collect();
+    // Free joints are at their nominal values.
     let poses = Kinematics::new(mechanism).poses(&nominal);
     let origins: Vec<[f64; 3]> = poses.frames().iter().map(|pose| pose.origin).collect();
     let distance = |a: &[f64; 3], b: &[f64; 3]| -> f64 {

@@ -74,6 +74,9 @@ pub(crate) struct DiagnosisQuery<'a> {
 }
 
 /// Finds the effects that a model lacks; `fit` are the fitted recordings, `check` the validation runs.
+///
+/// Fails when all forces are zero, when samples are too few, when a pose has no solution, and when a job is
+/// cancelled.
 pub(crate) fn find_missing_effects(
     model: &Model,
     fit: &[RecordingSegment],
@@ -158,6 +161,7 @@ pub(crate) fn find_missing_effects(
 
 /// Completes a disturbance: the units of its place, and a sentence.
 fn describe_disturbance(one: &mut Disturbance, model: &Model) {
+    // A disturbance of a drive has the unit of its force.
     let drives = model.drives();
     let place = one.at.first();
     let drive = drives.iter().position(|drive| Some(drive) == place);
@@ -205,6 +209,7 @@ impl ColumnProvider for ColumnSupply<'_> {
         load: &ForceColumn,
         which: LoadDependentQuery,
     ) -> Vec<(usize, ColumnChoice)> {
+        // Either all candidates or one of them, with a given value of its constant.
         let only = match which {
             LoadDependentQuery::All => None,
             LoadDependentQuery::One(candidate, _) => {
@@ -224,6 +229,7 @@ impl ColumnProvider for ColumnSupply<'_> {
         let made =
             load_dependent_columns(self.candidates, self.model, self.all, load, only, &tried);
         let made = made.unwrap_or_default();
+        // From entries back to candidates of the problem.
         let place = |entry: usize| {
             let is_its =
                 |origin: &CandidateOrigin| origin.as_ref().is_some_and(|(k, _)| *k == entry);
@@ -241,12 +247,15 @@ fn grid_middle(grid: &[f64]) -> Vec<f64> {
 }
 
 /// The problem in numbers, with all columns of the base.
+///
+/// Fails when all forces are zero, when samples are too few, or when a pose has no solution.
 fn problem(
     candidates: &DerivedCandidates,
     model: &Model,
     all: &SegmentList<'_>,
 ) -> Outcome<(DiagnosisProblem, columns::CandidateColumns)> {
     let measured = stack(all, |one| Ok(one.run.measured_forces()?.to_vec()))?;
+    // Forces that are all zero come from a recording without them.
     if measured.iter().flatten().all(|force| *force == 0.0) {
         let file = all.first().map(|(one, _)| one.run.file.as_str());
         return Err(Error::input(zero_force_message(
@@ -344,6 +353,8 @@ fn fix_parameters(problem: &mut DiagnosisProblem, model: &Model, held: FixedPara
 }
 
 /// Columns of viscous friction, dry friction and an offset of every drive, in this order.
+///
+/// Fails when a pose has no solution.
 fn friction(model: &Model, all: &SegmentList<'_>) -> Outcome<Vec<ForceColumn>> {
     let rates = stack(all, |one| drive_rates(model, one))?;
     let mut friction = Vec::new();
@@ -362,6 +373,8 @@ fn friction(model: &Model, all: &SegmentList<'_>) -> Outcome<Vec<ForceColumn>> {
 
 /// White noise of each force, N or N m. After decimation motion may look like noise, so the noise of all
 /// recorded samples bounds it.
+///
+/// Fails when a recording has no forces.
 fn noise_levels(measured: &[Vec<f64>], all: &SegmentList<'_>) -> Outcome<Vec<f64>> {
     let mut noises = Vec::with_capacity(measured.len());
     for (d, kept) in measured.iter().enumerate() {

@@ -50,6 +50,7 @@ pub fn effect(effect: &LocatedEffect) -> String {
 /// Effects as a list for a sentence: `x, y and z`.
 pub fn effects(effects: &[LocatedEffect]) -> String {
     let all: Vec<String> = effects.iter().map(effect).collect();
+    // The last effect is joined by `and`.
     match all.as_slice() {
         [] => "nothing".to_owned(),
         [one] => one.clone(),
@@ -59,9 +60,11 @@ pub fn effects(effects: &[LocatedEffect]) -> String {
 
 /// The effects that a step of the ladder added and dropped.
 pub fn rung(rung: &SelectionStep) -> String {
+    // The first step is the model of the file.
     if rung.added.is_empty() && rung.dropped.is_empty() {
         return "the model as it is".to_owned();
     }
+    // Signs show what was added and what became unnecessary.
     let mut says = Vec::new();
     says.extend(rung.added.iter().map(|one| format!("+ {}", effect(one))));
     says.extend(rung.dropped.iter().map(|one| format!("− {}", effect(one))));
@@ -75,6 +78,7 @@ fn is_rounding(noise_floor: f64) -> bool {
 
 /// The noise floor as a sentence; errors are compared with it.
 pub fn noise_floor_text(diagnosis: &ModelDiagnosis) -> String {
+    // Errors are compared with this figure.
     let floor = percent(Some(diagnosis.noise_floor));
     if is_rounding(diagnosis.noise_floor) {
         format!("The forces are noise-free: errors below {floor} are rounding.")
@@ -98,6 +102,7 @@ pub fn floor_label(noise_floor: f64) -> &'static str {
 /// returned unchanged.
 pub fn refusal(reason: &str, has_effects: bool) -> &str {
     match reason {
+        // Words of the search at the left, sentences at the right.
         "sign" => "its value would have the wrong sign",
         "explains nothing that is left" if has_effects => {
             "redundant: the effects found already explain it"
@@ -127,11 +132,13 @@ pub fn verdict(
     judged: ValidationMethod,
 ) -> String {
     let ladder = &diagnosis.steps;
+    // Without steps there is no verdict.
     let (Some(first), Some(last)) = (ladder.first(), ladder.last()) else {
         return String::new();
     };
     let noise = noise_floor_text(diagnosis);
     let found: Vec<LocatedEffect> = diagnosis.effects.iter().map(|f| f.effect.clone()).collect();
+    // The first step is the model as it is, the last one has all effects.
     let falls = error_reduction_text(first, last, channels, judged);
     let them = if found.len() == 1 { "it" } else { "them" };
     // Each verdict states the error and compares it with the noise.
@@ -174,6 +181,7 @@ pub fn verdict(
             }
         }
     };
+    // Suspicions come first, since they may make the verdict wrong.
     let all = [first_checks(diagnosis), Some(says), disturbances(diagnosis)];
     all.into_iter().flatten().collect::<Vec<_>>().join(" ")
 }
@@ -192,6 +200,7 @@ fn error_reduction_text(
         let share = |(before, after): &(&f64, &f64)| **after / before.max(f64::MIN_POSITIVE);
         share(a).total_cmp(&share(b))
     });
+    // The total is used unless it hides the drive.
     let (of, before, after) = match most {
         Some((channel, (before, after)))
             if last.check > HARDLY_LOWER * first.check && after < before =>
@@ -235,6 +244,7 @@ fn is_suspicion(one: &Disturbance) -> bool {
 
 /// Disturbances of the recordings by name, each kind once with all its places; `None` without any.
 fn disturbances(diagnosis: &ModelDiagnosis) -> Option<String> {
+    // Kinds in the order of their first disturbance.
     let mut kinds: Vec<(&str, Vec<&str>)> = Vec::new();
     for one in diagnosis.disturbances.iter().filter(|d| !is_suspicion(d)) {
         let places = one.at.iter().map(String::as_str);
@@ -246,6 +256,7 @@ fn disturbances(diagnosis: &ModelDiagnosis) -> Option<String> {
     let named: Vec<String> = kinds
         .into_iter()
         .map(|(name, mut at)| {
+            // Places keep their order.
             let mut seen = std::collections::HashSet::new();
             // A drive may have the same disturbance in several recordings.
             at.retain(|place| seen.insert(*place));
@@ -288,6 +299,7 @@ pub fn disturbance(one: &Disturbance) -> String {
         .collect();
     let all = all.join(", ");
     match one.kind.as_str() {
+        // Each kind says what it is and what follows for the model.
         "coloured_noise" => format!(
             "{at} has slow noise of {}, mostly below about {}. It does not repeat when the machine passes the same state, so no model \
              can explain it",
@@ -299,6 +311,7 @@ pub fn disturbance(one: &Disturbance) -> String {
             value("step")
         ),
         "outliers" => {
+            // The share of the samples has no unit.
             let share = one.estimates.iter().find(|value| value.name == "share");
             format!(
                 "{at} has outliers: {} of the samples, {} rms. The fit ignores them",
@@ -307,6 +320,7 @@ pub fn disturbance(one: &Disturbance) -> String {
             )
         }
         "periodic_in_time" => {
+            // A hum may have several frequencies.
             let frequencies = one
                 .estimates
                 .iter()
@@ -353,6 +367,7 @@ pub fn disturbance(one: &Disturbance) -> String {
 pub fn lines(text: &str, letters: usize) -> Vec<String> {
     let mut lines: Vec<String> = vec![String::new()];
     for word in text.split_whitespace() {
+        // Words are appended to the last line as long as they fit.
         let line = lines.len() - 1;
         let line = &mut lines[line];
         if !line.is_empty() && line.chars().count() + 1 + word.chars().count() > letters {

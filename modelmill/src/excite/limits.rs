@@ -109,6 +109,9 @@ pub fn merged_limits(model: &Model, given: &[TrajectoryLimit]) -> Outcome<Motion
 }
 
 /// Sets a limit of a coordinate, of its rate (`_d`) or of its acceleration (`_dd`).
+///
+/// Fails when there is no such coordinate, when a rate of a passive coordinate is limited, or when the range of
+/// a rate excludes 0.
 fn set_coordinate_limit(
     model: &Model,
     limits: &mut MotionLimits,

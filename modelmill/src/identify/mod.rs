@@ -58,6 +58,9 @@ impl Model {
     ///
     /// Fails when there are fewer equations than unknowns, when no force was measured, or when a recording contains a
     /// pose that the mechanism cannot reach.
+    ///
+    ///
+    /// Fails when the equations cannot be solved, when a pose has no solution, or when it is cancelled.
     pub fn identify(
         &self,
         fit: &[&PreparedRecording],

@@ -11,6 +11,7 @@ impl ModelChanges {
     /// dependencies (eq. (6)), base parameters (eq. (16)), and operations for each call.
     pub fn json(&self, before: &Model, after: &Model) -> Value {
         // Each change has a name and its text before and after; null means added or removed.
+        // Changes are in the order of the files.
         let list = |changes: &[EntryChange]| -> Vec<Value> {
             changes
                 .iter()
@@ -71,6 +72,7 @@ impl ModelChanges {
             if changes.is_empty() {
                 lines.push(format!("  {none}"));
             }
+            // A changed entry has a removed and an added line.
             for change in changes {
                 let name = &change.name;
                 if let Some(text) = &change.before {
@@ -83,6 +85,7 @@ impl ModelChanges {
         };
         // From the file to the results: entries, products, dependencies, base parameters.
         section("entries of the model file", "no change", &self.entries);
+        // Numbers of products of both models.
         let n = |model: &Model| model.derivation.reduction.products.len();
         section(
             &format!("p_g, eq. (5): {} -> {} products", n(before), n(after)),

@@ -19,6 +19,7 @@ pub fn json(kinds: &[EffectKind]) -> Value {
 
 /// The kinds as a table, a line for each.
 pub fn kind_table(kinds: &[EffectKind]) -> Vec<String> {
+    // Name, places and expression fit into one line for most kinds.
     let rows: Vec<Vec<String>> = kinds
         .iter()
         .map(|kind| vec![kind.name.clone(), places(kind), addition_text(kind)])
@@ -50,6 +51,7 @@ fn unknown_kind_error(name: &str, kinds: &[EffectKind]) -> Error {
 
 /// Where a kind acts, in words.
 fn places(kind: &EffectKind) -> String {
+    // A kind may act on several sorts of places.
     let all: Vec<&str> = kind.on.iter().map(|on| on.description()).collect();
     let joined = all.join(" or ");
     match (kind.places, kind.other) {
@@ -78,6 +80,7 @@ pub fn kind_text(kind: &EffectKind, style: TerminalStyle) -> String {
     lines.push(String::new());
     lines.push(format!("acts on  {}", places(kind)));
     lines.push(format!("adds     {}", addition_text(kind)));
+    // Parameters are identified, constants are fixed or searched.
     let mut symbols: Vec<Vec<String>> = Vec::new();
     // Parameters come first, with the sign that they must have.
     for one in &kind.parameters {
@@ -94,6 +97,7 @@ pub fn kind_text(kind: &EffectKind, style: TerminalStyle) -> String {
     }
     // Constants follow, with their default or the range of their search.
     for one in &kind.constants {
+        // A default stands in parentheses, as text of the library.
         let value = one.value.as_ref();
         let default = value.map_or_else(String::new, |v| format!(" ({v} if not given)"));
         symbols.push(vec![
@@ -172,6 +176,7 @@ fn search_text(constant: &KindConstant) -> String {
         None => String::new(),
         Some(ConstantSearch::Linear) => "estimated linearly".to_owned(),
         Some(ConstantSearch::Range { from, to, of }) => {
+            // Ranges may be relative to the motion of the place.
             let of = match of {
                 Scale::Rate => " times the largest rate",
                 Scale::Travel => " times the travel",

@@ -12,6 +12,7 @@ use crate::text::table::{ColumnAlignment, count, number, percent, significant, t
 
 /// Number of independent samples that the correlated ones are worth: the median over the parameters.
 fn effective_samples(found: &RegressionEstimate) -> Option<f64> {
+    // Parameters without a finite number, such as known ones, are left out.
     let mut all: Vec<f64> = found
         .deviations
         .effective_samples
@@ -51,6 +52,7 @@ pub(crate) fn json(model: &Model, found: &RegressionEstimate, args: &EstimatorOp
     // Optional parts are added only if the estimator computed them.
     let mut put = |name: &str, what: Value| value[name] = what;
     if let Some(weighting) = &found.weighting {
+        // Weights by drive are iterated with the noise of each drive.
         put("residual_scale", by_drive(&weighting.scales));
         put("iterations", json!(weighting.iterations));
         put("settled", json!(weighting.converged));
@@ -135,6 +137,7 @@ pub(crate) fn text(
     let deviations = &found.deviations;
     // Independent samples, since they explain the size of the standard deviations.
     if let Some(effective) = effective_samples(found) {
+        // One correlation for each drive.
         let correlations: Vec<String> = deviations
             .residual_lag1
             .iter()
@@ -151,6 +154,7 @@ pub(crate) fn text(
     }
     // Noise of each drive, if it was used as weight.
     if let Some(weighting) = &found.weighting {
+        // Drives with their noise in their own units.
         let scales: Vec<String> = weighting
             .scales
             .iter()
@@ -170,6 +174,7 @@ pub(crate) fn text(
                 ", not converged"
             }
         ));
+        // Robust weights reduce the influence of outliers.
         if let Some(bound) = weighting.huber {
             lines.push(format!(
                 "robust weights: {} of the residuals exceed {bound} times the noise (of normally distributed ones 18 % \
@@ -185,6 +190,7 @@ pub(crate) fn text(
         RefinementResult::Prior(_, beliefs) => {
             lines.push(prior_text(*beliefs, found.unknown.len()))
         }
+        // Names of the parameters that were removed.
         RefinementResult::Essential(dropped, rise) => {
             let names: Vec<String> = dropped.iter().map(|one| name(one.parameter)).collect();
             lines.push(if names.is_empty() {
@@ -211,6 +217,7 @@ pub(crate) fn text(
             "instruments: smallest correlation with the regressor {} (1 is ideal, below 0.2 is weak)",
             significant(*strength, 3)
         ));
+        // The difference of both estimates in standard deviations shows the bias.
         let rows: Vec<Vec<String>> = (0..found.unknown.len())
             .map(|i| {
                 let (value, std) = (found.solution.values[i], deviations.std[i]);
@@ -246,6 +253,7 @@ const NEARLY_IMPOSSIBLE: f64 = 0.01;
 
 /// How many base parameters have a soft constraint at their nominal value.
 fn prior_text(beliefs: usize, unknown: usize) -> String {
+    // Parameters without nominal value cannot be constrained.
     let constrained = count(beliefs, "base parameter", "base parameters");
     let without = match unknown - beliefs {
         0 => String::new(),
@@ -267,6 +275,7 @@ const PRINTED_AS_ZERO: f64 = 1e-6;
 /// Share of a physical parameter that the recordings determine, between 0 and 1, as text. The rest comes from
 /// nominal values and from the bounds of physical bodies.
 fn recording_share_text(physical: &PhysicalParameters, i: usize) -> String {
+    // Rounding must not be printed as a share.
     let share = physical.from_recording[i];
     if share < PRINTED_AS_ZERO {
         "0 %".to_owned()
@@ -309,6 +318,7 @@ fn physical_text(
         .collect();
     let is_of_effect = |name: &&String| of_effects.contains(&name.as_str());
     let others = bodies.iter().filter(is_of_effect).count();
+    // The head says how much the bounds cost.
     let mut lines = vec![
         format!(
             "physical parameters of {}, all physically possible{}; the residual grows by {}",

@@ -73,6 +73,7 @@ impl ExcitationResult {
     /// The trajectory as text: quality first, then the use of its limits.
     pub fn text(&self, style: TerminalStyle, spelling: &dyn RemedySpelling) -> String {
         let found = &self.found;
+        // The head has what was asked for.
         let mut lines = vec![style.bold(&format!(
             "{}: {} of {} s",
             self.model,
@@ -93,6 +94,7 @@ impl ExcitationResult {
     /// How well the trajectory determines the base parameters.
     fn conditions(&self) -> Vec<String> {
         let found = &self.found;
+        // The best random trajectory shows what the search gained.
         let mut lines = vec![format!(
             "  condition number {}; {} for the best of {} ({} times better)",
             number(found.condition_number),
@@ -104,6 +106,7 @@ impl ExcitationResult {
             ),
             significant(found.start_condition_number / found.condition_number, 3),
         )];
+        // Scaled columns make the number independent of units.
         if let Some(scaled) = self.scaled {
             lines.push(format!(
                 "  {} after scaling the columns to equal norm; {} evaluated",

@@ -33,9 +33,11 @@ impl DiagnosisFindings {
     /// - `with_nominal_parameters`: the diagnosis with all parameters fixed
     pub fn json(&self, spelling: &dyn StepSpelling) -> Value {
         let diagnosis = &self.diagnosis;
+        // Values are by drive, in the order of the model.
         let channels = self.channels();
         let model = &self.before.model;
-        // Missing effects with the motion that would separate them from their alternatives.
+        // Missing effects with the motion that would separate them from their alternatives. Kinds and places have
+        // the names of the model file.
         let effects: Vec<Value> = (self.missing.iter())
             .map(|missing| {
                 let separation = missing.separation.as_ref();
@@ -50,7 +52,8 @@ impl DiagnosisFindings {
                 })
             })
             .collect();
-        // All candidates, including those that were found; they have no rejection reason.
+        // All candidates, including those that were found; they have no rejection reason. A script can sort them
+        // by either share.
         let candidates: Vec<Value> = (diagnosis.candidates.iter())
             .map(|c| {
                 json!({"kind": c.effect.kind, "at": c.effect.at, "explained": c.explained, "gain": c.gain, "refused": c.rejection_reason})
@@ -66,6 +69,7 @@ impl DiagnosisFindings {
         // Parts of the residual are relative to the rms force of the drive.
         let budget: Map<String, Value> = (channels.iter().zip(&diagnosis.budgets).enumerate())
             .map(|(d, (channel, budget))| {
+                // A drive without force has no relative parts.
                 let part = |x: f64| {
                     if budget.force > 0.0 {
                         x / budget.force
@@ -185,7 +189,8 @@ impl DiagnosisFindings {
         self.refused_text(style, &mut lines);
         self.undecided_text(style, &mut lines);
         self.off_nominal_text(style, spelling, &mut lines);
-        // Entries to add first, then advice for what a model file cannot contain.
+        // Entries to add first, then advice for what a model file cannot contain. Steps are commands or calls,
+        // depending on the reader.
         let mut next: Vec<String> = (self.entries_to_add().iter())
             .map(|entry| spelling.spell_effect(&self.before.model, entry))
             .collect();
@@ -225,6 +230,7 @@ impl DiagnosisFindings {
         // Parts of the residual of each drive, relative to its force.
         let rows: Vec<Vec<String>> = (self.channels().iter().zip(&diagnosis.budgets))
             .map(|(channel, budget)| {
+                // Noise, what does not repeat, and what a model could explain.
                 let of = |x: f64| part(x, budget.force);
                 vec![
                     channel.clone(),
@@ -282,6 +288,7 @@ impl DiagnosisFindings {
                 values.join(", ")
             ));
             // Kinds of the libraries have a text of their own; others are explained here.
+            // The text of the library comes first, since users can add kinds.
             let mut kinds = self.answer.candidates.kinds.iter();
             let kind = kinds.find(|kind| kind.name == found.effect.kind);
             let meaning = kind.map_or_else(

@@ -13,6 +13,8 @@ use crate::text::table::{count, significant};
 
 impl Identification {
     /// The fit with all figures as one JSON object, from which [`modelmill_identify::FitFile`] is read again.
+    ///
+    /// Fails when the fit cannot be written as JSON.
     pub fn json(&self, model: &Model, spelling: &dyn RemedySpelling) -> Outcome<Value> {
         let value = serde_json::to_value(&self.fit);
         let mut value = value.map_err(|error| Error::input(error.to_string()))?;

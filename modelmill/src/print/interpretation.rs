@@ -107,6 +107,7 @@ impl InterpretationResult {
         for says in self.undetermined_directions() {
             lines.push(format!("  {says}."));
         }
+        // Each direction needs one more known parameter.
         if !self.directions().is_empty() {
             let how = message!(
                 "  Fix one parameter of each line at its nominal value: leave it out of {}.",
@@ -139,6 +140,7 @@ impl InterpretationResult {
     /// not plausible.
     fn table(&self, one: &PhysicalSolution) -> Vec<String> {
         let parameters = &self.model.derivation.mechanism.parameters;
+        // The last column is empty unless a value is impossible.
         let rows: Vec<Vec<String>> = (0..self.unknown.len())
             .map(|i| {
                 let parameter = &parameters[self.unknown[i]];
@@ -188,6 +190,7 @@ impl InterpretationResult {
             ("unit", ColumnAlignment::Left),
         ];
         let mut lines = table(2, &columns, &rows);
+        // The sum of squares in standard deviations judges the fit as a whole.
         if let Some(chi_squared) = one.chi_squared {
             lines.push(format!("  chi^2 {}", number(chi_squared)));
         }

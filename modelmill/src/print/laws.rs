@@ -118,6 +118,7 @@ pub(crate) fn gain(law: &ProposedLaw) -> String {
         "explains {} of the squared residual on data that were not fitted",
         percent(Some(law.gain))
     );
+    // A law may replace several effects that approximate it.
     if !law.instead_of.is_empty() {
         says.push_str(", and makes these effects unnecessary: ");
         says.push_str(&words::effects(&law.instead_of));

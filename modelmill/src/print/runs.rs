@@ -78,12 +78,14 @@ impl RunsComparison {
 
     /// The joint fit, in which some values are shared and each run has others for itself.
     fn shared_json(&self, fit: &SharedFit) -> Value {
+        // Names and units come from the model.
         let shared = self.parameters.iter().zip(&fit.shared);
         // Base parameters that are separate for each run are not in the shared list.
         let shared = shared.filter_map(|(info, value)| {
             let value = (*value)?;
             Some(json!({ "name": info.name, "expression": info.expression, "value": value.value, "std": value.deviation, "unit": info.unit }))
         });
+        // Factors of force signals, which need a known load.
         let gains = fit.gains.iter().map(
             |(drive, gain)| json!({ "drive": drive, "gain": gain.value, "std": gain.deviation }),
         );
@@ -110,6 +112,7 @@ impl RunsComparison {
 
     /// Base parameters with one fitted value each as JSON.
     fn parameters_json(&self, fitted: &[FittedValue]) -> Vec<Value> {
+        // A parameter that the run does not determine has no standard deviation.
         let pairs = self.parameters.iter().zip(fitted);
         let one = |(info, fitted): (&ParameterInfo, &FittedValue)| {
             json!({
@@ -125,6 +128,7 @@ impl RunsComparison {
 
     /// A base parameter of a run that differs from that of the first.
     fn moved_parameter_json(&self, run: usize, k: usize) -> Value {
+        // Both values are from separate fits, so their errors are independent.
         let (before, now) = (self.runs[0].alone[k], self.runs[run].alone[k]);
         let deviation = before.difference_deviation(now);
         json!({
@@ -302,9 +306,11 @@ fn write_many_runs(later: &[RunReport], lines: &mut Vec<String>, style: Terminal
 /// A change as JSON; `between` are the indices of both runs.
 fn change_json(between: [usize; 2], change: &RunChange) -> Value {
     let (kind, at, estimates) = change.change.parts(change.unit);
+    // Sizes of the change with standard deviations.
     let estimates = estimates.iter().map(|(name, estimate, unit)| {
         json!({ "name": name, "value": estimate.value, "std": estimate.deviation, "unit": unit })
     });
+    // Only contacts have a time.
     let interval = match &change.change {
         PhysicalChange::ContactEvent { interval, .. } => Some(interval),
         _ => None,
@@ -324,11 +330,13 @@ fn change_json(between: [usize; 2], change: &RunChange) -> Value {
 /// The joint fit: factors of force signals, and values that each run has for itself.
 fn write_shared_fit(fit: &SharedFit, lines: &mut Vec<String>, style: TerminalStyle) {
     lines.push(String::new());
+    // Base parameters that are separate for each run are not counted.
     let n = fit.shared.iter().flatten().count();
     lines.push(style.bold(&format!(
         "Joint fit of all runs, with {} shared",
         count(n, "base parameter", "base parameters")
     )));
+    // A value without standard deviation was not determined.
     let text = |value: FittedValue| match value.deviation {
         Some(deviation) => with_deviation(value.value, deviation),
         None => ["not identifiable".to_owned(), String::new()],
@@ -337,6 +345,7 @@ fn write_shared_fit(fit: &SharedFit, lines: &mut Vec<String>, style: TerminalSty
         lines.push(
             "  Factors of the force signals (true force = factor times measured force):".to_owned(),
         );
+        // One row for each drive.
         let rows: Vec<Vec<String>> = (fit.gains.iter())
             .map(|(drive, gain)| [vec![drive.clone()], text(*gain).to_vec()].concat())
             .collect();
@@ -347,8 +356,10 @@ fn write_shared_fit(fit: &SharedFit, lines: &mut Vec<String>, style: TerminalSty
         ];
         lines.extend(table(4, &columns, &rows));
     }
+    // Runs without values of their own are left out.
     for (file, values) in fit.runs.iter().filter(|(_, values)| !values.is_empty()) {
         lines.push(format!("  {file}"));
+        // A change relative to the first run is marked as such.
         let row = |one: &RunValue| {
             let [value, deviation] = text(one.value);
             let against = if one.is_against_first {

@@ -21,7 +21,8 @@ impl ModelCheck {
         let model = &self.model;
         let loaded = &model.loaded;
         let mut warnings = self::warnings(loaded, spelling);
-        // Warnings of the derivation come after those of the file.
+        // Warnings of the derivation come after those of the file: retained products that the reduction could not
+        // use.
         let in_vain = ineffective_retained(&model.derivation).into_iter();
         warnings.extend(in_vain.map(|(k, says)| {
             let span = loaded.retain.get(k);
@@ -34,6 +35,7 @@ impl ModelCheck {
                 "column": place.map(|p| p.1),
             })
         }));
+        // A reduction for one geometry and a rank that is uncertain.
         let caution = model.derivation.reduction.method.caution();
         let judged = caution.iter().chain(&self.warnings);
         warnings.extend(
@@ -82,6 +84,7 @@ fn diagnostics(
     found
         .iter()
         .map(|one| {
+            // Files that are included have their own path.
             let place = one.span.map(|span| {
                 let (line, column) = sources.line_and_column(span);
                 let file = sources.files.get(span.file);
@@ -136,11 +139,12 @@ impl ModelSummary {
         style: TerminalStyle,
     ) -> String {
         let m = &derivation.mechanism;
+        // The file is valid, otherwise its errors would be printed.
         let mut lines = vec![style.bold(&format!("{}: valid", plain(name)))];
         if let Some(title) = &m.title {
             lines.push(format!("  {}", plain(title)));
         }
-        // Names of the lines are padded to one width.
+        // Each line begins with what it counts, padded to one width.
         let mut line = |what: &str, text: String| lines.push(format!("  {what:<20}{text}"));
         let list = |names: &[String]| match names {
             [] => String::new(),
@@ -155,6 +159,7 @@ impl ModelSummary {
         };
         line("module", format!("{module} ({whose})"));
         line("bodies", self.bodies.to_string());
+        // Most models have none.
         if self.lumped_masses > 0 {
             line("lumped masses", self.lumped_masses.to_string());
         }
@@ -173,12 +178,14 @@ impl ModelSummary {
             "actuators",
             format!("{}{}", self.drives.len(), list(&drives(m, true))),
         );
+        // Rows of the equations without a drive have force zero.
         if !self.undriven.is_empty() {
             line(
                 "undriven",
                 format!("{}{}", self.undriven.len(), list(&drives(m, false))),
             );
         }
+        // Each row of the equations belongs to one degree of freedom.
         line("degrees of freedom", m.drives.len().to_string());
         if !self.effects.is_empty() {
             line(
@@ -251,6 +258,7 @@ fn joint(motion: CoordinateMotion, name: &str, passive: bool) -> String {
 
 /// Drives with the joint or the points between which they act, either the actuated or the undriven ones.
 fn drives(m: &Mechanism, is_driven: bool) -> Vec<String> {
+    // Drives beyond the degrees of freedom are listed with the others.
     let shared = m.shared_drives.iter();
     m.drives
         .iter()

@@ -21,6 +21,7 @@ pub fn parameters(parameters: &[FitParameter]) -> Vec<String> {
                 } else {
                     format!("({})", number(p.value))
                 },
+                // A parameter that was not identified says why.
                 match (p.status, p.std) {
                     (ParameterStatus::Known, _) => "known".to_owned(),
                     (ParameterStatus::NotEssential, _) => "not essential".to_owned(),
@@ -28,6 +29,7 @@ pub fn parameters(parameters: &[FitParameter]) -> Vec<String> {
                     (ParameterStatus::Identified, Some(std)) => significant(std, 2),
                     (ParameterStatus::Identified, None) => "—".to_owned(),
                 },
+                // A value of zero has no relative standard deviation.
                 p.std.map_or_else(String::new, |std| {
                     if p.value == 0.0 {
                         "-".to_owned()
@@ -55,6 +57,7 @@ pub fn parameters(parameters: &[FitParameter]) -> Vec<String> {
 
 /// Expressions of the base parameters as JSON and fit files write them: `p1_min = ...`.
 pub fn expressions(indent: usize, model: &Model) -> Vec<String> {
+    // The expression shows which physical parameters a base parameter combines.
     let indent = " ".repeat(indent);
     let lines = model.base.iter();
     lines
@@ -67,6 +70,7 @@ pub fn expressions(indent: usize, model: &Model) -> Vec<String> {
 /// used follow as a second table.
 pub fn figures(named: &[(&str, &ErrorFigures)]) -> Vec<String> {
     let mut rows = Vec::new();
+    // The name stands in the first row of its comparison only.
     for (name, figures) in named {
         let mut name = (*name).to_owned();
         // A total needs one unit: forces and torques are not added up.
@@ -88,6 +92,7 @@ pub fn figures(named: &[(&str, &ErrorFigures)]) -> Vec<String> {
         }
         // One row for each drive, with its error in the band if there is one.
         for (channel, one) in &figures.channels {
+            // The band is the same for all drives.
             let band = figures.band.as_ref();
             let band = band.and_then(|band| band.channels.get(channel));
             rows.push(vec![
@@ -103,6 +108,7 @@ pub fn figures(named: &[(&str, &ErrorFigures)]) -> Vec<String> {
             ]);
         }
     }
+    // Relative errors come first, absolute ones after them.
     let mut lines = table(
         2,
         &[
@@ -140,6 +146,7 @@ fn rows_of_fits(named: &[(&str, &ErrorFigures)]) -> Vec<String> {
     let Some((_, first)) = fits.first() else {
         return Vec::new();
     };
+    // A row has a title and one cell for each comparison.
     let row = |title: &str, cell: &dyn Fn(usize) -> String| {
         let cells = (0..fits.len()).map(cell);
         std::iter::once(title.to_owned()).chain(cells).collect()
@@ -157,6 +164,7 @@ fn rows_of_fits(named: &[(&str, &ErrorFigures)]) -> Vec<String> {
         };
         rows.push(row(drive, &cell));
     }
+    // The comparisons are the columns.
     let heads = fits.iter().map(|(name, _)| (*name, ColumnAlignment::Right));
     let columns: Vec<(&str, ColumnAlignment)> = std::iter::once(("", ColumnAlignment::Left))
         .chain(heads)

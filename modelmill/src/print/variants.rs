@@ -50,6 +50,7 @@ impl VariantComparison {
 
     /// The comparison as text, without its notes.
     pub fn text(&self, style: TerminalStyle) -> String {
+        // The motion on which both variants are compared.
         let mut lines = vec![style.bold(&format!(
             "along {}: {} in {} s",
             self.recordings.join(", "),
@@ -87,6 +88,7 @@ impl VariantComparison {
             return vec!["  the files have no `[limits]`".to_owned()];
         }
         let mut lines = Vec::new();
+        // The worst changes come first.
         for crossing in [
             LimitCrossing::NowExceeded,
             LimitCrossing::StillExceeded,
@@ -157,6 +159,7 @@ fn drive(one: &DriveVariants) -> Value {
             "by_value": term.by_value,
         })
     };
+    // Terms are grouped by their product of parameters.
     let products = one.products.iter().map(|product| {
         json!({
             "product": product.product,
@@ -176,6 +179,7 @@ fn drive(one: &DriveVariants) -> Value {
 
 /// One line of a limit: what each model uses of it.
 fn limit_line(one: &LimitUse) -> String {
+    // A model without this limit has no share.
     let used = one
         .used
         .map(|used| used.map_or_else(|| "no limit".to_owned(), part));
@@ -190,6 +194,7 @@ fn limit_line(one: &LimitUse) -> String {
             format!(" ({}, then {})", text(a), text(b))
         }
     };
+    // The state in words, in front of both shares.
     let says = match one.crossing() {
         LimitCrossing::NowExceeded => "is now exceeded: ",
         LimitCrossing::StillExceeded => "is exceeded by both: ",
@@ -210,12 +215,14 @@ fn part(used: f64) -> String {
 fn efforts(drives: &[DriveVariants]) -> Vec<String> {
     let mut rows = Vec::new();
     for one in drives {
+        // The unit follows the forces; powers and work have theirs in the head.
         let row = |drive: &str, which: &str, cells: [String; 6]| {
             let mut row = vec![drive.to_owned(), which.to_owned()];
             row.extend(cells);
             row.insert(4, one.unit.to_owned());
             row
         };
+        // Four digits show changes that matter.
         let shown = |effort: &DriveEffort| numbers(effort).map(|x| significant(x, 4));
         rows.push(row(&one.drive, "before", shown(&one.before)));
         rows.push(row("", "after", shown(&one.after)));
@@ -262,6 +269,7 @@ fn change(before: f64, after: f64) -> String {
     if by.abs() <= UNCHANGED * before.abs() {
         return "-".to_owned();
     }
+    // A change from zero has no percentage.
     let sign = if by > 0.0 { "+" } else { "-" };
     if before == 0.0 {
         return format!("{sign}{}", significant(by.abs(), 4));
@@ -271,6 +279,7 @@ fn change(before: f64, after: f64) -> String {
 
 /// Terms that cause the difference of a drive, the largest first.
 fn shares(one: &DriveVariants) -> Vec<String> {
+    // The size of the difference gives the shares a meaning.
     let size = one.difference;
     if one.products.is_empty() {
         return vec![format!("  {}: no difference", one.drive)];
@@ -282,6 +291,7 @@ fn shares(one: &DriveVariants) -> Vec<String> {
         significant(size.rms, 4),
         unit = one.unit
     )];
+    // Products show the causes in groups, terms show each of them.
     if one.products.len() > 1 {
         let least = LEAST_SHARE * one.products[0].share.abs();
         let large = (one.products.iter()).take_while(|p| p.share.abs() >= least);
@@ -297,6 +307,7 @@ fn shares(one: &DriveVariants) -> Vec<String> {
         let all: Vec<String> = most.collect();
         lines.push(format!("    by product of p_g: {}{more}", all.join(", ")));
     }
+    // Shares may be negative, where a term reduces the difference.
     let mut terms: Vec<&TermShare> = one.products.iter().flat_map(|p| &p.terms).collect();
     terms.sort_by(|a, b| b.share.abs().total_cmp(&a.share.abs()));
     let least = terms
@@ -341,6 +352,7 @@ fn shares(one: &DriveVariants) -> Vec<String> {
 
 /// A share in per cent with its sign.
 fn signed_percent(share: f64) -> String {
+    // A positive share has no sign.
     let size = percent(Some(share.abs()));
     if share < 0.0 {
         format!("-{size}")
@@ -369,6 +381,7 @@ fn column_share_text(term: &TermShare) -> String {
 
 /// Value of a term, and the one before.
 fn value(term: &TermShare) -> String {
+    // Numbers without unit stand alone.
     let unit = match term.unit.as_str() {
         "1" | "" => String::new(),
         unit => format!(" {unit}"),

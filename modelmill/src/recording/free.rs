@@ -23,6 +23,8 @@ pub(crate) fn free_bodies(mechanism: &Mechanism) -> impl Iterator<Item = &FreeBo
 
 /// Completes a raw recording: quaternions of unit length with continuous sign, and zero forces where no drive acts
 /// and no force was measured. The notes state what was added.
+///
+/// Fails when a quaternion is far from unit length, or when a twist is incomplete.
 pub(super) fn complete(model: &Model, raw: &mut Raw) -> Outcome<Vec<RecordingNote>> {
     let mechanism = &model.derivation.mechanism;
     // Free bodies first: their poses are needed for the forces.
@@ -106,6 +108,8 @@ fn add_shared_drive_forces(mechanism: &Mechanism, raw: &mut Raw) -> Outcome {
 }
 
 /// Scales quaternions to unit length, and changes the sign of those opposite to the one before.
+///
+/// Fails when a quaternion is far from unit length.
 fn normalise_quaternions(raw: &mut Raw, names: [&str; 4]) -> Outcome {
     let mut columns: Vec<Vec<f64>> = Vec::new();
     for name in names {
@@ -147,6 +151,8 @@ fn normalise_quaternions(raw: &mut Raw, names: [&str; 4]) -> Outcome {
 
 /// Refuses a twist of which only some components are recorded, and accelerations without the velocities that they
 /// change.
+///
+/// Fails when components are missing; the message names all of them.
 fn check_twist(mechanism: &Mechanism, body: &FreeBody, raw: &Raw) -> Outcome {
     let name = |i: usize| mechanism.coordinates[i].name.as_str();
     // Velocity and angular velocity are tested separately: all three components, or none.

@@ -34,6 +34,8 @@ pub use modelmill_identify::{PreparedRun, SmoothingMethod, StatePreparation};
 pub use options::RecordingOptions;
 
 /// Reads a recording with the columns that a model needs, completes free bodies and repairs faults of sensors.
+///
+/// Fails when the file cannot be read or lacks columns.
 fn read_raw(model: &Model, file: &RecordingFiles, reading: &RecordingOptions) -> Outcome<Raw> {
     let name = file.name();
     // Names of the file are needed to resolve the mapping.

@@ -60,6 +60,7 @@ fn emphasis_html(text: &str) -> String {
 /// The table of all mechanisms: numbers of joints, loops, drives and base parameters, operations, and seconds
 /// of the derivation.
 fn counts(mechanisms: &[AtlasMechanism]) -> String {
+    // Numbers are sorted by value.
     let whole = |n: usize| TableCell::number(&n.to_string(), n as f64);
     let rows: Vec<Vec<TableCell>> = mechanisms
         .iter()

@@ -53,6 +53,7 @@ pub fn section(before: &ModelVersion, after: Option<&ModelVersion>, names: [&str
     let most = (BUDGET / curves.max(1)).max(LEAST);
     let mut html = String::new();
     for (place, k) in order[..shown].iter().enumerate() {
+        // Each recording is folded, with the first one open.
         let run = &before.runs[*k];
         let title = format!(
             "{} {}",
@@ -190,6 +191,7 @@ fn static_picture(title: &str, curves: &[PlotCurve]) -> String {
 /// A curve for the script: the number that a step stands for, and the steps.
 fn pack(curve: &PlotCurve, most: usize) -> serde_json::Value {
     let values = &curve.values;
+    // Extremes of each segment are kept.
     let kept: Vec<f64> = thin_out(values, most).into_iter().map(|(_, v)| v).collect();
     let [low, high] = range(&kept);
     // A constant curve has a step of zero.

@@ -61,6 +61,7 @@ impl PlotAxis {
 
     /// The position of a value, kept within the axis.
     pub(crate) fn position(&self, value: f64) -> f64 {
+        // The share of the axis between its ends.
         let share = if self.log {
             (value.max(1e-300) / self.from).ln() / (self.to / self.from).ln()
         } else {
@@ -135,6 +136,7 @@ impl PlotAxis {
 fn round_step(rough: f64) -> f64 {
     let rough = rough.max(f64::MIN_POSITIVE * 1e10);
     let decade = 10_f64.powf(rough.log10().floor());
+    // Readers can interpolate between these steps.
     let steps = [1.0, 2.0, 5.0, 10.0];
     let step = steps.into_iter().find(|s| s * decade >= rough * 0.999);
     step.unwrap_or(10.0) * decade

@@ -120,6 +120,7 @@ pub(crate) fn figures(
     let judged = before.validation_runs();
     let mut html = String::new();
     for (d, drive) in before.model.drives().iter().enumerate() {
+        // Errors on the runs that judge the model.
         let error = before.errors(&judged, d);
         // With a delay the model with effects has other samples.
         let rest = after.map(|after| after.errors(&judged, d));
@@ -153,6 +154,7 @@ pub(crate) fn figures(
             .chain([rest.map(|rest| ("with the effects", sizes(&rest)))])
             .flatten()
             .collect();
+        // Names of the axes with units.
         let names = [i, j].map(|k| {
             let name = &variables[k].0;
             format!("{name}, {}", variable_unit(&before.model, name))
@@ -186,6 +188,7 @@ fn picture(
         .fold(0.0_f64, |m, v| m.max(*v));
     let mut picture = SvgPicture::new(860.0, top + height + 66.0);
     for (k, (title, map)) in maps.iter().enumerate() {
+        // The second map is to the right of the first.
         let left = 62.0 + k as f64 * (width + 62.0);
         let x = PlotAxis::new(grid.x, [left, left + width]);
         let y = PlotAxis::new(grid.y, [top + height, top]);

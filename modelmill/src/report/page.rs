@@ -63,10 +63,12 @@ pub fn page(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) -> Outcom
     ];
     // Links to all sections at the top of the page.
     page.push_str("<nav>");
+    // Each link leads to the id of its section.
     for (id, title, _) in &sections {
         let _ = write!(page, "<a href=\"#report-{id}\">{title}</a> ");
     }
     page.push_str("</nav>\n");
+    // The summary is above all sections, so that the result is seen first.
     page.push_str(&summary(findings));
     for (id, title, html) in &sections {
         let _ = write!(
@@ -96,6 +98,7 @@ pub fn scripts() -> impl Iterator<Item = &'static str> {
 
 /// Text between two marks; empty if they are missing.
 pub(super) fn text_between<'a>(text: &'a str, from: &str, to: &str) -> &'a str {
+    // The first occurrence of each mark counts.
     let inner = text
         .split_once(from)
         .and_then(|(_, rest)| rest.split_once(to));
@@ -111,6 +114,7 @@ fn summary(findings: &DiagnosisFindings) -> String {
         DiagnosisVerdict::MissingEffect => ("missing", "an effect is missing"),
         DiagnosisVerdict::Unexplained => ("unexplained", "error is not explained"),
     };
+    // The same sentences as in the text output.
     let says = words::verdict(
         diagnosis,
         &findings.before.model.drives(),
@@ -124,8 +128,10 @@ fn summary(findings: &DiagnosisFindings) -> String {
             tiles.push(("with the effects", percent(Some(last.check))));
         }
     }
+    // Errors cannot fall below the noise.
     let noise = words::floor_label(diagnosis.noise_floor);
     tiles.push((noise, percent(Some(diagnosis.noise_floor))));
+    // A list of terms, which also makes sense without style.
     let tiles: Vec<String> = tiles
         .iter()
         .map(|(name, value)| format!("<div><dt>{name}</dt><dd>{}</dd></div>", escape(value)))
@@ -139,6 +145,7 @@ fn summary(findings: &DiagnosisFindings) -> String {
 
 /// Errors after each added effect, as picture and table, and errors of each drive.
 fn ladder_section(findings: &DiagnosisFindings) -> String {
+    // The picture shows the steps, the table has the numbers.
     let diagnosis = &findings.diagnosis;
     format!(
         "<figure class=\"still\"><figcaption><b>Error relative to the force</b> <span class=\"key c-fit\">fit</span> \
@@ -155,6 +162,7 @@ fn ladder_section(findings: &DiagnosisFindings) -> String {
 
 /// Missing effects with next steps, then laws.
 fn missing_section(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) -> String {
+    // Effects of the library come before laws, which are only hypotheses.
     let mut html = effects(findings, spelling);
     if !findings.laws.is_empty() {
         html.push_str(&laws(findings, spelling));
@@ -179,6 +187,7 @@ fn laws(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) -> String {
             escape(&told::values(law)),
             escape(&told::gain(law))
         );
+        // Alternatives that the recordings do not distinguish.
         if !hypothesis.near_ties.is_empty() {
             html.push_str("<p>These laws explain the recordings equally well:</p>\n<ul>\n");
             for tie in &hypothesis.near_ties {
@@ -186,6 +195,7 @@ fn laws(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) -> String {
             }
             html.push_str("</ul>\n");
         }
+        // A law without memory can be added from a library file.
         match &law.entry {
             Some(entry) => {
                 let command = spelling.spell_effect_of_library(model, &entry.effect, told::LIBRARY);
@@ -224,6 +234,7 @@ fn effects(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) -> String 
         };
         return format!("<p>{says}</p>\n");
     }
+    // The effects with values, then the steps.
     let mut html = tables::effects(findings);
     if let Err(says) = &findings.after {
         let _ = writeln!(
@@ -263,6 +274,7 @@ fn curves_section(findings: &DiagnosisFindings) -> String {
 
 /// Regions of the error before and after the effects, and error maps.
 fn location(findings: &DiagnosisFindings) -> String {
+    // Both models are shown if the second one could be built.
     let after = findings.after.as_ref().ok();
     let mut html = String::new();
     html.push_str(&sentences(
@@ -306,6 +318,7 @@ fn location(findings: &DiagnosisFindings) -> String {
 /// A sentence in place of regions: the error is rounding, or no region stands out.
 fn sentences(places: &ErrorLocations, what: &str) -> String {
     let mut html = String::new();
+    // Regions of rounding errors would mislead.
     if !places.rounding.is_empty() {
         let _ = writeln!(
             html,
@@ -358,6 +371,7 @@ fn parameters(findings: &DiagnosisFindings) -> String {
 
 /// The page of equations inside this page: its anchors get a prefix, its headings go down two levels.
 fn embed_equations(findings: &DiagnosisFindings, page: &str) -> String {
+    // Only the main part is taken; styles and scripts are on this page already.
     let inner = text_between(page, "<main>", "</main>")
         .replace(" id=\"", " id=\"equations-")
         .replace("href=\"#", "href=\"#equations-");
@@ -369,6 +383,7 @@ fn embed_equations(findings: &DiagnosisFindings, page: &str) -> String {
             .replace(&format!("<{from}>"), &format!("<{to}>"))
             .replace(&format!("</{from}>"), &format!("</{to}>"));
     }
+    // The summary of the folded part names the model.
     let what = if findings.after.is_ok() {
         "The model with the effects"
     } else {

@@ -32,6 +32,7 @@ pub(crate) fn figures(
 ) -> String {
     let mut html = String::from("<div class=\"grid\">\n");
     for region in regions {
+        // A region without samples has a sentence only.
         let picture = picture(region, before, after, variables).unwrap_or_default();
         let _ = writeln!(
             html,
@@ -46,6 +47,7 @@ pub(crate) fn figures(
 /// A region in one sentence; every number has its unit.
 pub(crate) fn sentence(region: &ErrorRegion, model: &Model) -> String {
     let unit = variable_unit(model, &region.variable);
+    // Units make the sentence readable without the picture.
     let [low, high] = region.range;
     let name = if region.variable == TIME_COLUMN {
         "time"
@@ -115,6 +117,7 @@ fn picture(
             .find(|(name, _)| *name == region.variable)?;
         values.clone()
     };
+    // Errors before and after the effects.
     let mut curves = vec![("c-before", before.errors(&runs, d))];
     if let Some(after) = after {
         curves.push(("c-after", after.errors(&runs, d)));
@@ -136,6 +139,7 @@ fn picture(
     if bounds.is_empty() {
         return None;
     }
+    // The axis across covers all samples.
     let x = PlotAxis::new(range(&over), [LEFT, WIDTH - 10.0]);
     let y = PlotAxis::new(with_room(range(&bounds), 0.06), [HEIGHT - 36.0, 8.0]);
     let mut picture = SvgPicture::new(WIDTH, HEIGHT);
@@ -154,6 +158,7 @@ fn picture(
     for (class, bins) in &bins {
         let (mut upper, mut lower, mut mean) = (String::new(), String::new(), String::new());
         for (k, bin) in bins.iter().enumerate() {
+            // The band is a closed path: up along one side, back along the other.
             let at = x.position(bin.at);
             let pen = if k == 0 { 'M' } else { 'L' };
             let _ = write!(mean, "{pen}{at:.1} {:.1}", y.position(bin.mean));
@@ -203,6 +208,7 @@ fn bin_errors(over: &[f64], error: &[f64]) -> Vec<ErrorBin> {
         let sum = &mut sums[k.min(BINS - 1)];
         *sum = (sum.0 + 1.0, sum.1 + e, sum.2 + e * e);
     }
+    // Means of very few samples would only show noise.
     let bins = sums.iter().enumerate().filter(|(_, (n, _, _))| *n >= 3.0);
     bins.map(|(k, (n, sum, squares))| {
         let mean = sum / n;

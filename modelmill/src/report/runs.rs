@@ -34,6 +34,7 @@ pub fn runs_page(compared: &RunsComparison, spelling: &dyn RemedySpelling) -> St
             changes_table(compared),
         ),
     ];
+    // The joint fit exists only if it was requested.
     if let Some(shared) = &compared.shared {
         sections.push(("own", "Joint fit of all runs", shared_fit_section(shared)));
     }
@@ -56,6 +57,7 @@ pub fn runs_page(compared: &RunsComparison, spelling: &dyn RemedySpelling) -> St
 /// The verdict: lasting changes, and how many runs differ from the first.
 fn summary(compared: &RunsComparison) -> String {
     let later = compared.runs.len() - 1;
+    // The first run is the reference.
     let changed = compared.runs.iter().skip(1);
     let changed = changed.filter(|run| !run.changes.is_empty()).count();
     // The colour of the verdict.
@@ -64,6 +66,7 @@ fn summary(compared: &RunsComparison) -> String {
     } else {
         "missing"
     };
+    // Lasting changes count more than single runs, so they come first.
     let mut says = match compared.points.len() {
         0 => String::new(),
         n => format!("{}. ", count(n, "lasting change", "lasting changes")),
@@ -79,6 +82,7 @@ fn summary(compared: &RunsComparison) -> String {
 /// Changes as a list, each with those that explain the runs equally well.
 fn changes_list(changes: &[RunChange]) -> String {
     let mut html = String::from("<ul>\n");
+    // One item for each change, with its alternatives in small type.
     for one in changes {
         let _ = write!(html, "<li>{}", escape(&one.says));
         if !one.rivals.is_empty() {
@@ -100,6 +104,7 @@ fn points(compared: &RunsComparison) -> String {
         return "<p>No base parameter changed for two or more runs.</p>\n".to_owned();
     }
     let mut html = String::new();
+    // The file is named, since numbers of runs are hard to find again.
     for point in &compared.points {
         let file = escape(&compared.runs[point.run].file);
         let _ = writeln!(html, "<h3>From run {} on: {file}</h3>", point.run + 1);
@@ -135,6 +140,7 @@ fn points(compared: &RunsComparison) -> String {
 
 /// A value with its standard deviation as a cell.
 fn value(fitted: Option<FittedValue>) -> TableCell {
+    // A value without standard deviation was not determined.
     match fitted {
         Some(FittedValue {
             value,
@@ -180,6 +186,7 @@ fn shared_fit_section(shared: &SharedFit) -> String {
             .collect();
         html.push_str(&table("gains", &["drive", "#factor"], &rows));
     }
+    // One row for each value of each run.
     let rows: Vec<Vec<TableCell>> = (shared.runs.iter())
         .flat_map(|(file, values)| {
             values.iter().map(move |one| {
@@ -207,6 +214,7 @@ fn parameters(compared: &RunsComparison) -> String {
         let mut steps = compared.points.iter().flat_map(|point| &point.steps);
         steps.any(|step| step.parameter == *k)
     };
+    // A parameter that no run determines has no picture.
     let is_determined = |k: &usize| {
         compared
             .runs
@@ -240,9 +248,11 @@ fn determined(fitted: FittedValue) -> Option<[f64; 2]> {
 /// One base parameter over the runs.
 fn picture(compared: &RunsComparison, k: usize) -> String {
     let runs = &compared.runs;
+    // Runs that do not determine the parameter leave a gap.
     let known: Vec<(usize, [f64; 2])> = (runs.iter().enumerate())
         .filter_map(|(at, run)| Some((at, determined(run.alone[k])?)))
         .collect();
+    // Levels before and since each lasting change.
     let steps = compared.points.iter().flat_map(|point| {
         let own = point.steps.iter().filter(|step| step.parameter == k);
         own.map(move |step| (point.run, [step.before.value, step.now.value]))
@@ -264,6 +274,7 @@ pub fn parameter_history(
     let ends: Vec<f64> = (known.iter())
         .flat_map(|(_, [x, d])| [x - BARS * d, x + BARS * d])
         .collect();
+    // The first run is at 1, with half a step of room at each end.
     let x = PlotAxis::new([0.5, n as f64 + 0.5], [LEFT, WIDTH - RIGHT]);
     let y = PlotAxis::new(with_room(range(&ends), 0.05), [HEIGHT - 40.0, 8.0]);
     let mut picture = SvgPicture::new(WIDTH, HEIGHT);
@@ -286,6 +297,7 @@ pub fn parameter_history(
             let d = format!("M{:.1} {level:.1}H{:.1}", at(start), at(*run));
             picture.path("curve c-after", &d);
         }
+        // The level lasts until the next change.
         let level = y.position(*now);
         picture.path(
             "curve c-after",
@@ -308,6 +320,7 @@ pub fn parameter_history(
 
 /// All runs with their sizes, and those that could not be evaluated with the reason.
 fn runs(compared: &RunsComparison, spelling: &dyn RemedySpelling) -> String {
+    // Runs are numbered from 1, as everywhere in the output.
     let mut rows: Vec<Vec<TableCell>> = (compared.runs.iter().enumerate())
         .map(|(k, run)| {
             vec![
@@ -318,6 +331,7 @@ fn runs(compared: &RunsComparison, spelling: &dyn RemedySpelling) -> String {
             ]
         })
         .collect();
+    // Failed runs are listed too, so that none is missed.
     rows.extend(compared.unread.iter().map(|one| {
         let says = TableCell::text(&format!("not evaluated: {}", one.error.spell(spelling)));
         vec![

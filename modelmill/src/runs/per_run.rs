@@ -276,6 +276,8 @@ impl<'a> SharedFitBuilder<'a> {
     }
 
     /// The index of the run that carries a load.
+    ///
+    /// Fails when no run or several runs match its name.
     fn run_of_load(&self, load: &KnownLoad) -> Outcome<usize> {
         let names = self.runs.iter().enumerate();
         // The name must be complete path components at the end of the file name.
@@ -432,6 +434,8 @@ fn fitted_value(values: &JointValues, at: usize) -> FittedValue {
 }
 
 /// Index of a frame among those that may carry a load.
+///
+/// Fails when there is no such body; the message lists all.
 fn frame(payloads: &PayloadColumns, name: &str) -> Outcome<usize> {
     let at = payloads.frames.iter().position(|frame| frame == name);
     at.ok_or_else(|| unknown_name_error("body", name, &payloads.frames))
@@ -446,6 +450,8 @@ fn unknown_name_error(what: &str, name: &str, names: &[String]) -> Error {
 }
 
 /// The columns of a request, one entry for each of its places.
+///
+/// Fails when the kind or the place is unknown.
 fn per_run_columns(
     model: &Model,
     payloads: &PayloadColumns,
@@ -540,6 +546,8 @@ fn per_run_columns(
 }
 
 /// The column of an unknown base parameter with a name.
+///
+/// Fails when there is no such parameter, or when its value is known.
 fn base_parameter(
     model: &Model,
     payloads: &PayloadColumns,

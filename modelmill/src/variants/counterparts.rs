@@ -87,6 +87,8 @@ impl ModelCounterparts {
     }
 
     /// The states of a motion in the order of each model, with the load that its own forces cause.
+    ///
+    /// Fails when a model cannot follow the motion.
     pub(super) fn own_states(
         &self,
         models: [&Model; 2],
@@ -123,6 +125,8 @@ fn without_forces(run: &PreparedRun) -> PreparedRun {
 }
 
 /// The states with the load of the drives, if effects depend on it: the model's forces without these effects.
+///
+/// Fails when the model cannot follow the motion.
 fn with_own_load(model: &Model, mut states: RecordingSegment) -> Outcome<RecordingSegment> {
     if !model.load_dependent_effects().is_empty() {
         // Zero load makes the effects zero; the forces without them are the load.

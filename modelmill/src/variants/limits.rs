@@ -73,6 +73,8 @@ impl VariantLimits {
     }
 
     /// Adds a motion: the states of each model, and its forces `[drive][sample]`, N or N m.
+    ///
+    /// Fails when a model cannot follow the motion.
     pub(super) fn add(
         &mut self,
         models: [&Model; 2],

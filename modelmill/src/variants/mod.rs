@@ -192,6 +192,8 @@ fn for_both<T>(mut of: impl FnMut(usize) -> Outcome<T>) -> Outcome<[T; 2]> {
 }
 
 /// Forces of a model at the values of its file, `[drive][sample]`, N or N m.
+///
+/// Fails when the model cannot follow the motion; the message names it.
 fn forces_of(model: &Model, states: &RecordingSegment) -> Outcome<Vec<Vec<f64>>> {
     along::forces(model, states, &model.nominal).map_err(|error| match error {
         Error::Cancelled => error,

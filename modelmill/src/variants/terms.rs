@@ -117,6 +117,8 @@ impl SummandColumns {
 
     /// Adds a motion: the states of each model, pairs of drives, and for each pair the difference of forces,
     /// `[pair][sample]`.
+    ///
+    /// Fails when a pose has no solution, or when it is cancelled.
     pub(super) fn add(
         &mut self,
         models: [&Model; 2],
