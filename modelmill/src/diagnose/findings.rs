@@ -167,7 +167,7 @@ pub struct EffectEstimate {
 
 /// A diagnosis with all parameters fixed at their nominal values.
 pub struct NominalDiagnosis {
-    /// Verdict, ladder and candidates.
+    /// Verdict, steps and candidates.
     pub diagnosis: ModelDiagnosis,
     /// Missing effects with their estimates.
     pub missing: Vec<(LocatedEffect, Vec<EffectEstimate>)>,

@@ -58,7 +58,7 @@ pub fn effects(effects: &[LocatedEffect]) -> String {
     }
 }
 
-/// The effects that a step of the ladder added and dropped.
+/// The effects that a step of the selection added and dropped.
 pub fn rung(rung: &SelectionStep) -> String {
     // The first step is the model of the file.
     if rung.added.is_empty() && rung.dropped.is_empty() {

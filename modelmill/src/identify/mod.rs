@@ -58,9 +58,6 @@ impl Model {
     ///
     /// Fails when there are fewer equations than unknowns, when no force was measured, or when a recording contains a
     /// pose that the mechanism cannot reach.
-    ///
-    ///
-    /// Fails when the equations cannot be solved, when a pose has no solution, or when it is cancelled.
     pub fn identify(
         &self,
         fit: &[&PreparedRecording],
@@ -144,6 +141,8 @@ fn resolve_weights(
 }
 
 /// Identifies a model from some segments and validates it with others.
+///
+/// Fails when the equations cannot be solved, when a pose has no solution, or when it is cancelled.
 pub fn identify(
     model: &Model,
     data: &[RecordingSegment],

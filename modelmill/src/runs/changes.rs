@@ -1,6 +1,6 @@
 //! Physical changes between runs: their kinds, values and texts.
 //!
-//! Decision: at a drive that carries only its friction, more friction and a larger scale of the force are
+//! Decision: at a drive whose only force is its own friction, more friction and a larger scale of the force are
 //! indistinguishable. Friction changes every day and sensors hardly ever, so friction is named first and the scale
 //! as its alternative.
 
@@ -190,7 +190,7 @@ pub(crate) struct ChangeHypothesis {
 }
 
 /// Additional cost of a changed scale, since friction changes every day, but sensors, torque constants and gears
-/// hardly ever. It decides if both explain the same, as at a drive that carries only its own friction.
+/// hardly ever. It decides if both explain the same, as at a drive whose only force is its own friction.
 const RARE: f64 = 0.2;
 
 /// All hypotheses of the search: payloads, then friction, offset and scale of each drive, clock, zeros of encoders.
