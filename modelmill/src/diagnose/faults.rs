@@ -311,7 +311,7 @@ fn merge_events(all: &SegmentList<'_>) -> Vec<Disturbance> {
         }
         events.push(event.clone());
     }
-    // Very short events are outliers, which are handled elsewhere.
+    // Events that are too short for a contact or push are dropped.
     events.retain(|event| {
         event
             .interval

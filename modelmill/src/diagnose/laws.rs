@@ -510,7 +510,7 @@ impl LawFormula {
             LawShape::Step { centre, width } => {
                 format!("tanh({})", self.scaled_distance(z, centre, width, factor))
             }
-            // Dry friction whose size decays with the rate, as Stribeck friction does.
+            // A force that decays away from zero and changes sign there, as Stribeck friction does over the rate.
             LawShape::Fading { scale, halves } => {
                 let scale = self.constant("scale", scale, factor);
                 let power = match halves {
