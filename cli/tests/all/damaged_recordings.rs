@@ -151,7 +151,10 @@ fn faults_of_sensors_are_named_and_treated() {
         "{says}"
     );
     // Spikes of a million newtons would have moved parameters by many of their deviations.
-    assert!(says.contains("Without their repair, the sensor faults in"), "{says}");
+    assert!(
+        says.contains("Without their repair, the sensor faults in"),
+        "{says}"
+    );
     let (_, says) = identified(&write("sound.csv", &all), &[]);
     assert!(!says.contains("Without their repair"), "{says}");
     // A motor's force before a gear of 60 is another quantity.
