@@ -97,7 +97,10 @@ impl PreparationArgs {
     }
 
     /// The options that were given, as the command line has them, each with a space before it.
-    #[cfg_attr(not(feature = "workbench"), expect(dead_code, reason = "only the workbench prints them"))]
+    #[cfg_attr(
+        not(feature = "workbench"),
+        expect(dead_code, reason = "only the workbench prints them")
+    )]
     pub(crate) fn to_flags(&self) -> String {
         let mut all = String::new();
         let mut option = |name: &str, value: Option<String>| {

@@ -151,9 +151,12 @@ fn faults_of_sensors_are_named_and_treated() {
         "{says}"
     );
     // Spikes of a million newtons would have moved parameters by many of their deviations.
-    assert!(says.contains("Left in, the faults of sensors in"), "{says}");
+    assert!(
+        says.contains("Without their repair, the sensor faults in"),
+        "{says}"
+    );
     let (_, says) = identified(&write("sound.csv", &all), &[]);
-    assert!(!says.contains("Left in"), "{says}");
+    assert!(!says.contains("Without their repair"), "{says}");
     // A motor's force before a gear of 60 is another quantity.
     let geared: Vec<[f64; 5]> = (all.iter())
         .map(|[t, a, b, left, right]| [*t, *a, *b, left / 60.0, right / -60.0])

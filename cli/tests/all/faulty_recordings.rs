@@ -303,7 +303,7 @@ fn forces_of_another_sign_or_unit_are_named() {
             .flat_map(|map| ["--map", map])
             .collect();
         let (mended, says) = notes(&path, &maps);
-        assert!(!says.contains("nominal values give"), "{says}");
+        assert!(!says.contains("Compared with the nominal values"), "{says}");
         let nominal = number(&mended, "/parameters/0/nominal");
         assert!((number(&mended, "/parameters/0/value") / nominal - 1.0).abs() < 0.5);
     }

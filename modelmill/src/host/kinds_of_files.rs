@@ -1,4 +1,4 @@
-//! What a file is that was given in place of another one, so that a refusal can say so.
+//! Recognises files of the project that were given in place of another kind, so that the error can name what they are.
 
 use std::path::Path;
 
@@ -6,17 +6,19 @@ use modelmill_boundary::files::{FileSource, PathKind};
 
 use crate::host::Host;
 
-/// What kind of file of ours this is, in words with an article; `None` where it is none.
+/// The kind of a file of the project, as a phrase with an article; `None` if it is no file of the project.
 pub(crate) fn file_kind(host: &Host, path: &Path) -> Option<&'static str> {
-    // Anything else may be a pipe, which cannot be read twice, or too large to be one of these.
+    // Other files are not opened: a pipe cannot be read twice.
     let files = host.files();
     if files.kind(path) != PathKind::File {
         return None;
     }
+    // A fit is JSON; the size limit excludes recordings that happen to start like it.
     let starts_as_json = || {
         let text = files.read_text(path, 1 << 24).ok()?;
         Some(text.trim_start().starts_with('{'))
     };
+    // Model, rig and plan share the extension; the first one that loads decides.
     if path.extension().is_some_and(|e| e == "toml") {
         if modelmill_spec::load_file_with(path, host.libraries(), files).is_ok() {
             Some("a model file")

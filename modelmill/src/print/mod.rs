@@ -1,5 +1,5 @@
-//! Output of results. Each module takes one value of the library and returns JSON for scripts and text for people; none reads
-//! files or computes.
+//! Output of results. Each module takes one value of the library and returns JSON for scripts and text for
+//! people; none reads files or computes.
 
 mod changes;
 mod comparison;

@@ -33,8 +33,8 @@ fn gravity_that_pulls_the_other_way_is_told() {
             let says = told(&stands, &hangs, name, seed);
             assert!(
                 says.iter()
-                    .any(|says| says.contains("pull the other way")
-                        || says.contains("would turn them")),
+                    .any(|says| says.contains("point in the opposite direction")
+                        || says.contains("would also change their sign")),
                 "{name}, {seed}: {says:?}"
             );
             assert_eq!(

@@ -502,7 +502,7 @@ fn what_nothing_drives_is_left_out() {
         found.notes.iter().any(|note| note
             .says
             .in_library_words()
-            .starts_with("Nothing drives on_q2")),
+            .starts_with("No drive acts on on_q2")),
         "{:?}",
         found.notes
     );
